@@ -7,6 +7,7 @@ a joint with more inertia: where the damping is too large for the links' own ine
 """
 
 import math
+import weakref
 
 import numpy as np
 
@@ -25,7 +26,9 @@ class JointDamping:
 
     def __init__(self, model, client, time_step_s, wanted):
         """``client``: PyBullet's; ``wanted``: {joint index: damping [Nm s/rad or N s/m]}; the others have none."""
-        self._model = model
+        # Its owner: no cycle, so that a deleted model is freed at once, and not by a garbage collection, which leaves
+        # out what /gazebo has frozen.
+        self._model = weakref.proxy(model)
         self._client = client
         self._time_step_s = time_step_s
         #: (n,) as it acts [Nm s/rad or N s/m].

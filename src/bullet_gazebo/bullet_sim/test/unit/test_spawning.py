@@ -4,6 +4,7 @@
 import gc
 import math
 import os
+import weakref
 
 import numpy as np
 import pytest
@@ -22,6 +23,26 @@ LEAK_BYTES = 20e6
 def resident_bytes():
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_a_deleted_model_is_freed_without_a_garbage_collection(world, static):
+    """/gazebo freezes the objects of models: a collection never sees them again."""
+    links = "".join('<link name="%s">%s<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
+                    % (name, INERTIAL % (1.0, 0.01, 0.01, 0.01)) for name in ("base", "arm"))
+    xml = '<robot name="r">%s%s</robot>' % (links, JOINT % ("j", "base", "arm", "0 0 0.2"))
+    gc.disable()
+    try:
+        model = weakref.ref(world.spawn(parse_urdf(xml, source="r"), "r", static=static))
+        world.step()
+        model().set_damping(0, 0.5)
+        model().drive_position(np.array([0]), np.array([0.3]), np.array([5.0]))
+        world.step()
+        world.delete("r")
+        world.step()
+        assert model() is None
+    finally:
+        gc.enable()
 
 
 def write_ball(path, rings=40):
