@@ -10,6 +10,10 @@ import numpy as np
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics.collision import Touch
 from bullet_sim import World
+from urdf_model import Mesh
+
+# Random postures in which the hull of a fixed link's mesh must touch what the mesh touches, to replace it.
+_COMPARED = 300
 
 
 class BulletChecker:
@@ -19,14 +23,18 @@ class BulletChecker:
     does not.
     """
 
-    def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0):
+    def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0, rough=None):
         """``model``: the robot in ``world`` (bullet_sim); ``self_collision_pairs``: [(link, link)] that must not
         touch, all plausible ones if None. ``margin_m``: allowed depth of a contact; shapes are often a little
-        too large.
+        too large. ``rough``: (World, Model) of the same robot, in which the meshes of its fixed link are convex.
         """
         self._world, self._model, self._margin_m = world, model, margin_m
         pairs = plausible_pairs(world, model) if self_collision_pairs is None else self_collision_pairs
         model.set_self_collision_pairs(pairs)
+        self._rough, self._is_convex = rough, False
+        if rough is not None:
+            rough[1].set_self_collision_pairs(pairs)
+            self._is_convex = self._agree()
         self._plans = {}
 
     @classmethod
@@ -39,7 +47,12 @@ class BulletChecker:
         world = World(warn=warn, **({} if find_mesh is None else {"find_mesh": find_mesh}))
         options = {} if mesh_cuts is None else {"mesh_cuts": mesh_cuts}
         model = world.spawn(robot, robot.name or "robot", static=True, **options)
-        return cls(world, model, self_collision_pairs, margin_m)
+        rough = None
+        if mesh_cuts is None and _has_meshes(model.merged.links[model.merged.root]):
+            rough_world = World(**({} if find_mesh is None else {"find_mesh": find_mesh}))
+            # Meshes of a body that moves are convex; without a step it stays.
+            rough = rough_world, rough_world.spawn(robot, robot.name or "robot", static=False)
+        return cls(world, model, self_collision_pairs, margin_m, rough)
 
     @property
     def world(self):
@@ -54,7 +67,7 @@ class BulletChecker:
 
     def set_posture(self, joint_names, q):
         """Set the other joints of the robot, such as the other arm's."""
-        self._model.set_joint_positions(self._model.index(joint_names), np.asarray(q, dtype=float))
+        self._put(self._model.index(joint_names), np.asarray(q, dtype=float))
 
     def contact(self, joint_names, q):
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None if there is none."""
@@ -67,9 +80,9 @@ class BulletChecker:
         every posture touches that has this link in the same pose.
         """
         index, moved, last = self._plan(tuple(joint_names))
-        self._model.set_joint_positions(index, q)
+        self._put(index, q)
         worst, is_fixed = None, False
-        for found in self._world.touching(self._model):
+        for found in self._touching():
             if found.distance >= -self._margin_m:
                 continue
             ours, others = self._named(found)
@@ -81,9 +94,35 @@ class BulletChecker:
                 worst = Touch(ours[0], others, len(ours) == 1, -found.distance)
         return worst, is_fixed
 
+    def _put(self, index, q):
+        self._model.set_joint_positions(index, q)
+        if self._rough is not None:
+            self._rough[1].set_joint_positions(index, q)
+
+    def _touching(self):
+        """The contacts of the robot. Those with a fixed link of triangles take twenty times as long as all others, and
+        are looked at where something touches its convex hull, unless that is as good."""
+        if self._rough is not None and len(self._world.models) == 1:
+            world, model = self._rough
+            found, fixed = world.touching(model), model.merged.root
+            if self._is_convex or all(fixed not in (one.link_a, one.link_b) for one in found):
+                return found
+        return self._world.touching(self._model)
+
+    def _agree(self):
+        """Whether the same pairs touch with the fixed link as its hull, in all of some random postures."""
+        (world, model), index = self._rough, np.arange(len(self._model.joint_names))
+        for q in random_postures(model, _COMPARED):
+            self._put(index, q)
+            if _touching_pairs(world, model) != _touching_pairs(self._world, self._model):
+                return False
+        return True
+
     def close(self):
         """Close the world."""
         self._world.close()
+        if self._rough is not None:
+            self._rough[0].close()
 
     def _plan(self, joint_names):
         """Return (index of the joints, names of the links that they move, of those that the last one moves); computed
@@ -107,6 +146,21 @@ class BulletChecker:
         return (found.link_b,), "%s/%s" % (found.model_a, found.link_a)
 
 
+def random_postures(model, count):
+    """Postures (count, n) within the joints' limits, of joints that turn on and on within a turn; always the same."""
+    low, high = np.clip(model.lower, -np.pi, np.pi), np.clip(model.upper, -np.pi, np.pi)
+    return np.random.default_rng(0).uniform(low, high, (count, len(low)))
+
+
+def _touching_pairs(world, model):
+    return {frozenset((found.link_a, found.link_b)) for found in world.touching(model)
+            if found.model_a == found.model_b and found.distance < 0.0}
+
+
+def _has_meshes(link):
+    return any(isinstance(one.geometry, Mesh) for one in link.collisions)
+
+
 def self_checker(robot, find_mesh, warn=lambda text: None):
     """Return a BulletChecker of a robot alone: with Baxter's own pairs and convex pieces, or of another robot with all
     pairs that make sense. ``robot``: urdf_model.Robot; ``find_mesh``, ``warn``: as for ``bullet_sim.World``.
@@ -125,10 +179,8 @@ def plausible_pairs(world, model, samples=50):
     neighbours = {frozenset((joint.parent, joint.child)) for joint in model.merged.joints.values()}
     pairs = [pair for pair in itertools.combinations(model.merged.links, 2) if frozenset(pair) not in neighbours]
     model.set_self_collision_pairs(pairs)
-    low, high = np.clip(model.lower, -np.pi, np.pi), np.clip(model.upper, -np.pi, np.pi)
     touches = Counter()
-    for q in np.random.default_rng(0).uniform(low, high, (samples, len(low))):
-        model.set_joint_positions(np.arange(len(low)), q)
-        touches.update({frozenset((found.link_a, found.link_b)) for found in world.touching(model)
-                        if found.model_a == found.model_b and found.distance < 0.0})
+    for q in random_postures(model, samples):
+        model.set_joint_positions(np.arange(len(q)), q)
+        touches.update(_touching_pairs(world, model))
     return [pair for pair in pairs if touches[frozenset(pair)] <= samples // 2]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Collision-free inverse kinematics, on a robot of boxes with obvious contacts."""
+import itertools
 import math
 
 import numpy as np
@@ -49,6 +50,40 @@ def test_straight_arm_is_clear_and_folded_arm_touches(checker):
     assert not touch.with_world and touch.depth_m > 0.0
     # Clear again: it keeps no state between calls.
     assert checker.contact(_JOINTS, np.zeros(3)) is None
+
+
+def boxes_file(path, *boxes):
+    """A mesh of boxes, ((x, y, z) of the middle, sizes) each, as a Wavefront file."""
+    lines, corners = [], list(itertools.product((-0.5, 0.5), repeat=3))
+    for number, (middle, size) in enumerate(boxes):
+        lines += ["v %g %g %g" % tuple(np.array(middle) + np.array(corner) * size) for corner in corners]
+        for face in ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4)):
+            a, b, c, d = (corner + 8 * number for corner in face)
+            lines += ["f %d %d %d" % (a, b, c), "f %d %d %d" % (a, c, d)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+_WALLS = (((0.0, 1.6, 0.0), (0.2, 0.2, 0.4)), ((0.0, -1.6, 0.0), (0.2, 0.2, 0.4)))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_meshes_of_a_fixed_link_count_as_drawn(tmp_path, monkeypatch, count):
+    """One wall is its hull, which replaces its triangles. Two walls are not: their hull fills the room between them."""
+    boxes_file(tmp_path / "walls.obj", *_WALLS[:count])
+    mesh = "<collision><geometry><mesh filename='walls.obj'/></geometry></collision></link>"
+    checker = BulletChecker.of_robot(parse_urdf(_PLANAR.replace("</link>", mesh, 1)),
+                                     find_mesh=lambda name: str(tmp_path / name))
+    triangles, asked = checker.world.touching, []
+    monkeypatch.setattr(checker.world, "touching", lambda model: asked.append(model) or triangles(model))
+    at_the_wall, between = ((math.pi / 2, 0.0, 0.0), (math.pi / 2, 2.9, -2.0))
+    touch = checker.contact(_JOINTS, np.array(at_the_wall))
+    assert {touch.link_a, touch.link_b} == {"foot", "l2"}
+    assert checker.contact(_JOINTS, np.array(between)) is None
+    assert len(asked) == (0 if count == 1 else 2)
+    # Obstacles are in the world of triangles alone.
+    checker.world.spawn(box("post", "0.2 0.2 1"), "post", Pose((2.5, 0.0, 0)), static=True)
+    assert checker.contact(_JOINTS, np.zeros(3)).link_b == "post/box"
+    checker.close()
 
 
 def test_cause_is_the_last_link_where_no_other_posture_helps(checker):
