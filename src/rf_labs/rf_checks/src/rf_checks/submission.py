@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The files of a student's program: the program, and the modules beside it that it imports. Free of ROS."""
 import ast
+import io
 import os
 import stat
+import tokenize
 from pathlib import Path
 
 #: Largest size of a program [bytes, files].
@@ -59,8 +61,13 @@ def texts(program):
 
 
 def decoded(content):
-    """The text of a program (bytes), without the mark that Windows puts before UTF-8; other bytes are replaced."""
-    return content.decode("utf-8-sig", errors="replace")
+    """The text of a program (bytes) in the encoding that its first lines name, as Python reads it, without the mark
+    that Windows puts before UTF-8; other bytes are replaced."""
+    try:
+        return content.decode(tokenize.detect_encoding(io.BytesIO(content).readline)[0], errors="replace")
+    # The line names no encoding, or one that is none of texts.
+    except (SyntaxError, LookupError, UnicodeError):
+        return content.decode("utf-8-sig", errors="replace")
 
 
 def imported(source):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rf_checks import similarity
+from rf_checks import similarity, submission
 
 WORKSPACE = Path(__file__).resolve().parents[5]
 EXERCISES = WORKSPACE / "src/rf_labs/rf_checks/exercises"
@@ -92,3 +92,13 @@ def test_a_module_beside_the_program_is_looked_at_as_well(name):
 def test_what_python_cannot_read_has_no_likeness(text):
     assert similarity.fingerprints(text) == frozenset()
     assert notes(text) == []
+
+
+@pytest.mark.parametrize("encoding, expected", [
+    ("utf-7", "# coding: utf-7\nprint('ü+')\n"), ("latin-1", "# coding: latin-1\nprint('ü+')\n"),
+    ("no-such", "# coding: no-such\nprint('ü+')\n"), ("zlib", "# coding: zlib\nprint('ü+')\n")])
+def test_programs_are_compared_as_python_reads_them(encoding, expected):
+    """With another encoding a copy looks like no program at all."""
+    codec = encoding if encoding in ("utf-7", "latin-1") else "utf-8"
+    head, _, body = expected.partition("\n")
+    assert submission.decoded(head.encode() + b"\n" + body.encode(codec)) == expected

@@ -22,12 +22,15 @@ OTHER_SUFFIXES = (".7z", ".rar", ".tar.xz", ".txz", ".tar.zst", ".gz", ".bz2", "
 MOST_FILES, MOST_TAKEN_BYTES = 200, 16 << 20
 #: Most bytes of an archive inside a submission: students pack their reports and films, too.
 MOST_ARCHIVE_BYTES = 256 << 20
+# MemoryError: a dictionary of 4 GB for a small file.
 _DAMAGED = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, ValueError, OSError,
-            NotImplementedError, RuntimeError, UnicodeError)
+            NotImplementedError, RuntimeError, UnicodeError, MemoryError)
 # Entries of a tar file that describe the next one, such as a long name; tarfile reads them whole.
 _DESCRIPTIONS = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE, tarfile.GNUTYPE_LONGNAME,
                  tarfile.GNUTYPE_LONGLINK)
 _MOST_DESCRIPTION_BYTES = 1 << 20
+# Of a zip file's list for each of its entries, with a long path.
+_LISTED_BYTES = 512
 _UTF8_FLAG, _ENCRYPTED_FLAG = 0x800, 0x1
 _LINK, _FILE_KIND, _REGULAR = 0o120000, 0o170000, 0o100000
 
@@ -97,11 +100,11 @@ def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
     """
     try:
         with (io.BytesIO(source) if isinstance(source, bytes) else open(source, "rb")) as stream:
-            entries = _zip_entries(stream) if name.lower().endswith(".zip") else _tar_entries(
+            entries = _zip_entries(stream, bounds) if name.lower().endswith(".zip") else _tar_entries(
                 stream, name.lower(), bounds)
             return _take(entries, is_wanted, bounds, refused)
     except _DAMAGED as error:
-        raise BadArchive("is damaged and cannot be unpacked: %s" % (error or type(error).__name__)) from error
+        raise BadArchive("is damaged and cannot be unpacked: %s" % (str(error) or type(error).__name__)) from error
 
 
 def _take(entries, is_wanted, bounds, refused):
@@ -133,8 +136,27 @@ def _take(entries, is_wanted, bounds, refused):
     return taken, others
 
 
-def _zip_entries(stream):
-    with zipfile.ZipFile(stream) as archive:
+class _ListLimited:
+    """A file of which no more than the list of `entries` files is read at once, until `most` is None: zipfile reads the
+    whole list before it gives the first one, and needs a kilobyte of memory for each."""
+
+    def __init__(self, stream, entries):
+        self._stream, self._entries = stream, entries
+        self.most = _LISTED_BYTES * entries
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def read(self, size=-1):
+        if self.most is not None and size > self.most:
+            raise BadArchive("holds more than %d files, or names of unusual length" % self._entries)
+        return self._stream.read(size)
+
+
+def _zip_entries(stream, bounds):
+    limited = _ListLimited(stream, bounds.entries)
+    with zipfile.ZipFile(limited) as archive:
+        limited.most = None
         for info in archive.infolist():
             kind = info.external_attr >> 16 & _FILE_KIND
             if info.is_dir():

@@ -162,7 +162,7 @@ class _Grading:
             for count, outcome in enumerate(outcomes, 1):
                 task = todo[outcome.seed]
                 said = self._take(task, outcome, ledger)
-                print(formats.plain("%d of %d: %s, %s: %s" % (
+                print(formats.one_line("%d of %d: %s, %s: %s" % (
                     count, len(todo), ", ".join(owners[task.key]), task.exercise.name, said)), flush=True)
 
     def _take(self, task, outcome, ledger):
@@ -205,7 +205,7 @@ class _Grading:
     def _conclude(self, rows):
         missing = [row for row in rows if row.status == results.NOT_GRADED]
         for row in missing:
-            print(formats.plain("%s: %s" % (row.submission.entry, "; ".join(row.sentences))))
+            print(formats.one_line("%s: %s" % (row.submission.entry, "; ".join(row.sentences))))
         print("%d graded, %d without a program, %d not graded, in %.0f s; the class: %s" % (
             sum(row.status == results.GRADED for row in rows), sum(row.status == results.NO_PROGRAM for row in rows),
             len(missing), time.monotonic() - self._began, self._out / "index.html"))

@@ -21,6 +21,11 @@ def plain(text):
     return _NO_XML.sub("?", str(text))
 
 
+def one_line(text):
+    """As :func:`plain`, for a terminal: a name with a line's end does not pretend to be another line."""
+    return " ".join(plain(text).split())
+
+
 def _points(value):
     return "" if value is None else "%g" % round(value, 2)
 

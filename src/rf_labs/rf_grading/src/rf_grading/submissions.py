@@ -19,6 +19,10 @@ from rf_grading import archives
 PROGRAMS = (".py", ".ipynb")
 _GRADESCOPE = "submission_metadata.yml"
 _MOST_METADATA_BYTES = 20 << 20
+#: Of an entry's name; folders have at most 255, and a number may follow.
+_MOST_NAME_BYTES = 240
+#: Folders in each other: os.walk cannot follow a thousand.
+_DEEPEST = 30
 #: "Li Na_123456_assignsubmission_file_" and what follows: a folder of Moodle's, or a file of its flat form.
 _MOODLE = re.compile(r"(?P<entry>(?P<name>.+?)_(?P<number>\d+)_assignsubmission_(?:file|onlinetext)_?)(?P<file>.*)",
                      re.DOTALL)
@@ -98,6 +102,7 @@ def _sort_in(top, name, collected, left_out, exercise_names):
     one = collected.get(key)
     if one is None:
         taken = {other.entry for other in collected.values()}
+        entry = _shortened(entry)
         if entry in taken:
             numbered = ("%s (%d)" % (entry, k) for k in range(2, len(taken) + 3))
             entry = next(one for one in numbered if one not in taken)
@@ -118,6 +123,12 @@ def _sort_in(top, name, collected, left_out, exercise_names):
     one.others += others
     if not one.problem:
         one.files.update(files)
+
+
+def _shortened(entry):
+    """A name that a folder can have, also with a number behind it."""
+    return os.fsencode(entry)[:_MOST_NAME_BYTES].decode(errors="ignore") if (
+        len(os.fsencode(entry)) > _MOST_NAME_BYTES) else entry
 
 
 def _without_exercise(stem, exercise_names):
@@ -209,7 +220,7 @@ class _Folder:
     def read(self, name):
         """(files, others) below an entry. Raises BadArchive, BadSubmission, OSError."""
         path = self._path / name
-        if archives.is_archive(name) and not self.is_folder(name) and not path.is_symlink():
+        if archives.is_archive(name) and path.is_file() and not path.is_symlink():
             return archives.read(path, name, is_program)
         if not self.is_folder(name):
             return ({name: _content(path, name)}, []) if is_program(name) or path.is_symlink() else ({}, [name])
@@ -233,6 +244,9 @@ def _walk(top):
             elif path.is_symlink():
                 raise files_of_programs.BadSubmission("%s is a link, to %s; links are not followed" % (
                     relative, os.readlink(path)))
+            elif relative.count("/") >= _DEEPEST:
+                raise files_of_programs.BadSubmission("the submission has more than %d folders in each other"
+                                                      % _DEEPEST)
             elif name in names:
                 if archives.is_archive(name):
                     packed[relative] = _content(path, relative)

@@ -113,6 +113,27 @@ def test_many_entries_are_refused():
                       archives.Bounds(10, 1 << 20, 10, 1 << 20))
 
 
+MANY = zipped([("%d.txt" % k, b"") for k in range(200)])
+
+
+def test_a_long_list_is_refused_before_it_is_read(monkeypatch):
+    """A million names need a gigabyte of memory."""
+    monkeypatch.setattr(archives.zipfile, "ZipInfo", None)
+    few = archives.Bounds(10, 1 << 20, 10, 1 << 20)
+    with pytest.raises(archives.BadArchive, match="more than 10 files, or names"):
+        archives.read(MANY, "x.zip", is_wanted, few)
+
+
+def test_a_file_that_wants_more_memory_than_there_is_counts_as_damaged(monkeypatch):
+    """LZMA asks for a dictionary as large as the file says, up to 4 GB."""
+    def no_memory(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(archives, "_zip_content", no_memory)
+    with pytest.raises(archives.BadArchive, match="is damaged and cannot be unpacked: MemoryError"):
+        archives.read(zipped([("a.py", b"1")]), "x.zip", is_wanted)
+
+
 def test_an_encrypted_archive_is_refused():
     data = bytearray(zipped([("a.py", b"1")]))
     data[data.find(b"PK\x01\x02") + 8] |= 1

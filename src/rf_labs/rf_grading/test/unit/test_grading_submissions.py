@@ -141,6 +141,40 @@ def test_each_unreadable_one_has_its_sentence_and_the_others_are_read(tmp_path):
     assert found["good"].files == {"wave.py": b"1"}
 
 
+def test_a_pipe_that_calls_itself_an_archive(tmp_path):
+    """Nobody writes to it, so reading would wait for ever."""
+    put(tmp_path, {"good/wave.py": "1"})
+    os.mkfifo(tmp_path / "evil.zip")
+    found = by_entry(tmp_path)
+    assert "no Python file" in found["evil"].problem and not found["good"].problem
+
+
+def test_folders_in_folders_end_the_reading_of_their_submission_only(tmp_path):
+    put(tmp_path, {"good/wave.py": "1"})
+    folders = [str(tmp_path / "evil")]
+    while len(folders) < 1100:
+        folders.append(folders[-1] + "/a")
+    for folder in folders:
+        os.mkdir(folder)
+    try:
+        found = by_entry(tmp_path)
+    finally:
+        os.removedirs(folders[-1])
+    assert found["evil"].problem == "the submission has more than 30 folders in each other"
+    assert not found["good"].problem
+
+
+def test_long_names_are_names_of_folders(tmp_path):
+    """Of files as long as a disk allows, twice, and of longer ones in an archive."""
+    name = "ä" * 126
+    put(tmp_path, {name + ".py": "1", name + "/wave.py": "1"})
+    put(tmp_path.with_suffix(".class"), {"all.zip": zipped({"n" * 300 + "/wave.py": "1", "good/wave.py": "1"})})
+    for found in (by_entry(tmp_path), by_entry(tmp_path.with_suffix(".class") / "all.zip")):
+        assert len(found) == 2
+        for entry, one in found.items():
+            assert len(entry.encode()) <= 245 and one.files
+
+
 def test_a_name_that_is_no_utf8(tmp_path):
     os.mkdir(os.path.join(os.fsencode(tmp_path), b"\xe4nne"))
     put(tmp_path, {os.fsdecode(b"\xe4nne") + "/wave.py": "1"})
