@@ -65,7 +65,7 @@ function row(lab) {
   const made = document.createElement("tr");
   made.dataset.state = lab.state;
   made.dataset.slow = lab.factor !== null && lab.factor < SLOW;
-  const actions = document.createElement("td");
+  const actions = cell("", "actions");
   actions.append(link("look in", `../${lab.name}/?token=${encodeURIComponent(lab.view_token)}`),
                  ...VERBS[lab.state].map((verb) => button(lab, verb)));
   made.append(cell(lab.full_name), cell(lab.reason ? `${lab.state}: ${lab.reason}` : lab.state, "state"),
@@ -95,7 +95,9 @@ async function refresh() {
       });
     }
   }
-  byId("told").textContent = `${labs.filter((lab) => lab.pages).length} of ${labs.length} have a page open`;
+  const of = (state) => labs.filter((lab) => lab.state === state).length;
+  byId("told").textContent = [`${labs.filter((lab) => lab.pages).length} of ${labs.length} have a page open`,
+                              ...["failed", "waiting"].filter(of).map((state) => `${of(state)} ${state}`)].join(", ");
 }
 
 async function keepOn() {

@@ -24,7 +24,8 @@ _AGAIN_S = 2
 _POLLED = ("kernels", "sessions", "terminals", "kernelspecs")
 _WAITING = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="%d">
-<meta name="viewport" content="width=device-width, initial-scale=1"><title>Lab of %s</title></head>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark"><title>Lab of %s</title></head>
 <body style="font: 1.2em sans-serif; margin: 3em"><h1>Lab of %s</h1><p>%s</p></body></html>
 """
 

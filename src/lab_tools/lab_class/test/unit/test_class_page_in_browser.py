@@ -90,6 +90,17 @@ def test_a_class_is_shown_and_changed(shown):
     assert browser.errors == []
 
 
+def test_a_row_is_as_high_as_its_text_and_the_first_line_counts_labs_that_need_help(shown):
+    browser, supervisor = shown
+    supervisor.labs += [lab("cleo", "failed", factor=None, pages=0, reason="its files have 1.07 GB"),
+                        lab("dora", "failed", factor=None, pages=0), lab("emil", "waiting", factor=None, pages=0)]
+    browser.wait("document.getElementById('told').textContent === '2 of 5 have a page open, 2 failed, 1 waiting'")
+    tops = browser.evaluate("[...document.querySelectorAll('#labs tr')].map((row) => "
+                            "[...row.querySelectorAll('a, button')].map((one) => one.getBoundingClientRect().bottom))")
+    assert all(max(row) - min(row) < 10 for row in tops) and [len(row) for row in tops] == [3, 3, 2, 2, 2]
+    assert browser.evaluate("document.documentElement.scrollWidth") == 1280
+
+
 def test_a_refusal_stays_until_the_next_success(shown):
     browser, supervisor = shown
     browser.evaluate("document.querySelectorAll('#labs tr')[1].querySelector('button').click()")

@@ -49,6 +49,15 @@ def test_the_notebook_is_beside_the_robot_and_keys_and_the_pointer_divide_the_wi
     assert 0 < top < bottom <= 800  # it stays while the panels scroll
 
 
+@pytest.mark.parametrize("width", [1000, 390])
+def test_what_is_said_in_place_of_the_view_is_not_over_the_notebook(notebook, browser, width):
+    browser.resize(width, 800)
+    browser.evaluate("Object.assign(document.getElementById('view-note'), {textContent: 'no view', hidden: false})")
+    note, view = (browser.evaluate(BOX % selector) for selector in ("#view-note", "#view"))
+    browser.evaluate("document.getElementById('view-note').hidden = true")
+    assert view[0] <= note[0] < note[1] <= view[1] and view[2] < note[2] < note[3] < view[3], (note, view)
+
+
 def test_a_notebook_is_chosen_and_a_new_server_is_loaded_again(notebook, browser):
     # With JupyterLab's list of files beside it only where there is room for both.
     for width, mode in ((1920, "lab"), (1000, "doc")):
