@@ -23,8 +23,9 @@ _WHITE = (1.0, 1.0, 1.0, 1.0)
 GLOSS = 0.3
 #: So many shapes of models that are gone are kept, for models that come again.
 MOST_UNUSED = 100
-#: New models wait so long for their meshes [s]: most are ready by then, and are complete in their first picture.
-PATIENCE_S = 2.0
+#: New models wait so long for their meshes [s]: all but huge ones are ready by then, also on a busy machine, and are
+#: complete in their first picture, as programs expect that look at what they have spawned.
+PATIENCE_S = 10.0
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
