@@ -11,6 +11,7 @@ import re
 from tornado import web
 
 from lab_class.labs import MOST_FAILURES, ClassError, Kind, Role, State, may
+from lab_class.store import StoreError
 from web_bridge import http_text
 from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
 
@@ -222,7 +223,7 @@ class Renew(_ForInstructor):
     def post(self, name):
         try:
             self.door.supervisor.renew(name)
-        except (ClassError, OSError) as error:
+        except (ClassError, StoreError) as error:
             self.refuse(409, str(error))
             return
         self.set_status(204)

@@ -134,7 +134,7 @@ class Store:
                              "students new addresses" % (self.folder / _CLASS, type(error).__name__, error)) from error
 
     def write(self, record):
-        """Keep a ClassRecord."""
+        """Keep a ClassRecord. Raises StoreError."""
         self._write(_CLASS, {"options": asdict(record.options), "students": [list(row) for row in record.students],
                              "tokens": {name: [pair.act, pair.view] for name, pair in record.tokens.items()},
                              "instructor": record.instructor})
@@ -149,17 +149,23 @@ class Store:
         return found if isinstance(found, dict) else {}
 
     def write_running(self, values):
+        """Keep what other commands need to know of the supervisor. Raises StoreError."""
         self._write(_RUNNING, values)
 
     def _write(self, name, values):
         # Whole or not at all, also where the host loses power.
         temporary = self.folder / (name + _NEW)
-        with open(temporary, "w", encoding="utf-8") as stream:
-            os.fchmod(stream.fileno(), 0o600)
-            json.dump(values, stream, indent=1)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(self.folder / name)
+        try:
+            with open(temporary, "w", encoding="utf-8") as stream:
+                os.fchmod(stream.fileno(), 0o600)
+                json.dump(values, stream, indent=1)
+                stream.flush()
+                os.fsync(stream.fileno())
+            temporary.replace(self.folder / name)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise StoreError("%s cannot be written: %s" % (self.folder / name, error.strerror or error)) from error
 
     def lab(self, name):
         """The folder of one lab; made where it is missing."""

@@ -88,7 +88,7 @@ class Supervisor:
     def renew(self, name):
         """New tokens for a student, or for the instructor: the old ones open nothing any more.
 
-        What they have opened in a lab ends, since the lab starts again. Raises ClassError, OSError.
+        What they have opened in a lab ends, since the lab starts again. Raises ClassError, StoreError.
         """
         record = self._record.renewed(name)
         self._store.write(record)

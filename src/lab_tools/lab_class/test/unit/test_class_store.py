@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The class on disk."""
+import errno
+import os
+
 import pytest
 
 from lab_class import roster
@@ -75,6 +78,19 @@ def test_the_end_of_a_run_leaves_the_students_files(store):
 def test_a_host_that_lost_power_has_kept_any_part_of_a_supervisors_file(store, data):
     (store.folder / "running.json").write_bytes(data)
     assert store.running() == {}
+
+
+def test_on_a_full_disk_the_class_stays_as_it_was(store, monkeypatch):
+    record = ClassRecord.made(Options(), roster.numbered(1))
+    store.write(record)
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(StoreError, match="class.json cannot be written: " + os.strerror(errno.ENOSPC)):
+        store.write(record.renewed("student-01"))
+    assert store.read() == record and [path.name for path in store.folder.iterdir()] == ["class.json"]
 
 
 def test_a_folder_that_cannot_be(tmp_path):

@@ -222,7 +222,7 @@ def caches(environment, folder):
     """Copies of what numba has compiled and of spheres that stand for robots' links, as `binds` for `command`: they are
     used only where they could be written, beside the source.
 
-    folder: folder of the copies, used by nothing else, so that a sandbox cannot change the originals.
+    folder: folder of the copies, used by nothing else, so that a sandbox cannot change the originals. Raises OSError.
     """
     binds = []
     for root in workspaces(environment):
@@ -233,6 +233,15 @@ def caches(environment, folder):
                 cache = Path(path) / "__pycache__"
                 if any(next(cache.rglob(kind), None) for kind in ("*.nbi", "*.npy")):
                     copy = Path(folder) / ("cache-%d" % len(binds))
-                    shutil.copytree(cache, copy)
+                    _copy(cache, copy)
                     binds.append((copy, cache, True))
     return binds
+
+
+def _copy(source, target):
+    try:
+        shutil.copytree(source, target)
+    except shutil.Error as error:
+        # It lists each file, hundreds on a full disk, mostly with one reason.
+        reasons = {str(reason).partition(": '")[0] for _, _, reason in error.args[0]}
+        raise OSError("%s cannot be copied to %s: %s" % (source, target, "; ".join(sorted(reasons)[:3]))) from error
