@@ -21,6 +21,7 @@ from .gathered import Part, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
+from .room import try_room
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
@@ -86,7 +87,7 @@ class MeshCache:
         """A folder in which a file of ``size`` bytes can be made. Raises BulletSimError where there is none."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            _try_room(self.folder, size)
+            try_room(self.folder, size)
             return self.folder
         except OSError as error:
             refusal = "%s: %s" % (self.folder, error.strerror)
@@ -95,7 +96,7 @@ class MeshCache:
                 self._temporary = tempfile.TemporaryDirectory(prefix="bullet_sim_meshes_")
                 self._warn("meshes cannot be kept (%s); they are made again at each start, which takes longer. Make "
                            "room there, or make it yours if it is root's" % refusal)
-            _try_room(self._temporary.name, size)
+            try_room(self._temporary.name, size)
             return Path(self._temporary.name)
         except OSError as error:
             raise BulletSimError("there is no room for a converted mesh of up to %d kB, neither in %s, nor in %s: %s; "
@@ -122,12 +123,6 @@ class MeshCache:
 def _draft_folder(folder):
     """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
     return tempfile.TemporaryDirectory(dir=str(folder), prefix="part_")
-
-
-def _try_room(folder, size):
-    """Raises OSError where a file of ``size`` bytes cannot be made in the folder."""
-    with tempfile.TemporaryFile(dir=str(folder)) as file:
-        os.posix_fallocate(file.fileno(), 0, size)
 
 
 @contextlib.contextmanager

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes simplified for software rendering: split by colour, in levels of detail, cached on disk. ROS-free."""
+import atexit
 import hashlib
 import json
 import os
@@ -13,6 +14,7 @@ import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
 from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
+from bullet_sim.room import try_room
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
@@ -26,6 +28,8 @@ _PROCESSOR_S, _WAITING_S = 15, 240.0
 _PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 13
+# Room that a mesh's levels and its picture may need [bytes].
+_ROOM = 8_000_000
 # The files with the materials of a Wavefront file.
 _MATERIALS = re.compile(rb"^mtllib[ \t]+(\S.*?)[ \t]*\r?$", re.MULTILINE)
 
@@ -69,7 +73,8 @@ class DrawingError(Exception):
 
 
 class DrawingCache:
-    """Simplified meshes and reduced pictures on disk, under a hash of the original's content."""
+    """Simplified meshes and reduced pictures on disk, under a hash of the original's content. Where the folder cannot
+    be written, or its disk is full, in a temporary folder, which ends with the process."""
 
     def __init__(self, folder=None):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
@@ -114,8 +119,10 @@ class DrawingCache:
     def _make(self, key, name, write, path, *arguments):
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
+            try_room(self._folder, _ROOM)
         except OSError:
             self._folder = Path(tempfile.mkdtemp(prefix="bullet_gazebo_drawings_"))
+            atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
         draft = Path(tempfile.mkdtemp(dir=self._folder))
         try:
             _PROCESS.call(write, path, str(draft), *arguments)

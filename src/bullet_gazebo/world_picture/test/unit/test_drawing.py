@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simplified meshes; and no module of the package needs ROS."""
+import errno
+import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +51,20 @@ def test_a_collada_mesh_without_material_is_as_grey_as_in_rviz(tmp_path):
     path.write_text(COLLADA, encoding="utf-8")
     part, = drawing.DrawingCache(tmp_path / "cache").parts(path)
     assert part.colour == (0.6, 0.6, 0.6, 1.0)
+
+
+def test_without_room_in_the_cache_a_mesh_is_drawn_all_the_same(tmp_path, monkeypatch):
+    folder = tmp_path / "cache"
+
+    def fallocate(number, offset, size):
+        if os.readlink("/proc/self/fd/%d" % number).startswith(str(folder)):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    monkeypatch.setattr(os, "posix_fallocate", fallocate)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    path = tmp_path / "plain.DAE"
+    path.write_text(COLLADA, encoding="utf-8")
+    part, = drawing.DrawingCache(folder).parts(path)
+    assert os.path.exists(part.path) and list(folder.iterdir()) == []
 
 
 def test_a_collada_mesh_has_the_colours_that_its_file_names(tmp_path):
