@@ -21,7 +21,7 @@ from .gathered import Part, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
-from .room import try_room
+from .room import spare_folder, try_room
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
@@ -40,7 +40,7 @@ class MeshCache:
     """Meshes in any format that trimesh reads, kept on disk as the Wavefront files that PyBullet reads.
 
     The file name is a hash of the mesh's content, so a changed mesh is converted again and copies share a file. Where
-    the folder cannot be written, or its disk is full, files are made in a temporary folder that ends with the process.
+    the folder cannot be written, or its disk is full, files are made in a folder for temporary files.
     """
 
     def __init__(self, folder=None, warn=lambda text: None):
@@ -48,7 +48,6 @@ class MeshCache:
         self._warn = warn
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
-        self._temporary = None  # the folder instead, once it is needed
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
     def wavefront(self, path, planes=(), hollow=True, part=WHOLE):
@@ -92,19 +91,21 @@ class MeshCache:
         except OSError as error:
             refusal = "%s: %s" % (self.folder, error.strerror)
         try:
-            if self._temporary is None:
-                self._temporary = tempfile.TemporaryDirectory(prefix="bullet_sim_meshes_")
-                self._warn("meshes cannot be kept (%s); they are made again at each start, which takes longer. Make "
-                           "room there, or make it yours if it is root's" % refusal)
-            try_room(self._temporary.name, size)
-            return Path(self._temporary.name)
+            spare = spare_folder("bullet_sim_meshes")
+            try_room(spare, size)
         except OSError as error:
             raise BulletSimError("there is no room for a converted mesh of up to %d kB, neither in %s, nor in %s: %s; "
                                  "delete some files" % (size // 1000, refusal, tempfile.gettempdir(), error.strerror)
                                  ) from None
+        self._warn("meshes cannot be kept in %s; they are made in %s. Make room there, or make it yours if it is root's"
+                   % (refusal, spare))
+        self.folder = spare
+        return spare
 
     def _convert(self, path, name, planes, part):
         target = self._folder_with_room(int(np.clip(_GROWTH * os.stat(path).st_size, *_ROOM))) / name
+        if target.exists():
+            return target
         with _draft_folder(target.parent) as draft:
             copy = Path(draft) / "mesh"
             try:

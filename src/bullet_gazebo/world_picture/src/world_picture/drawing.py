@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes simplified for software rendering: split by colour, in levels of detail, cached on disk. ROS-free."""
-import atexit
 import hashlib
 import json
 import os
@@ -14,7 +13,7 @@ import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
 from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
-from bullet_sim.room import try_room
+from bullet_sim.room import spare_folder, try_room
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
@@ -74,7 +73,7 @@ class DrawingError(Exception):
 
 class DrawingCache:
     """Simplified meshes and reduced pictures on disk, under a hash of the original's content. Where the folder cannot
-    be written, or its disk is full, in a temporary folder, which ends with the process."""
+    be written, or its disk is full, in a folder for temporary files."""
 
     def __init__(self, folder=None):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
@@ -121,8 +120,9 @@ class DrawingCache:
             self._folder.mkdir(parents=True, exist_ok=True)
             try_room(self._folder, _ROOM)
         except OSError:
-            self._folder = Path(tempfile.mkdtemp(prefix="bullet_gazebo_drawings_"))
-            atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
+            self._folder = spare_folder("bullet_gazebo_drawings")
+            if (self._folder / key / name).exists():
+                return self._folder / key / name
         draft = Path(tempfile.mkdtemp(dir=self._folder))
         try:
             _PROCESS.call(write, path, str(draft), *arguments)
