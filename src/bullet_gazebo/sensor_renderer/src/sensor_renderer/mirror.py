@@ -23,9 +23,6 @@ _WHITE = (1.0, 1.0, 1.0, 1.0)
 GLOSS = 0.3
 #: So many shapes of models that are gone are kept, for models that come again.
 MOST_UNUSED = 100
-#: New models wait so long for their meshes [s]: all but huge ones are ready by then, also on a busy machine, and are
-#: complete in their first picture, as programs expect that look at what they have spawned.
-PATIENCE_S = 10.0
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
@@ -195,7 +192,7 @@ class Body:
 
 class _Built(NamedTuple):
     """A body and the entry of the scene that it was made of; the same ``key`` means the same body. ``waits_for``: the
-    keys of meshes and pictures that were not ready for it."""
+    keys of meshes that were not ready for it."""
 
     key: tuple
     entry: dict
@@ -229,7 +226,7 @@ class Mirror:
     def set_scene(self, listed, light=None):
         """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; bodies that exist already stay."""
         self._world_light = light or {}
-        known, waited = self._bodies, bool(self.waiting)
+        known = self._bodies
         self._bodies = {}
         for entry in listed:
             name = entry["name"]
@@ -238,9 +235,6 @@ class Mirror:
             old = known.get(name)
             self._bodies[name] = old if old is not None and old.key == key else self._build(key, entry)
         self._show_bodies()
-        if self.waiting and not waited:
-            self._drawings.wait(PATIENCE_S)
-            self.complete()
         self._forget_unused()
 
     def complete(self):
@@ -363,9 +357,6 @@ class Mirror:
             if path is None:
                 raise DrawingError("picture %s does not exist; what it should be on is shown in one colour" % name)
             return self._drawings.texture(path)
-        except NotReady as error:
-            self._not_ready.add(error.key)
-            return None
         except DrawingError as error:
             if name not in self._warned:
                 self._warned.add(name)

@@ -87,10 +87,10 @@ class SensorRenderer:
             if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
             self._finder.forget_missing()
-            with _told(READS_WITHIN_S, "cameras wait while the shapes of new models are read"):
+            with _told(READS_WITHIN_S, "cameras wait while meshes of new models are simplified; this is done once"):
                 self._mirror.set_scene(scene.bodies, scene.light)
             if self._mirror.waiting:
-                rospy.loginfo("meshes are being simplified, which is done once; the cameras see all of %s after that"
+                rospy.loginfo("large meshes are being simplified, which is done once; cameras see all of %s after that"
                               % ", ".join(self._mirror.waiting))
             self._world.forget()
             self._set_sensors(scene.bodies)

@@ -88,7 +88,7 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
     assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3
 
 
-def test_cameras_that_wait_for_shapes_say_so(simulator, monkeypatch):
+def test_cameras_that_wait_for_meshes_say_so(simulator, monkeypatch):
     monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
     said, texts = threading.Event(), []
     monkeypatch.setattr(node.rospy, "loginfo", lambda text: (texts.append(text), said.set()))
@@ -97,7 +97,7 @@ def test_cameras_that_wait_for_shapes_say_so(simulator, monkeypatch):
     monkeypatch.setattr(node, "READS_WITHIN_S", 0.0)
     simulator.write(1, 0.0, [AT_ORIGIN])
     renderer._turn(SnapshotReader(simulator.folder))
-    assert len(texts) == 1 and "cameras wait while the shapes" in texts[0]
+    assert len(texts) == 1 and "cameras wait while meshes" in texts[0]
     monkeypatch.setattr(node, "READS_WITHIN_S", 1000.0)
     monkeypatch.setattr(renderer._mirror, "set_scene", lambda *_: None)
     simulator.write_scene([with_sensor(STAND)])
@@ -117,8 +117,8 @@ def test_cameras_go_on_while_a_mesh_is_simplified(simulator, tmp_path, monkeypat
             return function(*arguments)
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("world_picture.drawing._PROCESS", Process())
-    monkeypatch.setattr("sensor_renderer.mirror.PATIENCE_S", 0.0)
+    monkeypatch.setattr("world_picture.background.LimitedProcess", lambda **limits: Process())
+    monkeypatch.setattr("world_picture.background.LARGE_BYTES", 0)
     monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
     monkeypatch.setattr(node.rospy, "loginfo", texts.append)
     renderer, reader = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), SnapshotReader(simulator.folder)

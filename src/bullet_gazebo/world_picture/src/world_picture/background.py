@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes and pictures that are simplified in a thread, while their viewer goes on. ROS-free."""
+"""Large meshes that are simplified in a thread, while their viewer goes on. ROS-free."""
 import collections
+import os
 import threading
 
-from bullet_sim.limited import LimitError
-from world_picture.drawing import DrawingCache
+from bullet_sim.limited import LimitedProcess, LimitError
+from world_picture.drawing import LIMITS, DrawingCache, write_parts
+
+#: Smaller mesh files are waited for: one of this size [bytes] has about 100,000 triangles, and takes some seconds.
+#: The choice does not depend on the machine's speed, so that models with ordinary meshes are in their first picture.
+LARGE_BYTES = 8_000_000
 
 
 class NotReady(Exception):
-    """A mesh or a picture is being simplified; ``key`` names it for :meth:`BackgroundDrawings.is_making`."""
+    """A mesh is being simplified; ``key`` names it for :meth:`BackgroundDrawings.is_making`."""
 
     def __init__(self, key):
         super().__init__("%s is being simplified" % key)
@@ -16,11 +21,13 @@ class NotReady(Exception):
 
 
 class BackgroundDrawings(DrawingCache):
-    """A :class:`world_picture.drawing.DrawingCache` whose methods raise :class:`NotReady` instead of waiting. A file
-    that cannot be used is not tried again as long as it stays the same."""
+    """A :class:`world_picture.drawing.DrawingCache` that raises :class:`NotReady` instead of waiting for a large mesh.
+    One that cannot be used is not tried again as long as its file stays the same."""
 
     def __init__(self, folder=None):
         super().__init__(folder)
+        # A separate process: smaller meshes do not wait for large ones.
+        self._behind = DrawingCache(folder, LimitedProcess(**LIMITS))
         self._changed = threading.Condition()
         self._made = {}  # by key: the file, a LimitError, or None while it is being made
         self._jobs = collections.deque()
@@ -36,7 +43,9 @@ class BackgroundDrawings(DrawingCache):
         with self._changed:
             self._changed.wait_for(lambda: not self._is_working, timeout_s)
 
-    def _make(self, key, *job):
+    def _make(self, key, name, write, path, *arguments):
+        if write is not write_parts or os.path.getsize(path) < LARGE_BYTES:
+            return super()._make(key, name, write, path, *arguments)
         with self._changed:
             made = self._made.get(key)
             if isinstance(made, LimitError):
@@ -45,7 +54,7 @@ class BackgroundDrawings(DrawingCache):
                 return made
             if made is not None or key not in self._made:
                 self._made[key] = None
-                self._jobs.append((key, *job))
+                self._jobs.append((key, name, write, path, *arguments))
                 if not self._is_working:
                     self._is_working = True
                     threading.Thread(target=self._work, name="drawings", daemon=True).start()
@@ -60,7 +69,7 @@ class BackgroundDrawings(DrawingCache):
                     return
                 key, *job = self._jobs.popleft()
             try:
-                made = super()._make(key, *job)
+                made = self._behind._make(key, *job)
             except LimitError as error:
                 made = error
             except OSError as error:  # no room on the disk

@@ -24,7 +24,8 @@ from world_picture.textures import Texture, save_reduced, write_texture
 PLAIN = 0.01
 # Limits of the process that simplifies: a mesh of 200,000 triangles takes some seconds, and longer on a busy machine.
 _PROCESSOR_S, _WAITING_S = 15, 240.0
-_PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
+LIMITS = {"processor_s": _PROCESSOR_S, "waiting_s": _WAITING_S}
+_PROCESS = LimitedProcess(**LIMITS)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 13
 # Room that a mesh's levels and its picture may need [bytes].
@@ -75,8 +76,10 @@ class DrawingCache:
     """Simplified meshes and reduced pictures on disk, under a hash of the original's content. Where the folder cannot
     be written, or its disk is full, in a folder for temporary files."""
 
-    def __init__(self, folder=None):
-        """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
+    def __init__(self, folder=None, process=None):
+        """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``; ``process``: a
+        ``bullet_sim.limited.LimitedProcess``, by default one for all caches of this program."""
+        self._process = process
         self._folder = Path(folder or cache_folder("drawings"))
 
     def parts(self, path, textured=False, part=WHOLE):
@@ -125,7 +128,7 @@ class DrawingCache:
                 return self._folder / key / name
         draft = Path(tempfile.mkdtemp(dir=self._folder))
         try:
-            _PROCESS.call(write, path, str(draft), *arguments)
+            (self._process or _PROCESS).call(write, path, str(draft), *arguments)
         except LimitError:
             shutil.rmtree(draft, ignore_errors=True)
             raise

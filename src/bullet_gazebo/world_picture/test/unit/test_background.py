@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes that are simplified in a thread: the caller goes on, and finds them later."""
+"""Large meshes that are simplified in a thread: the caller goes on, and finds them later."""
 import threading
 
 import pytest
@@ -7,7 +7,7 @@ import pytest
 from bullet_sim.limited import LimitError
 from lab_testing.meshes import sphere
 from lab_testing.waiting import wait_until
-from world_picture import drawing
+from world_picture import background, drawing
 from world_picture.background import BackgroundDrawings, NotReady
 
 DEADLINE_S = 30.0
@@ -30,7 +30,8 @@ class HeldProcess:
 @pytest.fixture
 def process(monkeypatch):
     held = HeldProcess()
-    monkeypatch.setattr(drawing, "_PROCESS", held)
+    monkeypatch.setattr(background, "LimitedProcess", lambda **limits: held)
+    monkeypatch.setattr(background, "LARGE_BYTES", 0)
     yield held
     held.go_on.set()
 
@@ -56,6 +57,16 @@ def test_the_caller_goes_on_while_a_mesh_is_simplified(tmp_path, process):
     assert not cache.is_making(keys)
     assert all(cache.parts(path) for path in paths)
     assert process.calls == [str(path) for path in paths], "each once"
+
+
+def test_a_smaller_mesh_is_waited_for_and_does_not_wait_for_a_large_one(tmp_path, process, monkeypatch):
+    cache, large, small = BackgroundDrawings(tmp_path / "cache"), tmp_path / "large.obj", tmp_path / "small.obj"
+    ball(large, 1).write_text(large.read_text(encoding="ascii") + 1000 * "#\n", encoding="ascii")
+    monkeypatch.setattr(background, "LARGE_BYTES", large.stat().st_size)
+    with pytest.raises(NotReady) as caught:
+        cache.parts(large)
+    assert cache.parts(ball(small, 2)) and cache.is_making([caught.value.key])
+    assert process.calls in ([], [str(large)])
 
 
 def test_waiting_has_an_end(tmp_path, process):
