@@ -47,6 +47,7 @@ TEXT
 
 # Replace this process by a command in the workspace's environment, or by a shell with the lab's prompt.
 enter() {
+    warn_of_logs
     if [[ $# -gt 0 ]]; then
         exec "$@"
     elif [[ -t 0 ]]; then

@@ -215,3 +215,15 @@ use_build() {
 use_build_if_there() {
     if [[ -f $LAB_ROOT/devel/setup.bash ]]; then use_build; fi
 }
+
+# Warn where ROS cannot keep its logs, as in folders that sudo has made root's: roslaunch then ends with several tracebacks.
+warn_of_logs() {
+    local home=${ROS_HOME:-$HOME/.ros} folder
+    for folder in "$home" "${ROS_LOG_DIR:-$home/log}"; do
+        if [[ -e $folder && ! (-d $folder && -w $folder) ]]; then
+            echo "baxter.sh: you cannot write to $folder, so ROS cannot start: it keeps its logs there. If it is root's," \
+                 "make it yours: sudo chown -R $(id -un) '$folder'" >&2
+            return
+        fi
+    done
+}

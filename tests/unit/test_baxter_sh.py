@@ -362,3 +362,16 @@ def test_students_copy_does_not_run_on_the_first_python_in_path(tmp_path):
     (tmp_path / "python3").chmod(0o755)
     done = baxter("handout", env={"PATH": f"{tmp_path}:/usr/bin:/bin"})
     assert done.returncode == 2 and "FOLDER" in done.stderr and "stranger" not in done.stderr
+
+
+@pytest.mark.parametrize(("make", "warns"), [("mkdir", False), ("touch", True), ("true", False)])
+def test_logs_that_cannot_be_written_are_named_with_what_mends_it(tmp_path, make, warns):
+    logs = tmp_path / "log"
+    subprocess.run([make, str(logs)], check=True)
+    script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; warn_of_logs'
+    environment = {"PATH": "/usr/bin:/bin", "HOME": "/nowhere", "ROS_LOG_DIR": str(logs)}
+    done = subprocess.run(["bash", "-c", script], env=environment,
+                          capture_output=True, text=True)
+    assert done.returncode == 0
+    assert (f"cannot write to {logs}" in done.stderr and "sudo chown -R" in done.stderr) == warns
+    assert warns or not done.stderr
