@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The jobs that come with the workspace. What a job needs is imported when it starts."""
+import contextlib
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -15,6 +17,9 @@ from .job import Job
 
 TAIL = 400  # characters of a program's output in the error of an episode
 STOP_TIMEOUT_S = 20.0
+# What roslaunch writes where a required node fails: its name, its exit code.
+_REQUIRED = re.compile(r"(?:\x1b\[\d+m)?=*REQUIRED process \[(.+?)\] has died!\s+"
+                       r"process has died \[pid \d+, exit code (-?\d+)")
 
 
 class InverseKinematics(Job):
@@ -61,8 +66,8 @@ class InverseKinematics(Job):
 class Command(Job):
     """Runs a program, such as roslaunch, on a ROS master port of its own.
 
-    {seed} in the command is replaced by the seed. Where the last line of its output is a JSON object, its values are
-    results.
+    {seed} in the command is replaced by the seed. The last line of its output that is a JSON object has results. A
+    required node of roslaunch that ends with another exit code than 0 is a failure; roslaunch itself ends with 0.
     """
 
     def __init__(self, command="", exit_codes=(0,)):
@@ -83,6 +88,9 @@ class Command(Job):
                 text = output.read().decode("utf-8", "replace")
         if code not in self._codes:
             raise RuntimeError("exit code %s; the end of its output: %s" % (code, text[-TAIL:].strip()))
+        if died := _REQUIRED.search(text):
+            raise RuntimeError("required node %s ended with exit code %s; the end of the output before: %s" % (
+                *died.groups(), text[:died.start()][-TAIL:].strip()))
         return {"exit_code": code, **_last_object(text)}
 
 
@@ -104,12 +112,12 @@ def _run(words, environment, output):
 
 
 def _last_object(text):
-    lines = text.strip().splitlines()
-    try:
-        found = json.loads(lines[-1]) if lines else {}
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}
+    """The last line that is a JSON object, or {}: behind those of its nodes roslaunch has lines of its own."""
+    for line in reversed(text.splitlines()):
+        if line.startswith("{"):
+            with contextlib.suppress(ValueError, RecursionError):
+                return json.loads(line)
+    return {}
 
 
 # Name: (class, one line for --list).

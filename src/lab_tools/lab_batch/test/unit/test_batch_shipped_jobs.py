@@ -33,6 +33,25 @@ def test_a_program_that_fails_says_how():
         job.run(1)
 
 
+_LAUNCH = """import sys
+print("\\x1b[1mprocess[trial-2]: started with pid [7]\\x1b[0m")
+print({0!r})
+print("\\x1b[31m" + 80 * "=" + "REQUIRED process [trial-2] has died!\\n{1}\\nlog file: x.log\\nInitiating shutdown!")
+print("[trial-2] killing on exit\\n\\x1b[1mdone\\x1b[0m")
+"""
+
+
+def test_results_of_a_launch_file_stand_before_the_words_of_roslaunch(tmp_path):
+    """With what roslaunch 1.15 prints when a required node ends; roslaunch ends with 0 in either case."""
+    (tmp_path / "good.py").write_text(_LAUNCH.format('{"placed": true}', "process has finished cleanly"))
+    (tmp_path / "bad.py").write_text(_LAUNCH.format(
+        "no cube found", "process has died [pid 7, exit code 3, cmd trial.py __name:=trial]."))
+    good, bad = (Command(command="%s %s" % (sys.executable, tmp_path / name)) for name in ("good.py", "bad.py"))
+    assert good.run(1) == {"exit_code": 0, "placed": True}
+    with pytest.raises(RuntimeError, match=r"required node trial-2 ended with exit code 3; .*\nno cube found$"):
+        bad.run(1)
+
+
 def test_inverse_kinematics_solves_reachable_poses():
     found, = map_seeds(Spec("lab_batch.shipped:InverseKinematics", {"poses": 20}), [5], Limits(1))
     assert found.result["all_solved"], found
