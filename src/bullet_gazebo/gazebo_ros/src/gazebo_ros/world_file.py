@@ -16,13 +16,15 @@ class WorldFileError(Exception):
 def find_world(name, folders):
     """Path of the world file ``name``: itself if it is there, else below one of ``folders``.
 
-    Raises :class:`WorldFileError`, which lists the searched folders.
+    Raises :class:`WorldFileError`, which lists the searched files, and the worlds where they could have been.
     """
-    candidates = [Path(name), *(Path(folder) / name for folder in folders)]
+    candidates = list(dict.fromkeys([Path(name), *(Path(folder) / name for folder in folders)]))
     for path in candidates:
         if path.is_file():
             return path
-    raise WorldFileError("world file '%s' not found; looked for %s" % (name, ", ".join(map(str, candidates))))
+    there = sorted({path.name for candidate in candidates for path in candidate.parent.glob("*.world")})
+    raise WorldFileError("world file '%s' not found; looked for %s; %s" % (
+        name, ", ".join(map(str, candidates)), "there is " + ", ".join(there) if there else "no world is there"))
 
 
 def read_world(path, folders):

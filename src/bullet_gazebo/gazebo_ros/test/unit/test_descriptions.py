@@ -139,6 +139,16 @@ def test_a_missing_world_says_where_it_was_looked_for(tmp_path):
         world_file.find_world("nowhere.world", [tmp_path])
 
 
+def test_a_misspelt_world_is_told_once_with_the_worlds_beside_it(tmp_path):
+    for name in ("cafe.world", "table.world", "notes.txt"):
+        (tmp_path / name).touch()
+    missing = str(tmp_path / "kitchen.world")
+    with pytest.raises(world_file.WorldFileError) as found:
+        world_file.find_world(missing, [tmp_path, tmp_path])
+    assert str(found.value) == (
+        "world file '%s' not found; looked for %s; there is cafe.world, table.world" % (missing, missing))
+
+
 def test_the_core_loads_without_ros():
     """Everything but the node and its conversions must import where there is no ROS."""
     block = "import sys; sys.modules.update(dict.fromkeys(%r)); " % (
