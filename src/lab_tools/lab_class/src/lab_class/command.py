@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh labs up N | list | start | pause | stop | renew | down | logs`: the command line."""
 import argparse
+import csv
 import os
 import re
 import shutil
@@ -81,7 +82,10 @@ def _parser():
     up.add_argument("--no-wait", action="store_true", help="do not wait until the labs run")
     up.set_defaults(run=_up)
     labs = commands.add_parser("list", help="the labs, and what they use")
-    labs.add_argument("--addresses", action="store_true", help="the addresses of instructor and students instead")
+    shown = labs.add_mutually_exclusive_group()
+    shown.add_argument("--addresses", action="store_true", help="the addresses of instructor and students instead")
+    shown.add_argument("--csv", action="store_true", help="names and addresses of the students as CSV, to send each of "
+                       "them one")
     labs.set_defaults(run=_list)
     for verb, help_text in (("start", "start stopped or failed labs, wake paused ones"),
                             ("pause", "pause labs; a click on its page wakes one"), ("stop", "end labs")):
@@ -303,6 +307,12 @@ def _list(options, store):
     overview = control.call(store, "GET", "/labs")
     if options.addresses:
         _print_addresses(store.read(), store)
+        return _DONE
+    if options.csv:
+        record, table = store.read(), csv.writer(sys.stdout, lineterminator="\n")
+        table.writerow(("name", "id", "address"))
+        table.writerows((student.full_name, student.name, _address(record, store, student.name))
+                        for student in record.students)
         return _DONE
     print(_COLUMNS % ("LAB", "STATE", "PAGES", "FACTOR", "MEMORY", "FILES", "UNUSED", "NAME"))
     for lab in overview["labs"]:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab_class import command
+from lab_class import command, roster
 from lab_class.disk import remove
 from lab_class.roster import Student
 from lab_class.store import ClassRecord, Options, Store, StoreError
@@ -69,6 +69,20 @@ def test_addresses_are_shown_again_while_the_class_runs(tmp_path, monkeypatch, c
     said = capsys.readouterr().out
     assert "http://localhost:8123/instructor/?token=" + record.instructor in said
     assert "Anna Müller" in said and "http://localhost:8123/anna/?token=" + record.tokens["anna"].act in said
+
+
+def test_addresses_are_a_table_that_is_a_roster_again(tmp_path, monkeypatch, capsys):
+    store = Store(tmp_path / "class")
+    store.make()
+    students = [Student("am1", "Müller, Anna"), Student("ben", "Ben")]
+    record = ClassRecord.made(Options(), students)
+    store.write(record)
+    store.write_running({"port": 8123})
+    monkeypatch.setattr(command.control, "call", lambda *_: {"labs": []})
+    assert command.main(["--folder", str(store.folder), "list", "--csv"]) == 0
+    said = capsys.readouterr().out
+    assert said.splitlines()[2] == "Ben,ben,http://localhost:8123/ben/?token=" + record.tokens["ben"].act
+    assert roster.read(said) == students
 
 
 def test_logs_of_a_lab_that_the_class_has_not_names_those_that_it_has(tmp_path, capsys):
