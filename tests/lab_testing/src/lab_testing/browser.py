@@ -28,6 +28,8 @@ _OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-
             "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--disable-sync",
             "--hide-scrollbars", "--lang=en-US", "about:blank")
 _START_S, _ANSWER_S = 60.0, 60.0
+# What Chromium answers to a command for a page that is replaced meanwhile.
+_LEFT = "Inspected target navigated"
 # What the browser itself does with a key goes by its number and text.
 _KEYS = {"Tab": {"windowsVirtualKeyCode": 9}, "Enter": {"windowsVirtualKeyCode": 13, "text": "\r"}}
 
@@ -35,6 +37,10 @@ _KEYS = {"Tab": {"windowsVirtualKeyCode": 9}, "Enter": {"windowsVirtualKeyCode":
 def why_not():
     """Why there is no browser for tests on this machine, or ""."""
     return "" if shutil.which(PROGRAM) else "no %s (set-up installs it on Debian)" % PROGRAM
+
+
+class PageLeft(AssertionError):
+    """The page has been left before it answered."""
 
 
 class Browser:
@@ -57,14 +63,13 @@ class Browser:
         self.resize(width, height)
 
     def call(self, method, **parameters):
-        """The result of a DevTools command. Raises AssertionError where it fails."""
+        """The result of a DevTools command. Raises AssertionError where it fails, and PageLeft."""
         self._number += 1
         self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
         while True:
             frame = json.loads(self._socket.recv())
             if frame.get("id") == self._number:
-                assert "error" not in frame, "%s: %s" % (method, frame["error"])
-                return frame["result"]
+                return _result(method, frame)
             self._note(frame)
 
     def evaluate(self, expression):
@@ -74,8 +79,13 @@ class Browser:
         return found["result"].get("value")
 
     def wait(self, expression, timeout_s=60.0):
-        """Wait until a JavaScript expression is true; returns its value."""
-        return wait_until(lambda: self.evaluate(expression), expression, timeout_s, interval_s=0.1)
+        """Wait until a JavaScript expression is true, also of a page that is just being opened; returns its value."""
+        def value():
+            with contextlib.suppress(PageLeft):
+                return self.evaluate(expression)
+            return None
+
+        return wait_until(value, expression, timeout_s, interval_s=0.1)
 
     def open(self, address):
         """Load a page and wait until it is complete."""
@@ -179,6 +189,15 @@ class Browser:
             self.errors.append(" ".join(str(part.get("value", part.get("description"))) for part in said["args"]))
         elif frame.get("method") == "Log.entryAdded" and said["entry"]["level"] == "error":
             self.errors.append("%s %s" % (said["entry"]["text"], said["entry"].get("url", "")))
+
+
+def _result(method, frame):
+    """What the answer to a DevTools command holds. Raises AssertionError, PageLeft."""
+    error = frame.get("error")
+    if error is not None and _LEFT in error.get("message", ""):
+        raise PageLeft("%s: %s" % (method, error))
+    assert error is None, "%s: %s" % (method, error)
+    return frame["result"]
 
 
 def write_picture(address, path, width, height):
