@@ -279,7 +279,10 @@ void main() {
     vec3 shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
     light_from(to_sun, sun, sun_shine, SUNLIT);
     LAMPS
-    seen = vec4(toned(texel.rgb * (own.rgb * lit + emission) + own.a * glint), opacity);
+    // The light is toned, not the product with the picture, whose edges stay where they are: half of a white pixel and
+    // half of a black one are half as bright as a white one.
+    vec3 light = toned(own.rgb * lit + emission);
+    seen = vec4(texel.rgb * light + toned(own.rgb * lit + emission + own.a * glint) - light, opacity);
 }
 """
 

@@ -305,7 +305,7 @@ def test_collada_glows_but_where_it_repeats_its_colour(renderer, tmp_path, quart
     quarters.replace(tmp_path / "meshes" / "quarters.png")
     urdf = collada(tmp_path, emission="1 1 1")
     picture, _ = renderer.render(world(tmp_path, urdf, DARK), PINHOLE, looking(x=-1.2))
-    assert picture[50, 50].max() > 200 and shows_quarters(picture)
+    assert picture[50, 50].max() > 190 and shows_quarters(picture)
 
 
 @pytest.mark.parametrize(("emission", "seen"), [
@@ -331,6 +331,17 @@ def test_only_pictures_that_say_so_have_holes(renderer, tmp_path):
         assert renderer.identify(mirror, PINHOLE, looking(x=-1.2))[0][60, 50] == 1
 
 
+def test_edges_in_a_bright_picture_stay_where_they_are(renderer, tmp_path):
+    """Halfway between black and white it is half as bright as the white: tags in the sun are not measured too small."""
+    pixels = np.zeros((64, 64, 3), dtype=np.uint8)
+    pixels[:, 32:] = 255
+    Image.fromarray(pixels).save(tmp_path / "edge.png")
+    mirror = world(tmp_path, wavefront(tmp_path, "map_Kd edge.png\n"), {**EVEN, "ambient": [1.6, 1.6, 1.6]})
+    row = renderer.render(mirror, PINHOLE, looking(x=-1.2))[0][60, :, 0].astype(float)
+    assert row[80] > 220 and row[40] == 0
+    assert (row[59] + row[60]) / 2.0 == pytest.approx(row[80] / 2.0, abs=4)
+
+
 def test_shadows_are_right_on_what_comes_into_view_later(renderer, tmp_path, quarters):
     """The map of a lamp is drawn once, here before there is a program for pictures."""
     lamp = {"type": "spot", "place": [-0.6, 0, 1.5], "direction": [0.4, 0, -1], "diffuse": [1, 1, 1],
@@ -346,7 +357,7 @@ def test_shadows_are_right_on_what_comes_into_view_later(renderer, tmp_path, qua
     other.close()
     assert (pictures[0] == pictures[2]).all() and (pictures[0] == pictures[3]).all()
     shaded, lit = (pictures[0][row, 50].max() for row in (36, 84))
-    assert shaded < 0.8 * lit, "below the picture's middle is -x, where the lamp is"
+    assert shaded < 0.9 * lit, "below the picture's middle is -x, where the lamp is"
 
 
 def test_without_opengl_a_picture_is_its_mean_colour(tmp_path, quarters):
