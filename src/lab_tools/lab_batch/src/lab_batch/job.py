@@ -9,6 +9,8 @@ import time
 import traceback
 from dataclasses import dataclass, field
 
+from . import keeping
+
 # sys.exit() in a job, or in a library that it calls, ends an episode and not its worker.
 _OF_JOBS = (Exception, SystemExit)
 # Of an array of NumPy that becomes a list: all results of a batch are in memory.
@@ -119,9 +121,12 @@ def run_episode(job, seed):
     except ResultError as error:
         result, text = {}, str(error)
     except _OF_JOBS as error:
+        text, is_out_of_memory = _text_of(error), _is_of_memory(error)
+        if is_out_of_memory:
+            # The job may still hold all of it.
+            keeping.raise_limit()
         where = traceback.extract_tb(error.__traceback__)[-1]
-        result, text = {}, "%s (%s, line %d)" % (_text_of(error), where.filename, where.lineno)
-        is_out_of_memory = _is_of_memory(error)
+        result, text = {}, "%s (%s, line %d)" % (text, where.filename, where.lineno)
     return Outcome(seed, result, text, time.monotonic() - started, is_out_of_memory)
 
 

@@ -21,6 +21,7 @@ STOP_TIMEOUT_S = 5.0
 #: Of the machine's memory, what all workers may take together by default.
 SHARE = 0.8
 _LOOK_S = 0.25
+_RESERVE_BYTES = 64 << 20
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # Where memory runs out all the same, Linux ends processes of workers before others (0 to 1000; others have 0).
 _OOM_SCORE = "500"
@@ -45,6 +46,13 @@ def limit_memory(memory_bytes):
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     if hard == resource.RLIM_INFINITY or memory_bytes < hard:
         resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, hard))
+
+
+def raise_limit():
+    """Let this process have a little more than its limit of memory, to say that it is reached."""
+    limit = resource.getrlimit(resource.RLIMIT_DATA)[0]
+    if limit != resource.RLIM_INFINITY:
+        limit_memory(limit + _RESERVE_BYTES)
 
 
 def own_memory_bytes():

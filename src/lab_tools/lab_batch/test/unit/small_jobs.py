@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Jobs for the tests of the engines."""
+import contextlib
 import os
 import random
 import signal
@@ -70,14 +71,22 @@ class Hog(Job):
 
         if seed in self._at_once:
             return {"last": float(np.ones(75_000_000)[-1])}
-        while seed in self._keeps:
-            self._kept.append(bytes(1_000_000))
+        if seed in self._keeps:
+            self._keep_all()
         if seed in self._programs:
             words = [sys.executable, "-c", "import signal; kept = bytes(range(200)) * 1_000_000; signal.pause()"]
             started = [subprocess.Popen(words, start_new_session=True) for _ in range(3)]
             (self._folder / "programs").write_text(" ".join(str(one.pid) for one in started))
             signal.pause()
         return {"good": True}
+
+    def _keep_all(self):
+        """To the last kilobyte."""
+        for size in (1_000_000, 1_000):
+            with contextlib.suppress(MemoryError):
+                while True:
+                    self._kept.append(bytes(size))
+        self._kept.append(bytes(1_000_000))
 
 
 class Leaves(Job):
