@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes simplified for software rendering: split by colour, in levels of detail, cached on disk. ROS-free."""
+import contextlib
 import hashlib
 import json
 import os
 import re
 import shutil
 import tempfile
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,6 +30,8 @@ LIMITS = {"processor_s": _PROCESSOR_S, "waiting_s": _WAITING_S}
 _PROCESS = LimitedProcess(**LIMITS)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 13
+# Names of folders that are being written begin so; nothing is written to one that is older than this [s].
+_DRAFT, _ABANDONED_S = "tmp", 3600.0
 # Room that a mesh's levels and its picture may need [bytes].
 _ROOM = 8_000_000
 # The files with the materials of a Wavefront file.
@@ -126,7 +130,8 @@ class DrawingCache:
             self._folder = spare_folder("bullet_gazebo_drawings")
             if (self._folder / key / name).exists():
                 return self._folder / key / name
-        draft = Path(tempfile.mkdtemp(dir=self._folder))
+        _remove_drafts(self._folder)
+        draft = Path(tempfile.mkdtemp(prefix=_DRAFT, dir=self._folder))
         try:
             (self._process or _PROCESS).call(write, path, str(draft), *arguments)
         except LimitError:
@@ -136,8 +141,18 @@ class DrawingCache:
         try:
             draft.rename(target)
         except OSError:
-            target = draft if not (target / name).exists() else target  # another process has made it
+            if not (target / name).exists():
+                return draft / name
+            shutil.rmtree(draft, ignore_errors=True)  # another process has made it
         return target / name
+
+
+def _remove_drafts(folder):
+    """Remove what programs have left that were killed while they simplified."""
+    for draft in folder.glob(_DRAFT + "*"):
+        with contextlib.suppress(OSError):
+            if time.time() - draft.stat().st_mtime > _ABANDONED_S:
+                shutil.rmtree(draft, ignore_errors=True)
 
 
 def _digest(path, content):

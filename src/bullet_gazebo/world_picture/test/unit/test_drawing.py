@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,34 @@ def test_without_room_in_the_cache_a_mesh_is_drawn_all_the_same(tmp_path, monkey
     path.write_text(COLLADA, encoding="utf-8")
     part, = drawing.DrawingCache(folder).parts(path)
     assert os.path.exists(part.path) and list(folder.iterdir()) == []
+
+
+def test_what_killed_programs_have_left_in_the_cache_is_removed_later(tmp_path):
+    folder, path = tmp_path / "cache", tmp_path / "plain.DAE"
+    path.write_text(COLLADA, encoding="utf-8")
+    for name, age_s in (("tmp_killed", 3700.0), ("tmp_at_work", 10.0)):
+        (folder / name).mkdir(parents=True)
+        then = time.time() - age_s
+        os.utime(folder / name, (then, then))
+    part, = drawing.DrawingCache(folder).parts(path)
+    assert {one.name for one in folder.iterdir()} == {"tmp_at_work", Path(part.path).parent.name}
+
+
+def test_two_programs_that_make_the_same_leave_one_result(tmp_path):
+    path = tmp_path / "plain.DAE"
+    path.write_text(COLLADA, encoding="utf-8")
+
+    class SlowProcess:
+        """While it simplifies, another program does, too."""
+
+        def call(self, function, *arguments):
+            theirs, = drawing.DrawingCache(tmp_path / "cache").parts(path)
+            function(*arguments)
+            self.made = theirs
+
+    slow = SlowProcess()
+    part, = drawing.DrawingCache(tmp_path / "cache", slow).parts(path)
+    assert part == slow.made and len(list((tmp_path / "cache").iterdir())) == 1
 
 
 def test_a_collada_mesh_has_the_colours_that_its_file_names(tmp_path):
