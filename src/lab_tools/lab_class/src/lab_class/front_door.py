@@ -147,7 +147,9 @@ class Passed(PassingHandler):
             self.refuse(403, "This address needs the token of this lab: /%s/?token=..." % self._name[:60])
         elif self.takes_request():
             if token:
-                self.set_cookie(COOKIE, token, path=self._prefix + "/", httponly=True, samesite="Strict")
+                encrypted = self.door.record.options.address.startswith("https:")
+                self.set_cookie(COOKIE, token, path=self._prefix + "/", httponly=True, samesite="Strict",
+                                secure=encrypted)
             return True
         return False
 

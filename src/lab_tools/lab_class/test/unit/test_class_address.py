@@ -58,7 +58,7 @@ def test_all_paths_of_the_door_begin_with_the_servers():
 
         token = "?token=" + record.tokens["anna"].act
         status, answer = await ask(PREFIX + "/anna/" + token)
-        assert status == 503 and "Path=%s/anna/;" % PREFIX in answer
+        assert status == 503 and "Path=%s/anna/;" % PREFIX in answer and "; Secure" in answer
         status, answer = await ask(PREFIX + "/anna" + token)
         assert status == 302 and "Location: %s/anna/?token=" % PREFIX in answer
         for path in ("/anna/" + token, "/aXb/robots/anna/" + token, "/instructor/"):
