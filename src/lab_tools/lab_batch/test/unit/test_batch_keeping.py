@@ -82,8 +82,9 @@ def test_a_program_ends_with_whoever_is_killed(tmp_path, who):
              "command=%s" % program]
     batch = subprocess.Popen(words)
     try:
-        wait_until(lambda: (tmp_path / "program").exists() and (tmp_path / "program").read_text(), "the program runs")
-        program = int((tmp_path / "program").read_text())
+        file = tmp_path / "program"
+        wait_until(lambda: file.exists() and file.read_text(), "the program runs", 60.0)
+        program = int(file.read_text())
         worker, keeper = parent_of(program), parent_of(parent_of(program))
         assert parent_of(keeper) == batch.pid
         os.kill({"batch": batch.pid, "worker": worker}[who], signal.SIGKILL)
