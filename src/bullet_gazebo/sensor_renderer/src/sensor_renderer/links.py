@@ -162,7 +162,7 @@ class Links:
             radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()) + error_m
             found = self._links[key] = Link(centre, (high - low) / 2.0 + error_m, radius,
                                             any(part.is_floor for part in parts), tuple(parts),
-                                            any(part.levels for part in parts))
+                                            any(part.is_mesh for part in parts))
             found.caster = self._caster_of(found)
         return found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sensor_renderer import triangles
 from sensor_renderer.light import Light
-from urdf_model import Finish, Mesh, merge_fixed, parse_urdf
+from urdf_model import Box, Finish, Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
 from world_picture.background import NotReady
 from world_picture.drawing import DrawingError, read_level, read_uv
@@ -23,6 +23,9 @@ _WHITE = (1.0, 1.0, 1.0, 1.0)
 GLOSS = 0.3
 #: So many shapes of models that are gone are kept, for models that come again.
 MOST_UNUSED = 100
+# Of a round thing, one pixel in sixteen has a surface so slanted that its depth is off by this many times the distance
+# from the surface, or more.
+_SLANTED = 4.0
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
@@ -56,7 +59,7 @@ class Part(NamedTuple):
     """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``levels``: of
     the same shape, the finest first; none for shapes that have no other. ``gloss``: strength of its highlights, from 0
     to 1. ``material``: None for a colour alone; else ``colour`` is about the mean. ``uv`` (3 m, 2): the corners' places
-    in its picture, if there are no levels."""
+    in its picture, if there are no levels. ``is_mesh``: whether its triangles are of a mesh file."""
 
     key: tuple
     triangles: np.ndarray
@@ -66,6 +69,7 @@ class Part(NamedTuple):
     gloss: float = GLOSS
     material: Material = None
     uv: np.ndarray = None
+    is_mesh: bool = False
 
     def level(self, error_m):
         """The number of the coarsest level that is within ``error_m`` [m] of the original; 0, the finest, if none."""
@@ -309,10 +313,10 @@ class Mirror:
         texture = self._texture(finish.texture, self._find_mesh(finish.texture)) if finish.texture else None
         if not isinstance(geometry, Mesh):
             look = _look(finish, colour, shape.colour or _WHITE, texture, finish.emission)
-            if look["material"] is not None:
+            if isinstance(geometry, Box) and look["material"] is not None:
                 look["uv"] = triangles.uv_on_primitive(geometry, triangles.of_primitive(geometry))
             return [self._placed((geometry,), lambda: _at(shape.origin, triangles.of_primitive(geometry)), shape.origin,
-                                 **look)]
+                                 levels=_round_levels(geometry, shape.origin), **look)]
         path = self._find_mesh(geometry.filename)
         if path is None:
             return []  # /gazebo has logged it
@@ -348,7 +352,7 @@ class Mirror:
                        for level in part.levels)
         # A mirrored mesh shows its backs; they are its outside.
         finish = replace(finish, two_sided=finish.two_sided or np.linalg.det(origin[:3, :3]) < 0.0)
-        return self._placed((part.path,), levels[part.plain].make, origin, levels=levels,
+        return self._placed((part.path,), levels[part.plain].make, origin, levels=levels, is_mesh=True,
                             **_look(finish, (*colour[:3], opacity), (*factor[:3], opacity), texture, emission))
 
     def _texture(self, name, path):
@@ -368,6 +372,19 @@ class Mirror:
         if key not in self._parts:
             self._parts[key] = make()
         return Part(key, self._parts[key], **look)
+
+
+def _round_levels(geometry, origin):
+    """The :class:`Level` of each of ``triangles.CIRCLES`` of a Cylinder or Sphere at ``origin`` (4, 4); () of a Box."""
+    def made(corners):
+        return triangles.of_primitive(geometry, corners)
+
+    if isinstance(geometry, Box):
+        return ()
+    return tuple(Level(_SLANTED * triangles.circle_error(geometry.radius, corners),
+                       lambda corners=corners: _at(origin, made(corners)),
+                       lambda corners=corners: triangles.uv_on_primitive(geometry, made(corners)))
+                 for corners in triangles.CIRCLES)
 
 
 def _look(finish, colour, factor, texture, emission):

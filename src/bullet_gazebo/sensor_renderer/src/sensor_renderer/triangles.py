@@ -10,21 +10,31 @@ import numpy as np
 from urdf_model import Box, Cylinder, Sphere
 from world_picture.reduction import corner_normals
 
-_CIRCLE = 32
+#: Corners of a circle, the finest first.
+CIRCLES = (128, 64, 32)
 
 
-def of_primitive(geometry):
-    """Triangles of a ``urdf_model`` Box, Cylinder or Sphere about its own origin; ``TypeError`` for anything else."""
+def of_primitive(geometry, corners=CIRCLES[-1]):
+    """Triangles of a ``urdf_model`` Box, Cylinder or Sphere about its own origin, with so many ``corners`` of a circle;
+    ``TypeError`` for anything else."""
     if isinstance(geometry, Box):
         return _box(np.asarray(geometry.size) / 2.0)
     if isinstance(geometry, Cylinder):
-        half = geometry.length / 2.0
-        profile = [(0.0, -half), (geometry.radius, -half), (geometry.radius, half), (0.0, half)]
-        return of_mesh(*_revolved(profile))
+        half, radius = geometry.length / 2.0, geometry.radius + circle_error(geometry.radius, corners)
+        profile = [(0.0, -half), (radius, -half), (radius, half), (0.0, half)]
+        return of_mesh(*_revolved(profile, corners))
     if isinstance(geometry, Sphere):
-        angles = np.linspace(-math.pi / 2.0, math.pi / 2.0, _CIRCLE // 2 + 1)
-        return of_mesh(*_revolved([(geometry.radius * math.cos(a), geometry.radius * math.sin(a)) for a in angles]))
+        angles, radius = np.linspace(-math.pi / 2.0, math.pi / 2.0, corners // 2 + 1), geometry.radius
+        radius += circle_error(radius, corners)
+        profile = [(radius * math.cos(a), radius * math.sin(a)) for a in angles]
+        return of_mesh(*_revolved(profile, corners))
     raise TypeError("no primitive: %r" % (geometry,))
+
+
+def circle_error(radius, corners):
+    """How far a polygon with so many ``corners`` is from its circle, in the unit of ``radius``: its corners are as far
+    outside as the middles of its sides are inside."""
+    return radius * math.tan(math.pi / (2.0 * corners)) ** 2
 
 
 def uv_on_primitive(geometry, rows):
@@ -79,13 +89,13 @@ def _box(half):
     return of_mesh(signs * half, np.array(faces))
 
 
-def _revolved(profile):
+def _revolved(profile, corners):
     """Vertices and faces of a profile of (radius, height), bottom to top, turned about z."""
-    angles = 2.0 * math.pi * np.arange(_CIRCLE) / _CIRCLE
+    angles = 2.0 * math.pi * np.arange(corners) / corners
     vertices = np.array([(r * math.cos(a), r * math.sin(a), z) for r, z in profile for a in angles])
     faces = []
     for ring in range(len(profile) - 1):
-        for i in range(_CIRCLE):
-            a, b = ring * _CIRCLE + i, ring * _CIRCLE + (i + 1) % _CIRCLE
-            faces += [(a, b, b + _CIRCLE), (a, b + _CIRCLE, a + _CIRCLE)]
+        for i in range(corners):
+            a, b = ring * corners + i, ring * corners + (i + 1) % corners
+            faces += [(a, b, b + corners), (a, b + corners, a + corners)]
     return vertices, np.array(faces)

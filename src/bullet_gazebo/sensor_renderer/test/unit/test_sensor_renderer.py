@@ -231,6 +231,29 @@ def test_a_shadow_falls_on_the_floor(tmp_path):
     renderer.close()
 
 
+@pytest.mark.parametrize("radius", [0.03, 0.3, 3.0])
+@pytest.mark.parametrize("geometry", ['<sphere radius="%g"/>', '<cylinder radius="%g" length="20"/>'])
+def test_the_depth_of_round_things_is_that_of_their_formula(tmp_path, geometry, radius):
+    away = 4.0 * radius
+    pinhole = Pinhole.from_field_of_view(320, 320, 0.6, 0.01, 100.0)
+    ball = "<robot name='b'><link name='l'><visual><geometry>%s</geometry></visual></link></robot>" % geometry % radius
+    renderer = GlRenderer()
+    _, depth = renderer.render(world([("ball", ball, [], [0, 0, 0, 0, 0, 0, 1])], tmp_path), pinhole,
+                               looking_at_origin(away), colour=False, depth=True)
+    renderer.close()
+    down, right = np.mgrid[0:320, 0:320]
+    rays = np.stack([(right - pinhole.cx) / pinhole.fx, (down - pinhole.cy) / pinhole.fy, np.ones((320, 320))], axis=2)
+    if "cylinder" in geometry:
+        rays[..., 1] = 0.0  # its axis is upright in the picture, and so long that its ends are outside
+    # |t ray - (0, 0, away)| = radius, the nearer one; t is the depth, since rays have z = 1.
+    square = (rays ** 2).sum(axis=2)
+    inside = away ** 2 - square * (away ** 2 - radius ** 2)
+    expected = (away - np.sqrt(np.where(inside > 0.0, inside, np.nan))) / square
+    both = np.isfinite(depth) & np.isfinite(expected)
+    assert both.sum() > 0.98 * np.isfinite(expected).sum()
+    assert np.mean(np.abs(depth - expected)[both] < 0.003 * max(1.0, away)) >= 0.99
+
+
 @pytest.mark.parametrize(("geometry", "volume"), [
     (Box((0.1, 0.2, 0.3)), 0.006), (Sphere(0.5), 4 / 3 * np.pi * 0.125), (Cylinder(0.1, 0.4), np.pi * 0.004)])
 def test_primitives_are_closed_and_face_outwards(geometry, volume):

@@ -2,7 +2,7 @@
 """Descriptions of things with a tag on their upper face. Free of ROS.
 
 The black cells are thin boxes on a white face, so every program that draws descriptions shows the tag, with edges as
-sharp as its pixels.
+sharp as its pixels. They are matt, as printed paper: black paint and plastic mirror the sky.
 """
 import numpy as np
 
@@ -19,7 +19,7 @@ _WHITE, _BLACK = "0.95 0.95 0.95 1", "0.03 0.03 0.03 1"
 _VISUAL = """    <visual>
       <origin xyz="%.6g %.6g %.6g"/>
       <geometry><box size="%.6g %.6g %.6g"/></geometry>
-      <material name="%s"><color rgba="%s"/></material>
+      <material name="%s"><color rgba="%s"/><gloss value="0"/></material>
     </visual>
 """
 _THING = """<robot name="%(name)s">
