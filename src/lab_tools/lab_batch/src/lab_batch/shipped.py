@@ -17,9 +17,9 @@ from .job import Job
 
 TAIL = 400  # characters of a program's output in the error of an episode
 STOP_TIMEOUT_S = 20.0
-# What roslaunch writes where a required node fails: its name, its exit code.
-_REQUIRED = re.compile(r"(?:\x1b\[\d+m)?=*REQUIRED process \[(.+?)\] has died!\s+"
-                       r"process has died \[pid \d+, exit code (-?\d+)")
+# What roslaunch writes where a required node fails: its name, its exit code; and the line before, in red.
+_REQUIRED = re.compile(r"REQUIRED process \[(.+?)\] has died!\s+process has died \[pid \d+, exit code (-?\d+)")
+_BEFORE = "=\x1b[31m"
 
 
 class InverseKinematics(Job):
@@ -90,7 +90,7 @@ class Command(Job):
             raise RuntimeError("exit code %s; the end of its output: %s" % (code, text[-TAIL:].strip()))
         if died := _REQUIRED.search(text):
             raise RuntimeError("required node %s ended with exit code %s; the end of the output before: %s" % (
-                *died.groups(), text[:died.start()][-TAIL:].strip()))
+                *died.groups(), text[:died.start()].rstrip(_BEFORE)[-TAIL:].strip()))
         return {"exit_code": code, **_last_object(text)}
 
 
