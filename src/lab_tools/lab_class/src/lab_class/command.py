@@ -296,6 +296,8 @@ def _await_labs(store):
                     print("%s is %s%s" % (lab["name"], lab["state"], ": " + lab["reason"] if lab["reason"] else ""),
                           flush=True)
             if len(shown) == len(labs):
+                if any(lab["state"] == State.PAUSED.value for lab in labs):
+                    print("A paused lab goes on as soon as its page is opened.", flush=True)
                 return _FAILED if any(lab["state"] == State.FAILED.value for lab in labs) else _DONE
             time.sleep(_LOOK_S)
     except KeyboardInterrupt:

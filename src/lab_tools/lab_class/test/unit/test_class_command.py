@@ -41,6 +41,20 @@ def test_ctrl_c_before_there_are_addresses_ends_the_class(tmp_path, monkeypatch)
     assert started[0].poll() == -signal.SIGTERM
 
 
+def test_labs_that_have_started_and_what_wakes_them(monkeypatch, capsys):
+    looks = [[("anna", "starting", ""), ("ben", "waiting", "")], [("anna", "paused", ""), ("ben", "failed", "no disk")]]
+
+    def call(*_):
+        return {"labs": [{"name": name, "state": state, "reason": reason, "is_starting": state == "starting"}
+                         for name, state, reason in looks.pop(0)]}
+
+    monkeypatch.setattr(command, "control", SimpleNamespace(call=call))
+    monkeypatch.setattr(command, "_LOOK_S", 0.0)
+    assert command._await_labs(None) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "anna is paused", "ben is failed: no disk", "A paused lab goes on as soon as its page is opened."]
+
+
 def test_a_port_that_is_taken_is_named():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
