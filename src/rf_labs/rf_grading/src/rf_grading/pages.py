@@ -167,31 +167,35 @@ def _histogram(points, most):
 
 def _submissions(results, feedback_of):
     head = "".join('<th class="n">%s</th>' % _text(exercise.name) for exercise in results.exercises)
+    # Folders and files without a learning system's names have none.
+    named = any(row.submission.name for row in results.rows)
     lines = []
     for row in results.rows:
         cells = "".join('<td class="n %s">%s</td>' % (_class_of(row.cells[exercise.name]),
                                                       _points(row.cells[exercise.name].points))
                         for exercise in results.exercises)
-        lines.append('<tr><td><a href="%s">%s</a></td><td>%s</td>%s<td class="n">%s</td>'
-                     '<td class="why">%s</td></tr>' % (
-            link_to(feedback_of(row)), _text(row.submission.entry), _text(row.submission.name), cells,
-            _points(row.points), _text("; ".join(row.sentences))))
-    return ('<table><tr><th>submission</th><th>name</th>%s<th class="n">points</th><th>reasons</th></tr>%s</table>'
-            % (head, "".join(lines)))
+        name = "<td>%s</td>" % _text(row.submission.name) if named else ""
+        lines.append('<tr><td><a href="%s">%s</a></td>%s%s<td class="n">%s</td><td class="why">%s</td></tr>' % (
+            link_to(feedback_of(row)), _text(row.submission.entry), name, cells, _points(row.points),
+            _text("; ".join(row.sentences))))
+    return ('<table><tr><th>submission</th>%s%s<th class="n">points</th><th>reasons</th></tr>%s</table>'
+            % ("<th>name</th>" if named else "", head, "".join(lines)))
 
 
 def _faults(results):
-    counts = {}
+    found = {}
     for row in results.rows:
         for name, cell in row.cells.items():
             what = (cell.verdict or {}).get("fault") or (cell.status if cell.status != GRADED else "")
             if what:
-                counts[name, what] = counts.get((name, what), 0) + 1
-    if not counts:
+                found.setdefault((name, what.replace("_", " ")), []).append(cell.sentence)
+    if not found:
         return "<p>Nothing.</p>"
-    return "<table>%s</table>" % "".join(
-        '<tr><td class="n">%d</td><td>%s</td><td>%s</td></tr>' % (count, _text(name), _text(what))
-        for (name, what), count in sorted(counts.items(), key=lambda one: (-one[1], one[0])))
+    return ('<table><tr><th class="n">number</th><th>exercise</th><th>fault</th><th>one of the sentences</th></tr>%s'
+            "</table>" % "".join(
+                '<tr><td class="n">%d</td><td>%s</td><td>%s</td><td class="why">%s</td></tr>' % (
+                    len(sentences), _text(name), _text(what), _text(sentences[0]))
+                for (name, what), sentences in sorted(found.items(), key=lambda one: (-len(one[1]), one[0]))))
 
 
 def _alike(results, feedback_of):

@@ -18,7 +18,8 @@ EVIL = "<script>alert('x')</script>\x00\x1b[31m\ud800"
 
 
 def verdict(points, hint=None, **more):
-    return {"points": points, "passed": points >= 80, "pass_mark": 80, "hint": hint, "fault": "late" if hint else None,
+    return {"points": points, "passed": points >= 80, "pass_mark": 80, "hint": hint,
+            "fault": "far_off" if hint else None,
             "wall_s": 2.0, "program": "wave.py", "notes": [], "isolation": "bubblewrap",
             "runs": [{"arguments": ["z", "90"], "points": points, "fault": None, "output": "", "errors": "",
                       "end": {"how": "finished", "simulated_s": 3.0},
@@ -142,6 +143,15 @@ def test_the_overview_has_everybody_and_who_is_alike(found):
     assert all(row.submission.entry in page for row in found.rows)
     assert 'href="feedback/%3Dcmd%28%29/feedback.html"' in page
     assert "90 % of the first's own code" in page and "SECRET" in page and "roster.csv" in page
+    assert '<td>wave</td><td>far off</td><td class="why">' in page and "far_off" not in page
+    assert '<td class="n">4</td><td>tf_listener</td><td>no program</td>' in page
+
+
+def test_the_overview_has_a_column_of_names_where_somebody_has_one(found):
+    assert "Anna Maria Gro" in found.rows[0].submission.name
+    for rows, shown in ((found.rows, True), (found.rows[1:], False)):
+        page = pages.overview(dataclasses.replace(found, rows=rows, alike=()), 1.0, lambda row: "a.html")
+        assert ("<th>name</th>" in page) == shown
 
 
 def test_the_median_of_two_is_between_them(found):
