@@ -83,9 +83,9 @@ def test_a_lab_knows_the_whole_path(tmp_path):
 
 
 def test_a_launch_file_that_no_lab_sees_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(command.isolation, "workspaces", lambda environment: ["/work/space"])
-    for words in (("baxter_gazebo", "baxter_world.launch"), ("/work/space/src/my.launch",), ("/opt/my.launch",)):
+    monkeypatch.setattr(command.isolation, "workspaces", lambda environment: ["/srv/space"])
+    for words in (("baxter_gazebo", "baxter_world.launch"), ("/srv/space/src/my.launch",), ("/opt/my.launch",)):
         command._refuse_launch_outside(Options(launch=words))
     command._refuse_launch_outside(Options(launch=("/home/me/my.launch",), trusted=True))
-    with pytest.raises(ClassError, match="labs do not see /home/me/my.launch; put .* /work/space"):
+    with pytest.raises(ClassError, match="labs do not see /home/me/my.launch; put .* /srv/space"):
         command._refuse_launch_outside(Options(launch=("/home/me/my.launch",)))
