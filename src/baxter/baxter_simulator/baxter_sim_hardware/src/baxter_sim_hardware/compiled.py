@@ -4,9 +4,19 @@ import numpy as np
 
 from baxter_sim_hardware.arms import avoidance
 from baxter_sim_hardware.arms.actuators import Actuators, Wanted
+from baxter_sim_hardware.arms.joint_command import CommandParser, JointLimits, Mode
 from baxter_sim_hardware.arms.joint_sensors import JointSensors
 from baxter_sim_hardware.arms.safety import blocks_of
-from baxter_sim_hardware.arms.setpoint import SetPoints, any_beyond, approach, approach_rates, follow
+from baxter_sim_hardware.arms.setpoint import (
+    SetPoints,
+    Speeds,
+    any_beyond,
+    approach,
+    approach_rates,
+    cruising_speeds,
+    follow,
+    shares_in_step,
+)
 
 
 def load():
@@ -18,6 +28,13 @@ def load():
     any_beyond(1.0, here, at_rest, here, 1.0)
     approach_rates(np.zeros(1, dtype=int), here, here, bound, bound, bound > 0.0)
     avoidance.field(avoidance.Guards(("guard",), np.zeros((1, 3)), bound), *_arm())
+    limits = JointLimits(("left_s0",), -bound, bound, bound, bound)
+    parser = CommandParser(limits, limits.names)
+    for mode in Mode:
+        command = parser.parse(mode, limits.names, [0.0])
+    speeds = Speeds(bound, 1.0)
+    shares_in_step(command.index, command.values, points.position, speeds.numbers, 1.0)
+    cruising_speeds(speeds.numbers, np.zeros(1, dtype=int), points.braking, here, points.speed)
 
 
 def load_of_effects(numbers):

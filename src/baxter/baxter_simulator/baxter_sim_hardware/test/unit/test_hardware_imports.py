@@ -4,8 +4,14 @@ import json
 import subprocess
 import sys
 
+import numba
 import pytest
+from baxter_core_msgs.msg import JointCommand
 from numba.core.dispatcher import Dispatcher
+
+from baxter_model import joint_names
+from baxter_sim_hardware import compiled
+from baxter_sim_hardware.arms.joint_command import Mode
 
 HEARD = ("*",)
 LOADED = """
@@ -13,9 +19,9 @@ import json, sys
 from numba.core.dispatcher import Dispatcher
 from baxter_sim_hardware import compiled
 compiled.load()
-print(json.dumps(sorted({found.py_func.__qualname__ for name, module in list(sys.modules.items())
-    if name.startswith("baxter_sim_hardware") for found in vars(module).values()
-    if isinstance(found, Dispatcher) and found.signatures})))
+print(json.dumps({found.py_func.__qualname__: list(map(str, found.signatures))
+    for name, module in list(sys.modules.items()) if name.startswith("baxter_sim_hardware")
+    for found in vars(module).values() if isinstance(found, Dispatcher)}))
 """
 
 
@@ -31,11 +37,13 @@ def test_cameras_and_spawning_load_no_compiled_code(module):
 
 
 def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
-    called = set()
+    compiled.load()  # they call each other, and none can be compiled while it is replaced
+    called = {}
 
     def recorded(function):
         def call(*arguments):
-            called.add(function.py_func.__qualname__)
+            types = str(tuple(map(numba.typeof, arguments)))
+            called.setdefault(function.py_func.__qualname__, set()).add(types)
             return function(*arguments)
         return call
 
@@ -46,5 +54,10 @@ def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
     lab = make_lab()
     lab.enable()
     lab.run(0.1)
-    assert {"follow", "approach", "any_beyond"} <= called
-    assert called <= set(json.loads(printed_by(LOADED)))
+    for mode in Mode:
+        names = list(joint_names("left"))
+        lab.send("limb/left/joint_command", JointCommand(mode, [0.1] * len(names), names))
+        lab.run(0.1)
+    loaded = json.loads(printed_by(LOADED))
+    assert {"follow", "approach", "any_beyond", "_clamp", "shares_in_step", "cruising_speeds"} <= called.keys()
+    assert {name: types - set(loaded[name]) for name, types in called.items()} == dict.fromkeys(called, set())

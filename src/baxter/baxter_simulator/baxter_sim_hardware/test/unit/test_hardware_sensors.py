@@ -9,7 +9,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Float32, Float64, String, UInt16
 
 from baxter_sim_hardware.arms import procedures
-from baxter_sim_hardware.sensing import sensors
+from baxter_sim_hardware.sensing import sensors, sonar_lights
+from baxter_sim_hardware.topics.sensors import LIGHT_TURNS, SONAR_RATE_HZ
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
@@ -113,6 +114,17 @@ def test_sonars_hear_a_wall_and_can_be_switched_off(make_lab):
     lab.send("sonar/head_sonar/set_sonars_enabled", UInt16(4096))
     lab.run(0.1)
     assert "must be from 0 to 4095" in lab.log.lines[-1]
+
+
+def test_without_a_client_every_light_follows_its_sonar(make_lab):
+    lab = make_lab(pose="start")
+    wall_before(lab, "sonar_ring", 2.0)
+    lab.run((LIGHT_TURNS + 0.5) / SONAR_RATE_HZ)
+    shown = lab.lights["sonar_ring"].pixels.copy()
+    lab.run(0.15)
+    mask = lab.last("sonar/head_sonar/lights/state").data
+    assert mask & 1, "the wall is before the first sonar"
+    np.testing.assert_array_equal(shown, sonar_lights.picture(mask, 0.0, 0.0))
 
 
 def test_lights_and_levels(make_lab):

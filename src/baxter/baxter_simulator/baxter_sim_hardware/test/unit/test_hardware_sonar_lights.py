@@ -10,6 +10,7 @@ from std_msgs.msg import Float32, UInt16
 
 from baxter_sim_hardware.sensing import sonar_lights
 from baxter_sim_hardware.sensing.sensors import LIGHTS_OVERRIDE
+from baxter_sim_hardware.topics.sensors import LIGHT_TURNS, SONAR_RATE_HZ
 from model_files.resources import ResourceFinder
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
@@ -83,7 +84,8 @@ def test_the_halo_is_a_line_around_the_head_below_the_lights(seen):
 
 def test_echoes_light_up_without_a_client(lab):
     light = lab.lights["sonar_ring"]
-    lab.run(0.15)
+    all_listened = (LIGHT_TURNS + 0.5) / SONAR_RATE_HZ
+    lab.run(all_listened)
     before = light.pixels.any()
     lab.send("sonar/head_sonar/set_sonars_enabled", UInt16(0))
     lab.run(0.15)
@@ -92,7 +94,7 @@ def test_echoes_light_up_without_a_client(lab):
     lab.run(0.15)
     assert light.pixels.max() == 127 and light.pixels[:, :, 1].any(axis=1).sum() < 10
     lab.plugin.reset()
-    lab.run(0.15)
+    lab.run(all_listened)
     assert light.pixels.any() == before
 
 

@@ -28,9 +28,19 @@ from baxter_sim_hardware.errors import CommandRefused
 from .drives import NO_JOINTS, Drives
 from .effort_bounds import REACH_RAD, EffortBounds
 from .joint_command import CommandParser, Mode
-from .joint_modes import POSITION, RAW_POSITION, VELOCITY, JointModes
+from .joint_modes import POSITION, RAW_POSITION, JointModes
 from .raw_stream import RawStream
-from .setpoint import MovingAverage, SetPoints, any_beyond, approach_rates, follow, stopping_point
+from .setpoint import (
+    MovingAverage,
+    SetPoints,
+    Speeds,
+    any_beyond,
+    approach_rates,
+    cruising_speeds,
+    follow,
+    shares_in_step,
+    stopping_point,
+)
 from .stopping import hardest_stop
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
@@ -54,18 +64,16 @@ SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanish
 class _Limb:
     """The state of one arm that is separate from the other's."""
 
-    def __init__(self, model, limits, speed_ratio):
+    def __init__(self, model, limits):
         self.parser = CommandParser(limits, model.joint_names)
         self.index = np.array([limits.names.index(name) for name in model.joint_names])
         self.joints = np.zeros(len(limits.names), dtype=bool)  # the same as a mask
         self.joints[self.index] = True
         self.mode = Mode.POSITION  # of the last command
-        self.speed_ratio = speed_ratio
         self.timeout_s = COMMAND_TIMEOUT_S
         self.floats = False
         self.yields = False
         self.balanced = True
-        self.slowing = 1.0  # share of the speed that its set-points may have
 
 
 class Arms:
@@ -79,15 +87,14 @@ class Arms:
     def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002, reach_rad=REACH_RAD):
         self.limits = limits
         self._measured, self._reach_rad = measured, reach_rad
-        self._limbs = {limb.side: _Limb(limb, limits, speed_ratio) for limb in limbs}
+        self._limbs = {limb.side: _Limb(limb, limits) for limb in limbs}
         self._dt = dt
         count = len(limits.names)
         self._all, self._still = np.arange(count), np.zeros(count)
         points = self._points = SetPoints(count)
         points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
         points.stopping[:] = points.acceleration
-        self._share = np.ones(count)  # of its speed that a joint needs to move in step with others, in POSITION mode
-        self._nominal_speed = np.zeros(count)  # [rad/s] cruising speed, if nothing slows a limb
+        self._speeds = Speeds(limits.velocity, speed_ratio)
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), measured.position)
         self._modes = JointModes(count)
         self._stream = RawStream(limits, dt)
@@ -185,11 +192,11 @@ class Arms:
         """Scale POSITION mode's speed; clipped to 0..1. Raises CommandRefused for NaN."""
         if np.isnan(ratio):
             raise CommandRefused("speed ratio is nan; it must be a number from 0 to 1")
-        self._limbs[side].speed_ratio = min(max(float(ratio), 0.0), 1.0)
+        self._speeds.ratio[self._limbs[side].index] = min(max(float(ratio), 0.0), 1.0)
         self._refresh_speed()
 
     def speed_ratio(self, side):
-        return self._limbs[side].speed_ratio
+        return float(self._speeds.ratio[self._limbs[side].index[0]])
 
     def set_timeout(self, side, seconds):
         """How old a streamed command may get [s]. Raises CommandRefused unless it is a positive number."""
@@ -253,13 +260,13 @@ class Arms:
         """
         points = self._points
         return approach_rates(self._limbs[side].index, points.target, points.position, points.acceleration,
-                              self._nominal_speed, self._modes.is_governed)
+                              self._speeds.nominal, self._modes.is_governed)
 
     def set_slowing(self, side, share):
         """Set the share of the speed, 0 to 1, that a limb's set-points may have in position and velocity mode."""
-        limb = self._limbs[side]
-        if share != limb.slowing:
-            limb.slowing = share
+        index = self._limbs[side].index
+        if share != self._speeds.slowing[index[0]]:
+            self._speeds.slowing[index] = share
             self._refresh_speed()
 
     def set_gravity_compensation(self, side, on):
@@ -452,17 +459,12 @@ class Arms:
 
     def _move_in_step(self, command):
         """Make the joints of a POSITION command arrive together."""
-        index = command.index
-        times = np.abs(command.values - self._points.position[index]) / self.limits.velocity[index]
-        longest = times.max()
-        shares = np.maximum(times / longest, LEAST_SHARE) if longest > 0.0 else np.ones(len(index))
-        if (shares != self._share[index]).any():
-            self._share[index] = shares
+        if shares_in_step(command.index, command.values, self._points.position, self._speeds.numbers, LEAST_SHARE):
             self._refresh_speed()
 
     def _set_mode(self, joints, mode):
         self._is_settled = False
-        self._share[joints] = 1.0
+        self._speeds.share[joints] = 1.0
         self._modes.set(joints, mode)
         self._points.streams[:] = self._modes.mode == RAW_POSITION
         self._points.braking &= ~joints
@@ -472,17 +474,5 @@ class Arms:
 
     def _refresh_speed(self):
         """Cruising speed of each joint's set-point [rad/s], by mode."""
-        points, modes, nominal = self._points, self._modes, self._nominal_speed
-        profiled = (modes.mode == POSITION) & ~points.braking
-        nominal[:] = np.where(profiled, self._share * self.limits.velocity, self.limits.velocity)
-        for limb in self._limbs.values():
-            if limb.speed_ratio != 1.0:
-                nominal[profiled & limb.joints] *= limb.speed_ratio
-        in_velocity = modes.mode == VELOCITY
-        if in_velocity.any():
-            nominal[in_velocity] = np.abs(modes.value[in_velocity])
-        points.speed[:] = nominal
-        for limb in self._limbs.values():
-            if limb.slowing != 1.0:
-                governed = limb.index[(modes.mode[limb.index] != RAW_POSITION) & ~points.braking[limb.index]]
-                points.speed[governed] *= limb.slowing
+        points, modes = self._points, self._modes
+        cruising_speeds(self._speeds.numbers, modes.mode, points.braking, modes.value, points.speed)

@@ -13,6 +13,9 @@ from enum import IntEnum
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
+from numba_cache import compiler
+
+_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 
 class Mode(IntEnum):
@@ -25,6 +28,17 @@ class Mode(IntEnum):
 
 
 _UNITS = {Mode.POSITION: "rad", Mode.VELOCITY: "rad/s", Mode.TORQUE: "Nm", Mode.RAW_POSITION: "rad"}
+
+
+@_compiled
+def _clamp(index, values, lower, upper):
+    """Bring values (k,) of joints `index` (k,) inside lower and upper (n,); returns whether one was outside."""
+    is_outside = False
+    for i, joint in enumerate(index):
+        inside = min(max(values[i], lower[joint]), upper[joint])
+        is_outside |= inside != values[i]
+        values[i] = inside
+    return is_outside
 
 
 @dataclass(frozen=True)
@@ -49,14 +63,12 @@ class JointLimits:
             object.__setattr__(self, field, value)
 
     def clamp(self, mode, index, values):
-        """`values` of the joints `index` brought inside what `mode` allows; same shape and unit."""
+        """Bring `values` of the joints `index` inside what `mode` allows; returns whether one was outside."""
         if mode is Mode.VELOCITY:
-            bound = self.velocity[index]
-            return np.minimum(np.maximum(values, -bound), bound)
+            return _clamp(index, values, -self.velocity, self.velocity)
         if mode is Mode.TORQUE:
-            bound = self.effort[index]
-            return np.minimum(np.maximum(values, -bound), bound)
-        return np.minimum(np.maximum(values, self.lower[index]), self.upper[index])
+            return _clamp(index, values, -self.effort, self.effort)
+        return _clamp(index, values, self.lower, self.upper)
 
 
 # A joint at its limit is measured slightly beyond it, and clients that start from the measured position send such
@@ -94,14 +106,13 @@ class CommandParser:
         """
         self._check(mode, names, values)
         mode, index = Mode(mode), self._last[1]
-        wanted = np.array(values, dtype=float)
-        values = self._limits.clamp(mode, index, wanted)
+        inside = np.array(values, dtype=float)
         clamped = ()
-        if (values != wanted).any():
-            outside = np.abs(values - wanted) > WORTH_TELLING
-            clamped = tuple("%s: %.5g became %.5g %s" % (names[i], wanted[i], values[i], _UNITS[mode])
+        if self._limits.clamp(mode, index, inside):
+            outside = np.abs(inside - values) > WORTH_TELLING
+            clamped = tuple("%s: %.5g became %.5g %s" % (names[i], values[i], inside[i], _UNITS[mode])
                             for i in np.flatnonzero(outside))
-        return JointCommand(mode, index, values, clamped)
+        return JointCommand(mode, index, inside, clamped)
 
     def _check(self, mode, names, values):
         """Raises CommandRefused; else `_last` holds the command's joints."""
@@ -124,9 +135,10 @@ class CommandParser:
             index = np.array([self._index[name] for name in names])
             index.setflags(write=False)
             self._last = names, index
-        for name, value in zip(names, values, strict=True):
-            if not math.isfinite(value):
-                raise self._refusal("the value for %s is %s, and it must be a finite number" % (name, value))
+        if not math.isfinite(sum(values)):  # the sum of finite values may overflow, too
+            for name, value in zip(names, values, strict=True):
+                if not math.isfinite(value):
+                    raise self._refusal("the value for %s is %s, and it must be a finite number" % (name, value))
 
     def _refusal(self, fault):
         return CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))

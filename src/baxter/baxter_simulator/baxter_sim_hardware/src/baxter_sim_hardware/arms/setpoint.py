@@ -6,6 +6,8 @@ import numpy as np
 
 from numba_cache import compiler
 
+from .joint_modes import POSITION, RAW_POSITION, VELOCITY
+
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 
@@ -127,6 +129,57 @@ def approach_rates(index, target, position, acceleration, speed, moves):
             ahead = target[joint] - position[joint]
             rates[i] = math.copysign(min(speed[joint], math.sqrt(2.0 * acceleration[joint] * abs(ahead))), ahead)
     return rates
+
+
+class Speeds:
+    """What the speeds of n set-points follow from, (n,) each, all views of the array `numbers`.
+
+    limit: of the joints [rad/s]; share, ratio: of it, in position mode, which a joint needs to move in step with
+    others, and which its limb may use; slowing: of its speed that collision avoidance leaves to its limb; nominal: its
+    speed if nothing slows the limb [rad/s].
+    """
+
+    def __init__(self, limit, ratio):
+        self.numbers = np.ones((5, len(limit)))
+        self.limit, self.share, self.ratio, self.slowing, self.nominal = self.numbers
+        self.limit[:], self.ratio[:] = limit, ratio
+
+
+@_compiled
+def shares_in_step(index, target, position, speeds, least):
+    """Make joints `index` (k,) of n arrive at target (k,) [rad] together: set their shares in `numbers` of `Speeds`, of
+    which none falls below `least`. position: (n,) [rad] where they are. Returns whether one has changed."""
+    limit, share = speeds[0], speeds[1]
+    longest = 0.0
+    for i, joint in enumerate(index):
+        longest = max(longest, abs(target[i] - position[joint]) / limit[joint])
+    changed = False
+    for i, joint in enumerate(index):
+        wanted = 1.0
+        if longest > 0.0:
+            wanted = max(abs(target[i] - position[joint]) / limit[joint] / longest, least)
+        changed |= share[joint] != wanted
+        share[joint] = wanted
+    return changed
+
+
+@_compiled
+def cruising_speeds(speeds, mode, braking, value, speed):
+    """Set the nominal speeds of `numbers` of `Speeds`, and speed (n,) [rad/s], at which each set-point cruises now.
+
+    mode: (n,) ints of `Mode`; braking: (n,) bool; value: (n,) [rad/s] commanded in velocity mode. Nothing slows a
+    set-point in raw position mode or one that brakes.
+    """
+    limit, share, ratio, slowing, nominal = speeds[0], speeds[1], speeds[2], speeds[3], speeds[4]
+    for i in range(len(limit)):
+        nominal[i] = limit[i]
+        if mode[i] == POSITION and not braking[i]:
+            nominal[i] = share[i] * limit[i] * ratio[i]
+        elif mode[i] == VELOCITY:
+            nominal[i] = abs(value[i])
+        speed[i] = nominal[i]
+        if mode[i] != RAW_POSITION and not braking[i]:
+            speed[i] *= slowing[i]
 
 
 def stopping_point(position, velocity, acceleration):

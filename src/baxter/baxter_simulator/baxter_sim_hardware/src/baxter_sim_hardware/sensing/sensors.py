@@ -71,6 +71,10 @@ class SonarRing:
         return [(sensor, distance) for sensor, distance in enumerate(distances)
                 if self.enabled >> sensor & 1 and SONAR_MIN_M <= distance <= SONAR_MAX_M]
 
+    def heard(self, distances):
+        """A bit for each sonar with an echo among (12,) distances."""
+        return sum(1 << sensor for sensor, _ in self.echoes(distances))
+
 
 def specific_force(before, after, gravity, rotation, dt):
     """(3,) [m/s^2] reading of an accelerometer, in its own axes.

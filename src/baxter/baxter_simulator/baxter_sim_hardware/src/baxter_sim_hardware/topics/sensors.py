@@ -18,6 +18,7 @@ from .row import STATE_RATE_HZ, Part, Topic
 
 SONAR_FRAME = "sonar_ring"
 SONAR_RATE_HZ = 10.0
+LIGHT_TURNS = 4  # in which all sonars have listened for the lights that pictures show
 _UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of an Imu's missing measurement
 
 
@@ -46,15 +47,24 @@ class SensorTopics(Part):
             pose, size, radius = band
             self._drawn = context.screen(SONAR_FRAME, pose, size, sonar_lights.PIXELS, glows=True, radius_m=radius)
         self._shown, self._drawing = (0, 0.0, 0.0), Schedule(SONAR_RATE_HZ)
+        self._heard, self._turn = np.full(sensors.SONAR_COUNT, np.inf), 0
 
     def reset(self):
         self._ring.reset()
+        self._heard[:] = np.inf
 
     def update(self, time_s):
-        """Show the ring's lights as they are at time_s [s]."""
+        """Show the ring's lights as they are at time_s [s]. The sonars listen in turns: to ask all of them each time
+        takes as long as eight physics steps, and mostly nobody takes a picture."""
         if self._drawn is None or not self._drawing.due(time_s):
             return
-        lit = (self._lit(time_s), self._ring.levels["red"], self._ring.levels["green"])
+        mask = self._ring.overridden(time_s)
+        if mask is None:
+            listening = slice(self._turn, None, LIGHT_TURNS)
+            self._turn = (self._turn + 1) % LIGHT_TURNS
+            self._heard[listening] = self._distances(listening)
+            mask = self._ring.heard(self._heard)
+        lit = (mask, self._ring.levels["red"], self._ring.levels["green"])
         if lit != self._shown:
             self._shown = lit
             self._drawn.show(sonar_lights.picture(*lit))
@@ -105,15 +115,16 @@ class SensorTopics(Part):
 
     # -- head
 
-    def _distances(self):
-        """(12,) [m] distance of each sonar's echo; inf for none."""
+    def _distances(self, listening=slice(None)):
+        """(k,) [m] distance of the echo of each sonar of a slice of the twelve; inf for none."""
+        directions = self._directions[listening]
         if SONAR_FRAME not in self._links:
-            return np.full(sensors.SONAR_COUNT, np.inf)
+            return np.full(len(directions), np.inf)
         matrix = self._model.link_pose(SONAR_FRAME).matrix()
-        rays = (self._directions @ matrix[:3, :3].T).reshape(-1, 3)
+        rays = (directions @ matrix[:3, :3].T).reshape(-1, 3)
         near = matrix[:3, 3] + sensors.SONAR_MIN_M * rays
         span = sensors.SONAR_MAX_M - sensors.SONAR_MIN_M
-        fractions = self._world.ray_test_batch(near, near + span * rays).reshape(self._directions.shape[:2]).min(axis=1)
+        fractions = self._world.ray_test_batch(near, near + span * rays).reshape(directions.shape[:2]).min(axis=1)
         return np.where(fractions < 1.0, sensors.SONAR_MIN_M + span * fractions, np.inf)
 
     def _sonar(self, time_s, component, snapshot):
@@ -129,9 +140,7 @@ class SensorTopics(Part):
     def _lit(self, time_s):
         """A bit for each light that is on."""
         mask = self._ring.overridden(time_s)
-        if mask is None:
-            mask = sum(1 << sensor for sensor, _ in self._ring.echoes(self._distances()))
-        return mask
+        return self._ring.heard(self._distances()) if mask is None else mask
 
     def _lights(self, time_s, component, snapshot):
         return UInt16(self._lit(time_s))
