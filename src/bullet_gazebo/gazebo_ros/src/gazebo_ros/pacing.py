@@ -143,7 +143,7 @@ def slowness_line(wanted, factor, mean, ago_s):
     """The log line about a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
     if mean is None:
         return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "
-                "(gui:=false), or publish /clock less often (clock_rate:=250). Said again every five minutes at most."
+                "(gui:=false), or publish /clock less often (clock_rate:=100). Said again every five minutes at most."
                 % (factor, wanted))
     return ("the simulation runs at %.2f of real time instead of %g; %.2f on average in the %.0f minutes since the "
             "last such line" % (factor, wanted, mean, ago_s / 60.0))

@@ -20,7 +20,7 @@ _CLOCK_BYTES = 8
 MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s].
-MOST_AT_ONCE_S = 0.004
+MOST_AT_ONCE_S = 0.010
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
@@ -84,7 +84,8 @@ class Publications:
         paused = simulation.paused
         in_real_time = simulation.real_time_factor == 1.0 and not paused
         clock_may_go = in_real_time or now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE
-        if clock_may_go or paused:
+        # The last of several ticks at once is enough: nothing else runs in between.
+        if paused or (clock_may_go and tick % simulation.ticks_at_once == 0):
             self._set_rospy_time()
         if clock_may_go and (tick % self._clock_divisor == 0 or paused):
             self._clock_sent_at = now
