@@ -19,7 +19,7 @@ from bullet_sim.room import spare_folder, try_room
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
-from world_picture.results import cache_folder
+from world_picture.results import cache_folder, existing
 from world_picture.textures import Texture, save_reduced, write_texture
 
 #: Where one level must do: the coarsest whose distance from the original is at most this share of the mesh's size.
@@ -114,8 +114,8 @@ class DrawingCache:
             raise DrawingError("%s %s cannot be read: %s" % (what, path, error.strerror)) from error
         key = "%s-%d%s" % (_digest(path, content), _VERSION, kind)
         del content
-        index = self._folder / key / name
-        if not index.exists():
+        index = existing(self._folder, Path(key) / name)
+        if index is None:
             try:
                 index = self._make(key, name, write, str(path), *arguments)
             except LimitError as error:

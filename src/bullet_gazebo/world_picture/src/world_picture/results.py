@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+#: This variable names a folder as :func:`cache_folder` has them, which is only read: results of another user.
+READY = "BULLET_GAZEBO_READY"
 #: Most results that are kept. Models of ever other sizes, as for data sets, would fill the disk.
 MOST_KEPT = 5000
 
@@ -16,6 +18,16 @@ def cache_folder(name):
     """The path of a folder below ``$XDG_CACHE_HOME/bullet_gazebo``, by default ``~/.cache/bullet_gazebo``."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     return Path(base) / "bullet_gazebo" / name
+
+
+def existing(folder, name):
+    """The path ``name`` in a cache's ``folder``, or else in the one of the same name that :data:`READY` names, if it is
+    there; None if it is in neither."""
+    ready = os.environ.get(READY)
+    for place in (folder, *([Path(ready) / folder.name] if ready else ())):
+        if (place / name).exists():
+            return place / name
+    return None
 
 
 class ResultCache:
@@ -31,23 +43,25 @@ class ResultCache:
         """The array that ``calculate()`` returns, from the disk if it is there. ``calculation``: a name, with a number
         to be increased when the result for the same inputs changes; ``inputs``: arrays and numbers, on which alone it
         depends."""
-        path = self._folder / ("%s-%s.npy" % (calculation, _digest(inputs)))
+        name = "%s-%s.npy" % (calculation, _digest(inputs))
+        path = existing(self._folder, name) or self._folder / name
         # Missing, cut short, or of something else: it is calculated again.
         with contextlib.suppress(OSError, ValueError, EOFError):
-            found = np.load(path, allow_pickle=False)
-            os.utime(path)
-            return found
-        found = calculate()
+            result = np.load(path, allow_pickle=False)
+            with contextlib.suppress(OSError):  # it is only read here
+                os.utime(path)
+            return result
+        result = calculate()
         with contextlib.suppress(OSError):
-            self._write(path, found)
-        return found
+            self._write(self._folder / name, result)
+        return result
 
-    def _write(self, path, found):
+    def _write(self, path, result):
         self._folder.mkdir(parents=True, exist_ok=True)
         number, draft = tempfile.mkstemp(dir=self._folder, prefix=".draft")
         try:
             with os.fdopen(number, "wb") as file:
-                np.save(file, found, allow_pickle=False)
+                np.save(file, result, allow_pickle=False)
             os.replace(draft, path)
         except BaseException:
             os.unlink(draft)

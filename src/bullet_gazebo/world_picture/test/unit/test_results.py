@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from world_picture.results import ResultCache
+from world_picture.results import READY, ResultCache
 
 
 class Counted:
@@ -27,6 +27,17 @@ def test_a_result_is_calculated_once(tmp_path, calculate):
         found = ResultCache(tmp_path / "a" / "b").array("sum-1", (np.eye(3), 2.0), calculate)
         assert found.dtype == bool and found.tolist() == [True, False, True]
     assert calculate.calls == 1
+
+
+def test_what_is_ready_already_is_used_and_stays_as_it_is(tmp_path, calculate, monkeypatch):
+    ready, own = tmp_path / "ready" / "results", tmp_path / "own" / "results"
+    ResultCache(ready).array("sum-1", (1,), calculate)
+    before = set(ready.iterdir())
+    monkeypatch.setenv(READY, str(ready.parent))
+    assert ResultCache(own).array("sum-1", (1,), calculate).tolist() == [True, False, True] and calculate.calls == 1
+    assert not own.exists()
+    ResultCache(own).array("sum-1", (2,), calculate)
+    assert calculate.calls == 2 and len(list(own.iterdir())) == 1 and set(ready.iterdir()) == before
 
 
 @pytest.mark.parametrize(("name", "inputs"), [
