@@ -12,6 +12,7 @@ from lab_class import command, front_door, launching
 from lab_class.labs import ClassError, Labs, State
 from lab_class.roster import Student
 from lab_class.store import ClassRecord, Options, Store, Tokens
+from world_picture.results import READY
 
 PAGE = Path(__file__).resolve().parents[2] / "page"
 ADDRESS = "https://labs.example/a.b/robots"
@@ -80,6 +81,17 @@ def test_a_lab_knows_the_whole_path(tmp_path):
     place = launching.Place(tmp_path / "anna", tmp_path, tmp_path / "libraries", False)
     found, _, _ = launching.prepared(place, Options(address=ADDRESS), Tokens("a", "b"), 3, ([], ()))
     assert found[found.index("--below") + 1] == PREFIX + "/anna"
+
+
+def test_a_lab_sees_what_set_up_has_made_ready_for_pictures(tmp_path, monkeypatch):
+    place = launching.Place(tmp_path / "anna", tmp_path, tmp_path / "libraries", True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert READY not in launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))[1]
+    ready = tmp_path / "cache" / "bullet_gazebo"
+    ready.mkdir(parents=True)
+    (place.folder / "caches").rename(tmp_path / "former caches")
+    found, environment, _ = launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))
+    assert found[found.index(str(ready)) - 1:][:3] == ["--ro-bind", str(ready), environment[READY]]
 
 
 def test_a_launch_file_that_no_lab_sees_is_refused(tmp_path, monkeypatch):
