@@ -67,7 +67,7 @@ _LARGEST_PORT = 65535
 #: while nobody needs them.
 _POSES_S, _LOOK_S, _LOOK_UNSEEN_S = 0.05, 1.0, 5.0
 # Between reads of the robot's topics without a page, and of the clock without any client [s].
-_REST_S, _REST_OF_CLOCK_S = 0.05, 0.1
+_REST_S, _REST_OF_CLOCK_S = 0.25, 0.25
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 # How long the comparison with a physical robot waits for the messages of some topics [s].

@@ -11,7 +11,7 @@ import rospy
 # How long topics are still read when nobody needs them any more: a page that is loaded again finds all as it was [s].
 LINGER_S = 10.0
 # Between two looks at who needs them [s].
-_LOOK_S = 0.05
+_LOOK_S = 0.1
 # A message that waited for its thread comes in less time than this after the one before it [s].
 _AT_ONCE_S = 0.001
 
