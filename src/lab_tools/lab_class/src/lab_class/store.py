@@ -31,7 +31,7 @@ class StoreError(Exception):
 
 @dataclass(frozen=True)
 class Options:
-    """How a class runs. ``launch``: the words after roslaunch, by default with a fifth of the messages of a lab's clock;
+    """How a class runs. ``launch``: the words after roslaunch, by default with 100 messages of the clock a second;
     ``idle_s``: None means never; ``keep_running``: labs do not wait for their first visitor paused; ``memory_bytes``,
     ``disk_bytes``: of each lab; ``at_once``: labs that start at a time; ``address``: of a server in front of the
     front door, without a slash at the end, or "".
