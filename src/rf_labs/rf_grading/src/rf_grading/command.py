@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 from lab_batch import JobError, Spec
+from lab_batch.keeping import default_memory_bytes
 from lab_batch.processes import Limits, map_seeds
 from lab_environment import isolation
 from lab_environment.work_folder import work_folder
@@ -157,7 +158,8 @@ class _Grading:
                            "trusted": options.trusted, "hidden": [str(self._folder), str(self._out)]})
         processors = len(os.sched_getaffinity(0))
         workers = min(options.workers or workers_for(processors, _free_bytes()), len(todo))
-        limits = Limits(workers, options.wall_limit + _GRACE_S, _CHECKS_OF_A_WORKER)
+        memory = max(MEMORY_BYTES + LAB_BYTES, default_memory_bytes(workers))
+        limits = Limits(workers, options.wall_limit + _GRACE_S, _CHECKS_OF_A_WORKER, memory)
         with contextlib.closing(map_seeds(spec, range(len(todo)), limits)) as outcomes:
             for count, outcome in enumerate(outcomes, 1):
                 task = todo[outcome.seed]

@@ -212,6 +212,14 @@ def test_a_class_around_the_workspace_is_refused(judge, class_folder, monkeypatc
     assert "is hidden from the judged programs" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("share", "limit"), [(9 << 30, 9 << 30), (1 << 30, 3 << 30)])
+def test_a_judge_with_its_lab_has_its_share_of_the_memory_and_room_for_a_program(
+        judge, class_folder, monkeypatch, share, limit):
+    monkeypatch.setattr(command, "default_memory_bytes", lambda workers: share)
+    command.main(["class", "lab2"])
+    assert judge.limits.memory_bytes == limit
+
+
 def test_workers_are_limited_by_processors_and_memory():
     assert command.workers_for(2, 64 << 30) == 2
     assert command.workers_for(16, 7 << 30) == 2
