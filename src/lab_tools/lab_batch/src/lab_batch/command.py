@@ -5,6 +5,7 @@ import ast
 import os
 import shlex
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from .shipped import JOBS
 ROOT = Path(os.environ.get("LAB_ROOT", Path.cwd()))
 # Between two lines of progress: on a terminal, where each replaces the last one, and in a file.
 PROGRESS_S, LINE_S = 0.5, 30.0
+# No end of an episode for so long is told [s], where it is also so many times the longest until then.
+SILENT_S, SILENT_FACTOR = 60.0, 5.0
 BAR_WIDTH = 30
 LEAST_GB = 0.1
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
@@ -132,12 +135,14 @@ class Progress:
     def __init__(self, total, stream=None, clock=time.monotonic):
         self._stream, self._clock = sys.stderr if stream is None else stream, clock
         self._total, self._count, self._failed = total, 0, 0
-        self._began = self._shown = clock()
+        self._began = self._shown = self._ended = clock()  # of the last episode
+        self._longest, self._silent_s = 0.0, SILENT_S
 
     def step(self, outcome):
         self._count += 1
         self._failed += not outcome.is_done
         now = self._clock()
+        self._longest, self._ended = max(self._longest, now - self._ended), now
         terminal, is_last = self._stream.isatty(), self._count == self._total
         if terminal and (is_last or now - self._shown >= PROGRESS_S):
             self._write("\r\x1b[K%s %s" % (self._bar(), self._text(now)))
@@ -146,6 +151,18 @@ class Progress:
         else:
             return
         self._shown = now
+
+    def silence(self):
+        """A line to show where no episode has ended for much longer than before, else "". Each line of one silence
+        comes after twice the time of the last. Any thread may call it."""
+        silent = self._clock() - self._ended
+        if silent < SILENT_S:
+            self._silent_s = SILENT_S
+        if silent < max(self._silent_s, SILENT_FACTOR * self._longest):
+            return ""
+        self._silent_s = 2.0 * silent
+        return ("batch: no episode has ended for %s. If one hangs, --time-limit SECONDS gives it up: Ctrl-C, then the "
+                "same command with it, which goes on from here" % duration(silent))
 
     def _bar(self):
         full = BAR_WIDTH * self._count // self._total
@@ -221,11 +238,21 @@ def _run_left(options, spec, left, records):
     limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle,
                               memory_bytes_of(options))
     extra = {"address": options.address} if options.engine == "ray" else {}
+    done = threading.Event()
+    if options.time_limit is None:
+        threading.Thread(target=_tell_silence, args=(progress, done), daemon=True).start()
     try:
         for outcome in ENGINES[options.engine](spec, left, limits, **extra):
             progress.step(records.add(outcome))
     finally:
+        done.set()
         progress.end()
+
+
+def _tell_silence(progress, done):
+    while not done.wait(1.0):
+        if line := progress.silence():
+            print("\n" + line if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
 
 
 def report(options, outcomes, path, count, seconds):

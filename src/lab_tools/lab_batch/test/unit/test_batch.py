@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -329,6 +330,40 @@ def test_a_file_gets_a_line_of_progress_now_and_then():
     lines = progress_of(io.StringIO(), 20.0).splitlines()
     assert lines == ["2/4, 1 failed, 0.05/s, 00:40 left", "4/4, 1 failed, 0.05/s, 00:00 left"]
     assert not progress_of(io.StringIO(), 1.0)
+
+
+def test_a_long_silence_is_told_in_ever_longer_periods():
+    now = [0.0]
+    progress = command.Progress(3, io.StringIO(), lambda: now[0])
+
+    def told(until_s):
+        lines = []
+        while now[0] < until_s:
+            now[0] += 1.0
+            lines += [(now[0], line) for line in [progress.silence()] if line]
+        return lines
+
+    (first, line), (second, _) = told(150.0)
+    assert (first, second) == (60.0, 120.0)
+    assert line.startswith("batch: no episode has ended for 01:00. If one hangs, --time-limit SECONDS gives it up")
+    progress.step(Outcome(0, {}, ""))
+    assert [at for at, _ in told(1200.0)] == [900.0], "the first one took 150 s"
+
+
+def test_a_batch_tells_a_silence_unless_it_has_a_time_limit(tmp_path, monkeypatch, capsys):
+    def slow(spec, seeds, limits):
+        if limits.episode_s is None:
+            wait_until(lambda: "--time-limit" in capsys.readouterr().err, "the line", 30.0)
+        for seed in seeds:
+            yield Outcome(seed, {"drawn": 1.0}, "")
+
+    monkeypatch.setattr(command, "SILENT_S", 0.1)
+    monkeypatch.setitem(command.ENGINES, "processes", slow)
+    out = ["--out", str(tmp_path / "results.jsonl")]
+    before = threading.active_count()
+    assert command.main([TROUBLE, "--seeds", "0:2", *out]) == 0
+    assert command.main([TROUBLE, "--seeds", "2:4", "--time-limit", "5", *out]) == 0
+    wait_until(lambda: threading.active_count() == before, "the end of the thread")
 
 
 def test_durations_have_hours_where_needed():
