@@ -54,7 +54,7 @@ def prepared(place, options, tokens, listener, refused):
     environment.pop("ROS_IP", None)
     if not place.walls:
         environment.update({name: os.environ[name] for name in ("USER", "LOGNAME", "TMPDIR") if name in os.environ},
-                           XDG_CACHE_HOME=str(place.libraries.parent))
+                           XDG_CACHE_HOME=str(place.libraries.parent), **{READY: str(cache_folder(""))})
         environment.pop("XDG_RUNTIME_DIR", None)
         return [*limits, *command], environment, (listener,)
     environment[isolation.WALLED] = "1"
@@ -70,7 +70,7 @@ def prepared(place, options, tokens, listener, refused):
 def _ready(environment):
     """What set-up has made ready for pictures, as binds; without it each lab simplifies the robot's meshes when it
     starts, which takes ten seconds of a processor. Notes in the lab's environment where it is."""
-    folder = cache_folder("drawings").parent
+    folder = cache_folder("")
     if not folder.is_dir():
         return []
     environment[READY] = environment["HOME"] + "/.cache/bullet_gazebo_ready"

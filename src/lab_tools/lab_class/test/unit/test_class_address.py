@@ -92,6 +92,8 @@ def test_a_lab_sees_what_set_up_has_made_ready_for_pictures(tmp_path, monkeypatc
     (place.folder / "caches").rename(tmp_path / "former caches")
     found, environment, _ = launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))
     assert found[found.index(str(ready)) - 1:][:3] == ["--ro-bind", str(ready), environment[READY]]
+    place = launching.Place(tmp_path / "bo", tmp_path, tmp_path / "libraries", False)
+    assert launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))[1][READY] == str(ready)
 
 
 def test_a_launch_file_that_no_lab_sees_is_refused(tmp_path, monkeypatch):
