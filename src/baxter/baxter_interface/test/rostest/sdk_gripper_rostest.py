@@ -36,9 +36,12 @@ class Commands:
 
     def __init__(self):
         self.messages = []
-        self._subscriber = rospy.Subscriber(
-            "/robot/end_effector/left_gripper/command", EndEffectorCommand, self.messages.append)
-        wait_for(lambda: self._subscriber.get_num_connections(), DEADLINE_S)
+        topic = "/robot/end_effector/left_gripper/command"
+        self._subscriber = rospy.Subscriber(topic, EndEffectorCommand, self.messages.append)
+        # A node has one publisher for a topic, and it knows of a connection a moment after the subscriber does.
+        self._publisher = rospy.Publisher(topic, EndEffectorCommand, queue_size=1)
+        nothing = EndEffectorCommand(command=EndEffectorCommand.CMD_NO_OP)
+        wait_for(lambda: self.messages, DEADLINE_S, body=lambda: self._publisher.publish(nothing))
 
     def wait_for_last(self, command):
         wait_for(lambda: any(message.command == command for message in self.messages), DEADLINE_S,
@@ -47,6 +50,7 @@ class Commands:
 
     def close(self):
         self._subscriber.unregister()
+        self._publisher.unregister()
 
 
 class ElectricTest(unittest.TestCase):
