@@ -84,7 +84,7 @@ class Publications:
         paused = simulation.paused
         in_real_time = simulation.real_time_factor == 1.0 and not paused
         clock_may_go = in_real_time or now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE
-        # The last of several ticks at once is enough: nothing else runs in between.
+        # The last of several ticks at once is enough: requests and messages are not handled in between.
         if paused or (clock_may_go and tick % simulation.ticks_at_once == 0):
             self._set_rospy_time()
         if clock_may_go and (tick % self._clock_divisor == 0 or paused):

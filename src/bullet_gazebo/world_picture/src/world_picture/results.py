@@ -25,7 +25,7 @@ def existing(folder, name):
     there; None if it is in neither."""
     ready = os.environ.get(READY)
     for place in (folder, *([Path(ready) / folder.name] if ready else ())):
-        if (place / name).exists():
+        if os.path.exists(place / name):  # unlike Path.exists, False for a folder that may not be read
             return place / name
     return None
 
