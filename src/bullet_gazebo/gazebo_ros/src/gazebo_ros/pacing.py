@@ -10,6 +10,9 @@ MAX_DEBT_S = 0.2
 MAX_CATCH_UP = 2.0
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
+# A world that is later than this [s] for so long [s, wall time], and gets no better, makes its turns longer; one that
+# is on time for so long [s, wall time] tries shorter ones again.
+LATE_S, LONGER_AFTER_S, SHORTER_AFTER_S = 0.05, 0.3, 30.0
 # prctl(2): how late Linux may wake a sleeping thread, to wake several at once. Its default is 0.05 ms.
 _PR_SET_TIMERSLACK = 29
 _LEAST_SLACK_NS = 1
@@ -52,11 +55,13 @@ class Pacer:
         self._period = step_s / real_time_factor if real_time_factor else 0.0
         self._clock = clock
         self._sleep = sleep
+        self.lag = Lag()
         self.restart()
 
     def restart(self):
         """Forget the delay: time counts from now on. For the start and after a pause."""
         self._due = self._last = self._clock()
+        self.lag.restart(self._last)
 
     @property
     def is_paced(self):
@@ -74,11 +79,45 @@ class Pacer:
         self._due += ticks * self._period
         if now - self._due > MAX_DEBT_S:
             self._due = now - MAX_DEBT_S
+        self.lag.update(now - self._due, now)
         wake = max(self._due, self._last + ticks * self._period / MAX_CATCH_UP)
         if wake > now:
             self._sleep(wake - now)
             now = self._clock()
         self._last = now
+
+
+class Lag:
+    """For how long a world has been late, as a level from 0 on: how much longer its turns should be.
+
+    Every turn of the loop costs something by itself: it wakes up, reads sockets, sends the time.
+    """
+
+    def __init__(self, most=2):
+        """``most``: the highest level."""
+        self.level = 0
+        self._most = most
+        self.restart(0.0)
+
+    def restart(self, now):
+        """After a pause; ``now`` [s, wall time]."""
+        # Since when it is late, and how late it was then, or at the end of the last LONGER_AFTER_S.
+        self._late_since, self._late_s, self._changed_at = None, 0.0, now
+
+    def update(self, late_s, now):
+        """At the end of a turn that should have ended ``late_s`` ago [s]; ``now`` [s, wall time]."""
+        if late_s <= LATE_S:
+            self._late_since = None
+            if self.level and now - self._changed_at >= SHORTER_AFTER_S:
+                self.level, self._changed_at = self.level - 1, now
+            return
+        self._changed_at = now
+        if self._late_since is None:
+            self._late_since, self._late_s = now, late_s
+        elif now - self._late_since >= LONGER_AFTER_S:
+            if late_s >= self._late_s:
+                self.level = min(self.level + 1, self._most)
+            self._late_since, self._late_s = now, late_s
 
 
 class RateMeter:
@@ -143,7 +182,7 @@ def slowness_line(wanted, factor, mean, ago_s):
     """The log line about a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
     if mean is None:
         return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "
-                "(gui:=false), or publish /clock less often (clock_rate:=100). Said again every five minutes at most."
+                "(gui:=false) and other programs. Said again every five minutes at most."
                 % (factor, wanted))
     return ("the simulation runs at %.2f of real time instead of %g; %.2f on average in the %.0f minutes since the "
             "last such line" % (factor, wanted, mean, ago_s / 60.0))

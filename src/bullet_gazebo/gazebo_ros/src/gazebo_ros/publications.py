@@ -21,6 +21,9 @@ MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s].
 MOST_AT_ONCE_S = 0.010
+# In a world that is late it is these times, one after the other [s], and the clock has a message for each. A program
+# with rospy.Rate(100) keeps its mean rate up to the last one.
+LATE_TURNS_S = (0.010, 0.020)
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
@@ -62,7 +65,9 @@ class Publications:
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
         # Who gets the time less often than each tick sees no difference; commands wait a little longer.
-        self._simulation.ticks_at_once = max(1, min(self._clock_divisor, int(MOST_AT_ONCE_S * tick_rate + 1e-6)))
+        normal = max(1, min(self._clock_divisor, int(MOST_AT_ONCE_S * tick_rate + 1e-6)))
+        late = (int(time_s * tick_rate + 1e-6) for time_s in LATE_TURNS_S)
+        self._simulation.turn_lengths = (normal, *(ticks for ticks in late if ticks > normal))
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._contacts_divisor = ticks_between(CONTACTS_RATE, tick_rate)
 
@@ -87,7 +92,7 @@ class Publications:
         # The last of several ticks at once is enough: requests and messages are not handled in between.
         if paused or (clock_may_go and tick % simulation.ticks_at_once == 0):
             self._set_rospy_time()
-        if clock_may_go and (tick % self._clock_divisor == 0 or paused):
+        if clock_may_go and (tick % max(self._clock_divisor, simulation.ticks_at_once) == 0 or paused):
             self._clock_sent_at = now
             self.publish_clock()
         if tick % self._states_divisor == 0:

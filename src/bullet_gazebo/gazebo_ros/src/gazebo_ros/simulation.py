@@ -63,9 +63,9 @@ class Simulation:
         self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
         #: Called after the length of a tick has changed.
         self.on_step_change = lambda: None
-        #: In a paced world, the ticks up to a multiple of this follow each other at once: fewer wake-ups, which make a
-        #: tick take longer.
-        self.ticks_at_once = 1
+        #: In a paced world, the ticks up to a multiple of the first number follow each other at once: fewer wake-ups,
+        #: which make a tick take longer. The next ones are for a world that is late; ascending.
+        self.turn_lengths = (1,)
         self.world = world
         self.requests = requests
         self.paused = paused
@@ -124,6 +124,11 @@ class Simulation:
     @real_time_factor.setter
     def real_time_factor(self, factor):
         self._pacer = Pacer(self._step_s, factor)
+
+    @property
+    def ticks_at_once(self):
+        """The one of ``turn_lengths`` that is in force."""
+        return self.turn_lengths[min(self._pacer.lag.level, len(self.turn_lengths) - 1)]
 
     @property
     def is_stepping(self):

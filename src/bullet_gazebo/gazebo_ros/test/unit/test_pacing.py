@@ -6,9 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from gazebo_ros.pacing import (
+    LATE_S,
+    LONGER_AFTER_S,
     MAX_CATCH_UP,
     MAX_DEBT_S,
+    SHORTER_AFTER_S,
     YIELD_PERIOD_S,
+    Lag,
     Pacer,
     RateMeter,
     SlownessWatch,
@@ -112,6 +116,55 @@ def test_as_fast_as_possible_lets_others_run_now_and_then(clock):
         clock.now += 0.26 * YIELD_PERIOD_S
         pacer.wait()
     assert slept == [0] * 25
+
+
+def test_who_is_late_for_long_and_gets_no_better_is_told_until_it_was_on_time_for_long():
+    lag, now = Lag(most=2), 100.0
+
+    def level_after(seconds, late_s, shrinking_s=0.0):
+        nonlocal now
+        for _ in range(round(100 * seconds)):
+            now += 0.01
+            late_s -= shrinking_s
+            lag.update(late_s, now)
+        return lag.level
+
+    late, soon, later = 2.0 * LATE_S, 0.9 * LONGER_AFTER_S, 1.2 * LONGER_AFTER_S
+    assert level_after(60.0, LATE_S) == 0
+    assert level_after(soon, late) == 0
+    assert level_after(0.01, LATE_S) == 0
+    assert level_after(soon, late) == 0
+    assert level_after(0.01, LATE_S) == 0
+    assert level_after(5.0, 100.0, 0.01) == 0, "it is late and catches up"
+    assert level_after(0.01, LATE_S) == 0
+    assert level_after(later, late) == 1
+    assert level_after(60.0, late) == 2
+    assert level_after(0.9 * SHORTER_AFTER_S, 0.0) == 2
+    assert level_after(0.2 * SHORTER_AFTER_S, 0.0) == 1
+    assert level_after(SHORTER_AFTER_S, 0.0) == 0
+    assert level_after(60.0, 0.0) == 0
+
+
+def test_one_stall_does_not_make_a_world_late(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    clock.now += 10.0
+    for _ in range(1000):
+        clock.now += 0.0005
+        pacer.wait()
+        assert pacer.lag.level == 0
+
+
+def test_a_world_whose_turns_cost_too_much_keeps_its_time_by_longer_ones(clock):
+    pacer, lengths, ticks = Pacer(0.002, clock=clock, sleep=clock.sleep), (1, 5, 10), 0
+    seen = set()
+    while clock.now < 280.0:
+        count = lengths[pacer.lag.level]
+        clock.now += 0.003 + 0.001 * count
+        pacer.wait(count)
+        ticks += count
+        seen.add(pacer.lag.level)
+    # It tries the shortest ones six times, and catches up.
+    assert seen == {0, 1} and 0.002 * ticks > 0.998 * 180.0
 
 
 @pytest.mark.parametrize("step, factor", [(0.0, 1.0), (-1.0, 1.0), (float("nan"), 1.0), (0.002, -1.0),

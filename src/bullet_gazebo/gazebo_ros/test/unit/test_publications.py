@@ -18,7 +18,7 @@ class World:
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
         monkeypatch.setattr(publications.time, "perf_counter", lambda: self.wall_s)
         self.simulation = SimpleNamespace(step_s=STEP_S, tick=0, time_ns=0, time_s=0.0, paused=paused, is_stepping=True,
-                                          real_time_factor=asked,
+                                          real_time_factor=asked, ticks_at_once=1,
                                           world=SimpleNamespace(models={}, contacts=lambda: [TOUCH, TOUCH]))
         self.contacts = SimpleNamespace(has_listeners=False, publish=lambda message: self.messages.append(message))
         self.messages, self.pauses = [], []
@@ -47,13 +47,22 @@ class World:
 
 
 @pytest.mark.parametrize(("clock_rate", "step_s", "ticks"), [
-    (500.0, 0.002, 1), (250.0, 0.002, 2), (100.0, 0.002, 5), (50.0, 0.002, 5), (250.0, 0.001, 4), (1000.0, 0.001, 1),
-    (50.0, 0.01, 1)])
+    (500.0, 0.002, (1, 5, 10)), (250.0, 0.002, (2, 5, 10)), (100.0, 0.002, (5, 10)), (50.0, 0.002, (5, 10)),
+    (250.0, 0.001, (4, 10, 20)), (1000.0, 0.001, (1, 10, 20)), (50.0, 0.01, (1, 2)), (20.0, 0.05, (1,))])
 def test_ticks_follow_each_other_at_once_where_the_clock_has_fewer_messages(monkeypatch, clock_rate, step_s, ticks):
     world = World(monkeypatch, factor=1.0, clock_rate=clock_rate)
     world.simulation.step_s = step_s
     world.publications.step_changed()
-    assert world.simulation.ticks_at_once == ticks
+    assert world.simulation.turn_lengths == ticks
+
+
+@pytest.mark.parametrize(("clock_rate", "ticks_at_once", "clocks"), [
+    (500.0, 1, 1000), (500.0, 5, 200), (500.0, 10, 100), (100.0, 5, 200), (100.0, 10, 100), (10.0, 10, 20)])
+def test_a_late_world_tells_its_time_at_the_end_of_each_turn(monkeypatch, clock_rate, ticks_at_once, clocks):
+    world = World(monkeypatch, factor=1.0, asked=1.0, clock_rate=clock_rate)
+    world.simulation.ticks_at_once = ticks_at_once
+    world.run(2.0)
+    assert world.clocks == clocks
 
 
 def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):

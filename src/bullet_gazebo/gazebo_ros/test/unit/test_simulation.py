@@ -132,7 +132,7 @@ def test_a_tick_is_update_step_publish_at_the_right_times(simulation):
 
 
 def test_ticks_up_to_a_multiple_follow_each_other_at_once_in_a_paced_world_alone(simulation):
-    simulation.paused, simulation.ticks_at_once = False, 4
+    simulation.paused, simulation.turn_lengths = False, (4,)
     simulation.do_tick()
     assert [simulation._some_ticks() for _ in range(3)] == [3, 4, 4] and simulation.tick == 12
 
@@ -144,6 +144,18 @@ def test_ticks_up_to_a_multiple_follow_each_other_at_once_in_a_paced_world_alone
     simulation.paused, simulation.on_tick = False, lambda: None
     simulation.real_time_factor = 0.0
     assert simulation._some_ticks() == 1
+
+
+def test_a_late_world_has_longer_turns_and_the_last_length_is_for_all_that_are_later(simulation):
+    simulation.paused, simulation.turn_lengths = False, (1, 5)
+    lengths = []
+    for level in range(3):
+        simulation._pacer.lag.level = level
+        lengths.append(simulation.ticks_at_once)
+    assert lengths == [1, 5, 5]
+    assert [simulation._some_ticks() for _ in range(2)] == [5, 5]
+    simulation.real_time_factor = 1.0
+    assert simulation.ticks_at_once == 1
 
 
 def test_time_is_exact_after_days(simulation):

@@ -18,11 +18,12 @@ def main():
     rospy.init_node("both_arms", disable_rostime=True)
     publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1)
                   for side in SIDES}
+    neutral = {side: list(poses().angles("neutral", side).values()) for side in SIDES}
     rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1).publish(True)
     for _ in beats(RATE_HZ, rospy.is_shutdown):
         offset = SWING_RAD * math.sin(SWING_RAD_S * time.monotonic())
         for side, publisher in publishers.items():
-            angles = [angle + offset for angle in poses().angles("neutral", side).values()]
+            angles = [angle + offset for angle in neutral[side]]
             publisher.publish(JointCommand(JointCommand.POSITION_MODE, angles, list(joint_names(side))))
 
 
