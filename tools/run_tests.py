@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests.
+"""`./baxter.sh test`: lint, unit tests, most of them under a comma-decimal locale, rostests.
 
 At the end it prints the tests that did not run, with reasons, those that failed, and one line of counts.
 
@@ -50,6 +50,9 @@ BUSY_PERCENT = 40.0
 # The limits are for a machine with two cores.
 WHOLE_MACHINE_PERCENT = 200.0
 EXIT_SKIPPED = 77
+# Factor of all time limits. They are written for an idle machine with two fast cores; others may be half as fast, or
+# have neighbours. Only a test that hangs takes longer by it.
+STRETCH = 2.0
 # Rostests that run at a time beside another one on a whole machine. They mostly wait, and do not fill a core each.
 BESIDE = 2
 
@@ -134,8 +137,11 @@ def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
     if selection.unit_targets:
         # A test that is named runs even if it is long; the user's own -m comes later and takes precedence.
         is_single = any("::" in target for target in selection.unit_targets)
-        # The run under the second locale has the tests marked as tree, so that both runs take the same time.
-        elsewhere = ["--in-the-other-run=tree"] if selection.is_whole_suite else []
+        elsewhere = []
+        if selection.is_whole_suite:
+            # With --long most tests run twice. Otherwise those that the second locale's run has run there alone: what
+            # passes there passes under the usual locale, too.
+            elsewhere = ["--in-the-other-run=tree" if long else "--in-this-run=once,build"]
         runs = {"unit tests": UnitRun("unit", selection.unit_targets, elsewhere + selection.pytest_arguments,
                                       leaves_out_long=not (long or is_single))}
         ending.callback(runs["unit tests"].kill)
@@ -170,11 +176,11 @@ class Beside:
     would run alone.
     """
 
-    def __init__(self, tests, stretch: float = 1.0):
+    def __init__(self, tests, stretch: float = STRETCH):
         self.tests = sorted(tests, key=lambda test: rostests.declared_s(test.path), reverse=True)
         self._stretch = stretch
         self._ending = threading.Event()
-        self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=BESIDE if stretch == 1.0 else 1)
+        self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=BESIDE if stretch == STRETCH else 1)
         self._tallies = {test: self._executor.submit(self._run, test) for test in self.tests}
 
     def _run(self, test):
@@ -192,8 +198,9 @@ class Beside:
         self._executor.shutdown(cancel_futures=True)
 
 
-def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
+def run_layers(selection, long: bool, stretch: float = STRETCH) -> Tally:
     """Run all selected tests and print each result."""
+    os.environ[rostests.STRETCH_VARIABLE] = f"{stretch:g}"
     total = Tally(long=[name for test in selection.left_out for name in rostests.names(test, ROOT)])
     with contextlib.ExitStack() as ending:
         for title, run in layers(selection, long, stretch, ending):
@@ -216,7 +223,7 @@ def run_with_share(selection, options) -> Tally:
         return run_layers(selection, options.long)
     with Quota(options.busy):
         print(f"--busy: {options.busy:g} % of one core", flush=True)
-        return run_layers(selection, options.long, max(1.0, WHOLE_MACHINE_PERCENT / options.busy))
+        return run_layers(selection, options.long, STRETCH * max(1.0, WHOLE_MACHINE_PERCENT / options.busy))
 
 
 def separate_busy(words: list[str]) -> list[str]:

@@ -23,8 +23,9 @@ NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv pip meshes overlay build urdf kernels pictures)
-# Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
-COMPILED=(baxter_sim_kinematics baxter_sim_hardware motion_planning)
+# Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
+# and run one after the other, the groups beside each other.
+COMPILED=("baxter_sim_kinematics baxter_sim_hardware" motion_planning)
 # Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
 # Robots whose meshes are made ready for pictures.
@@ -266,8 +267,12 @@ step_urdf() {
 # Compiling takes about ten seconds; without this, the first launch would seem to hang.
 step_kernels() {
     local package
-    # numba does not compile again what is in the cache.
-    for package in "${COMPILED[@]}"; do
+    # On all cores, and then once more one after the other: numba does not compile again what is in the cache, and what
+    # fails, perhaps for lack of memory, is repeated alone and told.
+    run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\n" "$@" | xargs -P "$(nproc)" -I GROUP \
+        bash -c "for package in GROUP; do python3 -m \$package || exit; done" || true' compile "$LAB_ROOT" "${COMPILED[@]}"
+    # shellcheck disable=SC2068
+    for package in ${COMPILED[@]}; do
         run bash -c 'source "$1/tools/environment.bash" && use_build && python3 -m "$2"' compile "$LAB_ROOT" "$package"
     done
     # The collision spheres are cached in the same way, beside the compiled code.

@@ -220,8 +220,27 @@ def test_a_test_may_take_what_its_file_says(tmp_path):
     assert rostests.declared_s(tmp_path / "a.test") == 2560.0
 
 
+def test_what_is_in_the_other_run_is_left_out_but_for_long_tests(tmp_path):
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long:\n    once:\n    build:\n    tree:\n")
+    (tmp_path / "test_one.py").write_text("import pytest\ndef test_plain(): pass\n" + "".join(
+        "%sdef test_%s(): pass\n" % ("".join("@pytest.mark.%s\n" % mark for mark in marks), "_".join(marks))
+        for marks in (("once",), ("build",), ("tree",), ("long",), ("long", "tree"))))
+
+    def run(*options):
+        done = subprocess.run([sys.executable, "-m", "pytest", "-v", "-p", "lab_tests.long_tests", *options, tmp_path],
+                              text=True, capture_output=True, check=True,
+                              env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
+        return set(re.findall(r"::test_(\w+) PASSED", done.stdout))
+
+    assert run("--in-this-run=once,build") == {"once", "build", "long", "long_tree"}
+    assert run("--in-this-run=once,build", "--leave-out-long=%s" % (tmp_path / "left")) == {"once", "build"}
+    assert (tmp_path / "left").read_text().split() == ["test_one.py::test_long", "test_one.py::test_long_tree"]
+    assert run("--in-the-other-run=tree") == {"plain", "once", "build", "long", "long_tree"}
+
+
 def test_every_test_is_in_one_of_the_two_runs():
-    """The first run leaves out tests marked `tree`, the one under the second locale `build` and `once`."""
+    """With --long the first run leaves out tests marked `tree`; the one under the second locale always leaves out
+    `build` and `once`."""
     marks = {path: set(re.findall(r"pytest\.mark\.(tree|once|build)\b", path.read_text(encoding="utf-8")))
              for folder in ("src", "tests") for path in (ROOT / folder).rglob("test_*.py") if path != Path(__file__)}
     assert {mark for found in marks.values() for mark in found} == {"tree", "once", "build"}

@@ -7,7 +7,7 @@ import time
 POLL_S = 0.01
 # Only keeps a test from hanging: so long that no busy machine fails it.
 DEADLINE_S = 90.0
-# `./baxter.sh test --busy` gives the tests a part of one core, and sets the factor of their time limits.
+# `./baxter.sh test` sets the factor of the time limits; with `--busy` it gives the tests a part of one core.
 STRETCH = float(os.environ.get("LAB_TEST_STRETCH", "1"))
 
 
@@ -21,7 +21,7 @@ def wait_until(condition, what="the condition", timeout_s=DEADLINE_S, interval_s
 
     what: description of the condition, for the error; a function is called then, to report the progress. Raises
     AssertionError after ``timeout_s`` [s] of wall time; the last call is after the deadline, so that a stopped process
-    does not fail. Under `./baxter.sh test --busy` it waits STRETCH times as long.
+    does not fail. It waits STRETCH times as long.
     """
     timeout_s *= STRETCH
     deadline = time.monotonic() + timeout_s

@@ -11,6 +11,11 @@ from lab_testing.processes import is_alive, living
 from lab_testing.waiting import beats, wait_for_publishers, wait_until
 
 
+@pytest.fixture(autouse=True)
+def limits_as_written(monkeypatch):
+    monkeypatch.setattr(waiting, "STRETCH", 1.0)
+
+
 def test_the_first_true_answer_is_returned():
     answers = iter([None, 0, "third", "fourth"])
     assert wait_until(lambda: next(answers), interval_s=0.0) == "third"

@@ -21,7 +21,7 @@ from baxter_conformance.reader import read
 from baxter_model.interface import physical_robot
 from baxter_sim_hardware.arms import collision
 from baxter_sim_hardware.topics import coverage, interface
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import stretched, wait_for_message, wait_until
 
 NEUTRAL = {name: angle for side in SIDES
            for name, angle in zip(joints(side), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True)}
@@ -100,7 +100,11 @@ class RobotInterfaceTest(unittest.TestCase):
         folder = Path(rospkg.RosPack().get_path("baxter_sim_hardware"))
         table = yaml.safe_load((folder / "config" / "topics_not_served.yaml").read_text())
         kinds = coverage.physical()
-        findings = comparison.compare(physical_robot(), read(physical_robot(), 20.0))
+        # On a slow machine the cameras come some time after the robot.
+        for name in ("/cameras/list", "/cameras/open", "/cameras/close", "/cameras/reset"):
+            rospy.wait_for_service(name, stretched(90.0))
+        wait_for_message("/cameras/right_hand_camera/image", Image)
+        findings = comparison.compare(physical_robot(), read(physical_robot(), stretched(20.0)))
         left = [one for one in findings if one.is_public and one.verdict is not comparison.Verdict.MET
                 and not coverage.reason_to_leave_out(one.name, kinds.get(one.name, ""), table)]
         # The frames of the set-points come with reference_frames:=true; rostest starts no rosout node.
