@@ -52,6 +52,7 @@ class Publications:
         self._clock_sent_at = 0.0
         self._snapshot_written_at = 0.0
         self._snapshot_too_small = False
+        self._late_turns_told = False
         self._clock = ros.publisher("/clock", Clock, greet=True)
         self._model_states = ros.publisher("/gazebo/model_states", ModelStates)
         self._link_states = ros.publisher("/gazebo/link_states", LinkStates)
@@ -170,6 +171,13 @@ class Publications:
             metrics = PerformanceMetrics(real_time_factor=factor)
             metrics.header.stamp = stamp_ns(simulation.time_ns)
             self._metrics.publish(metrics)
+        ticks = simulation.ticks_at_once
+        if ticks > simulation.turn_lengths[0] and not self._late_turns_told:
+            self._late_turns_told = True
+            self._log.info("this machine is busy. To keep real time, /clock has %g messages a second while it is, and "
+                           "commands wait up to %g ms for their tick" % (
+                               1.0 / (max(ticks, self._clock_divisor) * simulation.step_s),
+                               1e3 * ticks * simulation.step_s))
         wanted = simulation.real_time_factor
         news = None if simulation.paused else self._watch.news(factor, wanted)
         if news is not None:

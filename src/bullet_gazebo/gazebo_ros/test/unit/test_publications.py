@@ -6,6 +6,7 @@ import pytest
 
 from bullet_sim import Contact
 from gazebo_ros import publications
+from gazebo_ros.pacing import RateMeter
 
 STEP_S = 0.002
 TOUCH = Contact("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0), -0.001, 5.0, (1.0, 0.0, 0.0))
@@ -63,6 +64,21 @@ def test_a_late_world_tells_its_time_at_the_end_of_each_turn(monkeypatch, clock_
     world.simulation.ticks_at_once = ticks_at_once
     world.run(2.0)
     assert world.clocks == clocks
+
+
+def test_longer_turns_of_a_late_world_are_told_once(monkeypatch):
+    lines = []
+    world = World(monkeypatch, factor=1.0, asked=1.0)
+    world.publications._log = SimpleNamespace(info=lines.append)
+    world.publications._meter = RateMeter(clock=lambda: world.wall_s)
+    world.run(3.0)
+    assert lines == []
+    world.simulation.ticks_at_once = 5
+    world.run(3.0)
+    world.simulation.ticks_at_once = 10
+    world.run(3.0)
+    line, = lines
+    assert "100 messages a second" in line and "10 ms" in line
 
 
 def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):
