@@ -339,6 +339,8 @@ done
 
 # Nothing of another Python, workspace or virtual environment may leak into the build. Debian's own tools come first.
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV CMAKE_PREFIX_PATH ROS_PACKAGE_PATH ROS_DISTRO PKG_CONFIG_PATH
+# Of a build's time a sixth goes to messages in Lisp, which nothing here uses; ROS_LANG_DISABLE= makes them, too.
+export ROS_LANG_DISABLE=${ROS_LANG_DISABLE-genlisp}
 export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
 if [[ -f $NOETIC ]]; then
     set +u
