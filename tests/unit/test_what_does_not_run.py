@@ -89,19 +89,23 @@ def test_slower():
 @pytest.mark.tree
 def test_in_the_other_run():
     pass
+
+@pytest.mark.once
+def test_once():
+    pass
 """
 
 
 @pytest.mark.parametrize(("words", "ran", "left_out"), [
-    ([], ["test_quick"], ["test_a.py::test_slow", "test_a.py::test_slower"]),
-    (["--long"], ["test_quick", "test_slow", "test_slower"], None),
+    ([], ["test_once"], ["test_a.py::test_slow", "test_a.py::test_slower"]),
+    (["--long"], ["test_quick", "test_slow", "test_slower", "test_once"], None),
     (["-k", "slower"], [], ["test_a.py::test_slower"]),
     (["-m", "long"], ["test_slow", "test_slower"], None),
     (["-m", "tree"], ["test_slower", "test_in_the_other_run"], None),
 ])
 def test_long_tests_are_left_out_and_named(tmp_path, monkeypatch, words, ran, left_out):
     (tmp_path / "test_a.py").write_text(LONG)
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: long\n    tree: tree\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: long\n    tree: tree\n    once: once\n")
     monkeypatch.setattr(run_tests, "ROOT", tmp_path)
     monkeypatch.setattr(run_tests, "WORK", tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(ROOT / "tools"), prepend=os.pathsep)

@@ -21,9 +21,9 @@ MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s].
 MOST_AT_ONCE_S = 0.010
-# In a world that is late it is these times, one after the other [s], and the clock has a message for each. A program
+# In a world that is late it is this time [s], and the clock has a message for each. A program
 # with rospy.Rate(100) keeps its mean rate up to the last one.
-LATE_TURNS_S = (0.010, 0.020)
+LATE_TURNS_S = (0.010,)
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
