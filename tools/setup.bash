@@ -221,7 +221,7 @@ remove_dead_relays() {
 step_build() {
     local key
     # Without the workspace's own CMakeLists.txt, which catkin_make writes.
-    key="$LAB_ROOT $(cd src && find -L . -mindepth 2 \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
+    key="$LAB_ROOT $ROS_LANG_DISABLE $(cd src && find -L . -mindepth 2 \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
     # make takes a file that a killed compiler has half written as finished.
@@ -339,7 +339,7 @@ done
 
 # Nothing of another Python, workspace or virtual environment may leak into the build. Debian's own tools come first.
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV CMAKE_PREFIX_PATH ROS_PACKAGE_PATH ROS_DISTRO PKG_CONFIG_PATH
-# Of a build's time a sixth goes to messages in Lisp, which nothing here uses; ROS_LANG_DISABLE= makes them, too.
+# A third of the messages' code would be in Lisp, which nothing here uses; ROS_LANG_DISABLE= makes it, too.
 export ROS_LANG_DISABLE=${ROS_LANG_DISABLE-genlisp}
 export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
 if [[ -f $NOETIC ]]; then

@@ -3,6 +3,7 @@
 
 import os
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -22,9 +23,9 @@ while (key := sys.stdin.read(1)) != "q":
     print("key", key, flush=True)
 """
 DISCARDS_KEYS = """
-import sys, time, tty
+import sys, tty
 print("up", flush=True)
-time.sleep(0.5)
+open("go").read()
 tty.setraw(0)
 print("key", sys.stdin.read(1), flush=True)
 """
@@ -49,7 +50,17 @@ def test_keys_arrive_in_a_terminal_and_the_program_ends(tmp_path):
         program.finish()
 
 
-def test_a_pressed_key_waits_for_a_program_that_discards_earlier_ones(tmp_path):
+def test_a_pressed_key_waits_for_a_program_that_discards_earlier_ones(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "go")
+    looks, settings = [], termios.tcgetattr
+
+    def look(terminal):
+        looks.append(terminal)
+        if len(looks) == 3:  # the program goes on while the key waits
+            (tmp_path / "go").write_text("")
+        return settings(terminal)
+
+    monkeypatch.setattr(termios, "tcgetattr", look)
     with start(DISCARDS_KEYS, tmp_path) as program:
         program.expect("up")
         program.expect("key x", timeout_s=20.0, beyond=program.press("x"))

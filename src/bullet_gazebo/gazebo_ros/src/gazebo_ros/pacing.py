@@ -10,8 +10,8 @@ MAX_DEBT_S = 0.2
 MAX_CATCH_UP = 2.0
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
-# A world that is later than this [s] for so long [s, wall time], and gets no better, makes its turns longer; one that
-# is on time for so long [s, wall time] tries shorter ones again.
+# A world that is later than this [s] for so long [s, wall time], and gets no better, makes its turns longer; it tries
+# shorter ones again so long [s, wall time] after that was last so.
 LATE_S, LONGER_AFTER_S, SHORTER_AFTER_S = 0.05, 0.3, 30.0
 # prctl(2): how late Linux may wake a sleeping thread, to wake several at once. Its default is 0.05 ms.
 _PR_SET_TIMERSLACK = 29
@@ -55,13 +55,17 @@ class Pacer:
         self._period = step_s / real_time_factor if real_time_factor else 0.0
         self._clock = clock
         self._sleep = sleep
-        self.lag = Lag()
+        self.lag = Lag(clock())
         self.restart()
 
     def restart(self):
         """Forget the delay: time counts from now on. For the start and after a pause."""
         self._due = self._last = self._clock()
-        self.lag.restart(self._last)
+        self.lag.forget(self._last)
+
+    def forget_lag(self):
+        """What has just delayed the world was no lack of processor time."""
+        self.lag.forget(self._clock())
 
     @property
     def is_paced(self):
@@ -79,7 +83,8 @@ class Pacer:
         self._due += ticks * self._period
         if now - self._due > MAX_DEBT_S:
             self._due = now - MAX_DEBT_S
-        self.lag.update(now - self._due, now)
+        if self.real_time_factor <= 1.0:  # a world that should be faster than that has as much as there is
+            self.lag.update(now - self._due, now)
         wake = max(self._due, self._last + ticks * self._period / MAX_CATCH_UP)
         if wake > now:
             self._sleep(wake - now)
@@ -88,35 +93,37 @@ class Pacer:
 
 
 class Lag:
-    """For how long a world has been late, as a level from 0 on: how much longer its turns should be.
+    """Whether a world has been late for long, so that its turns should be longer.
 
     Every turn of the loop costs something by itself: it wakes up, reads sockets, sends the time.
     """
 
-    def __init__(self, most=2):
-        """``most``: the highest level."""
-        self.level = 0
-        self._most = most
-        self.restart(0.0)
+    def __init__(self, now=0.0):
+        """``now`` [s, wall time]: also of the methods."""
+        self.is_late = False
+        self._on_time_since = self._seen_at = now
+        self.forget(now)
 
-    def restart(self, now):
-        """After a pause; ``now`` [s, wall time]."""
+    def forget(self, now):
+        """After a pause or a long request: what has happened since the last turn counts neither as late nor as on
+        time."""
+        self._on_time_since += now - self._seen_at
+        self._seen_at = now
         # Since when it is late, and how late it was then, or at the end of the last LONGER_AFTER_S.
-        self._late_since, self._late_s, self._changed_at = None, 0.0, now
+        self._late_since, self._late_s = None, 0.0
 
     def update(self, late_s, now):
-        """At the end of a turn that should have ended ``late_s`` ago [s]; ``now`` [s, wall time]."""
+        """At the end of a turn that should have ended ``late_s`` ago [s]."""
+        self._seen_at = now
         if late_s <= LATE_S:
             self._late_since = None
-            if self.level and now - self._changed_at >= SHORTER_AFTER_S:
-                self.level, self._changed_at = self.level - 1, now
-            return
-        self._changed_at = now
-        if self._late_since is None:
+            if self.is_late and now - self._on_time_since >= SHORTER_AFTER_S:
+                self.is_late = False
+        elif self._late_since is None:
             self._late_since, self._late_s = now, late_s
         elif now - self._late_since >= LONGER_AFTER_S:
             if late_s >= self._late_s:
-                self.level = min(self.level + 1, self._most)
+                self.is_late, self._on_time_since = True, now
             self._late_since, self._late_s = now, late_s
 
 

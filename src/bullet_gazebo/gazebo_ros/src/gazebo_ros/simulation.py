@@ -8,7 +8,7 @@ import time
 import traceback
 from concurrent.futures import Future
 
-from gazebo_ros.pacing import Pacer
+from gazebo_ros.pacing import LATE_S, Pacer
 from loop_ros.faults import SURVIVED, described
 
 # While the world is paused: how long the loop sleeps when nobody asks for anything, and while a lock-step request
@@ -63,9 +63,9 @@ class Simulation:
         self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
         #: Called after the length of a tick has changed.
         self.on_step_change = lambda: None
-        #: In a paced world, the ticks up to a multiple of the first number follow each other at once: fewer wake-ups,
-        #: which make a tick take longer. The next ones are for a world that is late; ascending.
-        self.turn_lengths = (1,)
+        #: In a paced world, the ticks up to a multiple of this follow each other at once: fewer wake-ups, which make a
+        #: tick take longer. The second number is for a world that is late.
+        self.turn_lengths = 1, 1
         self.world = world
         self.requests = requests
         self.paused = paused
@@ -128,7 +128,7 @@ class Simulation:
     @property
     def ticks_at_once(self):
         """The one of ``turn_lengths`` that is in force."""
-        return self.turn_lengths[min(self._pacer.lag.level, len(self.turn_lengths) - 1)]
+        return self.turn_lengths[self._pacer.lag.is_late]
 
     @property
     def is_stepping(self):
@@ -140,7 +140,9 @@ class Simulation:
         self._pacer.restart()
         requests = self.requests
         while not stop():
-            requests.run_pending()
+            began = time.perf_counter()
+            if requests.run_pending() and time.perf_counter() - began > LATE_S:
+                self._pacer.forget_lag()
             self._faults.guarded("between two ticks", self.on_turn)
             if self._advance is not None:
                 self._advance_turn()

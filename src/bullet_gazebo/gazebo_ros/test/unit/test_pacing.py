@@ -118,31 +118,54 @@ def test_as_fast_as_possible_lets_others_run_now_and_then(clock):
     assert slept == [0] * 25
 
 
-def test_who_is_late_for_long_and_gets_no_better_is_told_until_it_was_on_time_for_long():
-    lag, now = Lag(most=2), 100.0
+class Turns:
+    """Turns of 10 ms of a world with a Lag."""
 
-    def level_after(seconds, late_s, shrinking_s=0.0):
-        nonlocal now
+    def __init__(self):
+        self.now = 100.0
+        self.lag = Lag(self.now)
+
+    def late_after(self, seconds, late_s, shrinking_s=0.0):
+        """Whether the world counts as late after some time in which it is behind by ``late_s``, less by ``shrinking_s``
+        at each turn."""
         for _ in range(round(100 * seconds)):
-            now += 0.01
+            self.now += 0.01
             late_s -= shrinking_s
-            lag.update(late_s, now)
-        return lag.level
+            self.lag.update(late_s, self.now)
+        return self.lag.is_late
 
-    late, soon, later = 2.0 * LATE_S, 0.9 * LONGER_AFTER_S, 1.2 * LONGER_AFTER_S
-    assert level_after(60.0, LATE_S) == 0
-    assert level_after(soon, late) == 0
-    assert level_after(0.01, LATE_S) == 0
-    assert level_after(soon, late) == 0
-    assert level_after(0.01, LATE_S) == 0
-    assert level_after(5.0, 100.0, 0.01) == 0, "it is late and catches up"
-    assert level_after(0.01, LATE_S) == 0
-    assert level_after(later, late) == 1
-    assert level_after(60.0, late) == 2
-    assert level_after(0.9 * SHORTER_AFTER_S, 0.0) == 2
-    assert level_after(0.2 * SHORTER_AFTER_S, 0.0) == 1
-    assert level_after(SHORTER_AFTER_S, 0.0) == 0
-    assert level_after(60.0, 0.0) == 0
+
+SOON, LATER = 0.9 * LONGER_AFTER_S, 1.2 * LONGER_AFTER_S
+
+
+def test_who_is_late_for_long_and_gets_no_better_counts_as_late():
+    turns = Turns()
+    assert not turns.late_after(60.0, LATE_S)
+    for _ in range(2):
+        assert not turns.late_after(SOON, 2.0 * LATE_S)
+        assert not turns.late_after(0.01, LATE_S)
+    assert not turns.late_after(5.0, 100.0, 0.01), "it catches up"
+    assert not turns.late_after(0.01, LATE_S)
+    assert turns.late_after(LATER, 2.0 * LATE_S)
+    assert turns.late_after(60.0, 2.0 * LATE_S)
+    assert turns.late_after(0.9 * SHORTER_AFTER_S, 0.0)
+    assert not turns.late_after(0.2 * SHORTER_AFTER_S, 0.0)
+
+
+def test_pauses_and_single_hitches_do_not_keep_a_world_late():
+    for pause_s, hitch_s in ((0.0, 0.06), (20.0, 0.0)):
+        turns = Turns()
+        assert turns.late_after(LATER, 2.0 * LATE_S)
+        for _ in range(5):
+            turns.late_after(0.25 * SHORTER_AFTER_S, 0.0)
+            turns.late_after(0.05, hitch_s)
+            turns.now += pause_s
+            turns.lag.forget(turns.now)
+        assert not turns.lag.is_late
+    assert turns.late_after(LATER, 2.0 * LATE_S)
+    turns.now += 10.0 * SHORTER_AFTER_S
+    turns.lag.forget(turns.now)
+    assert turns.late_after(0.9 * SHORTER_AFTER_S, 0.0), "a pause is not time in which it was on time"
 
 
 def test_one_stall_does_not_make_a_world_late(clock):
@@ -151,20 +174,28 @@ def test_one_stall_does_not_make_a_world_late(clock):
     for _ in range(1000):
         clock.now += 0.0005
         pacer.wait()
-        assert pacer.lag.level == 0
+        assert not pacer.lag.is_late
 
 
 def test_a_world_whose_turns_cost_too_much_keeps_its_time_by_longer_ones(clock):
-    pacer, lengths, ticks = Pacer(0.002, clock=clock, sleep=clock.sleep), (1, 5, 10), 0
-    seen = set()
+    pacer, lengths, ticks = Pacer(0.002, clock=clock, sleep=clock.sleep), (1, 5), 0
+    late = []
     while clock.now < 280.0:
-        count = lengths[pacer.lag.level]
+        count = lengths[pacer.lag.is_late]
         clock.now += 0.003 + 0.001 * count
         pacer.wait(count)
         ticks += count
-        seen.add(pacer.lag.level)
-    # It tries the shortest ones six times, and catches up.
-    assert seen == {0, 1} and 0.002 * ticks > 0.998 * 180.0
+        late.append(pacer.lag.is_late)
+    # It tries the shortest ones about six times, and catches up.
+    assert set(late) == {True, False} and 0.002 * ticks > 0.998 * 180.0
+
+
+def test_a_world_that_should_be_faster_than_the_machine_can_has_no_longer_turns(clock):
+    pacer = Pacer(0.002, 5.0, clock=clock, sleep=clock.sleep)
+    for _ in range(5000):
+        clock.now += 0.001
+        pacer.wait()
+    assert not pacer.lag.is_late
 
 
 @pytest.mark.parametrize("step, factor", [(0.0, 1.0), (-1.0, 1.0), (float("nan"), 1.0), (0.002, -1.0),

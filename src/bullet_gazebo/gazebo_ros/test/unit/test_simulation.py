@@ -6,6 +6,7 @@ import time
 import pytest
 
 from gazebo_ros.model_plugin import ModelPlugin
+from gazebo_ros.pacing import LATE_S
 from gazebo_ros.simulation import AdvanceRefused, HostedPlugin, Simulation
 from lab_testing.waiting import wait_until
 from loop_ros.faults import Faults
@@ -132,7 +133,7 @@ def test_a_tick_is_update_step_publish_at_the_right_times(simulation):
 
 
 def test_ticks_up_to_a_multiple_follow_each_other_at_once_in_a_paced_world_alone(simulation):
-    simulation.paused, simulation.turn_lengths = False, (4,)
+    simulation.paused, simulation.turn_lengths = False, (4, 4)
     simulation.do_tick()
     assert [simulation._some_ticks() for _ in range(3)] == [3, 4, 4] and simulation.tick == 12
 
@@ -146,16 +147,28 @@ def test_ticks_up_to_a_multiple_follow_each_other_at_once_in_a_paced_world_alone
     assert simulation._some_ticks() == 1
 
 
-def test_a_late_world_has_longer_turns_and_the_last_length_is_for_all_that_are_later(simulation):
+def test_a_late_world_has_longer_turns(simulation):
     simulation.paused, simulation.turn_lengths = False, (1, 5)
-    lengths = []
-    for level in range(3):
-        simulation._pacer.lag.level = level
-        lengths.append(simulation.ticks_at_once)
-    assert lengths == [1, 5, 5]
+    assert simulation.ticks_at_once == 1
+    simulation._pacer.lag.is_late = True
     assert [simulation._some_ticks() for _ in range(2)] == [5, 5]
     simulation.real_time_factor = 1.0
     assert simulation.ticks_at_once == 1
+
+
+def test_a_long_request_does_not_make_a_world_late_and_a_short_one_does_not_hide_it(simulation):
+    forgotten, turns = [], iter(range(3))
+    simulation.paused, simulation._pacer.forget_lag = False, lambda: forgotten.append(simulation.tick)
+    # A request that takes long is what is tested.
+    requests = [lambda: None, lambda: time.sleep(1.2 * LATE_S)]
+
+    def stop():
+        if requests:
+            simulation.requests.submit(requests.pop(0))
+        return next(turns, None) is None
+
+    simulation.run(stop)
+    assert forgotten == [1] and simulation.tick == 3
 
 
 def test_time_is_exact_after_days(simulation):

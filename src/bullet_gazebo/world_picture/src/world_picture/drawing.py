@@ -19,7 +19,7 @@ from bullet_sim.room import spare_folder, try_room
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
-from world_picture.results import cache_folder, existing
+from world_picture.results import cache_folder, existing, open_to_all
 from world_picture.textures import Texture, save_reduced, write_texture
 
 #: Where one level must do: the coarsest whose distance from the original is at most this share of the mesh's size.
@@ -30,6 +30,7 @@ LIMITS = {"processor_s": _PROCESSOR_S, "waiting_s": _WAITING_S}
 _PROCESS = LimitedProcess(**LIMITS)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 13
+_FOLDER = "drawings"
 # Names of folders that are being written begin so; nothing is written to one that is older than this [s].
 _DRAFT, _ABANDONED_S = "tmp", 3600.0
 # Room that a mesh's levels and its picture may need [bytes].
@@ -84,7 +85,7 @@ class DrawingCache:
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``; ``process``: a
         ``bullet_sim.limited.LimitedProcess``, by default one for all caches of this program."""
         self._process = process
-        self._folder = Path(folder or cache_folder("drawings"))
+        self._folder = Path(folder or cache_folder(_FOLDER))
 
     def parts(self, path, textured=False, part=WHOLE):
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`. ``textured``: for a
@@ -114,7 +115,7 @@ class DrawingCache:
             raise DrawingError("%s %s cannot be read: %s" % (what, path, error.strerror)) from error
         key = "%s-%d%s" % (_digest(path, content), _VERSION, kind)
         del content
-        index = existing(self._folder, Path(key) / name)
+        index = existing(self._folder, Path(key) / name, _FOLDER)
         if index is None:
             try:
                 index = self._make(key, name, write, str(path), *arguments)
@@ -137,6 +138,7 @@ class DrawingCache:
         except LimitError:
             shutil.rmtree(draft, ignore_errors=True)
             raise
+        open_to_all(draft)
         target = self._folder / key
         try:
             draft.rename(target)

@@ -12,6 +12,7 @@ import numpy as np
 READY = "BULLET_GAZEBO_READY"
 #: Most results that are kept. Models of ever other sizes, as for data sets, would fill the disk.
 MOST_KEPT = 5000
+_FOLDER = "results"
 
 
 def cache_folder(name):
@@ -20,14 +21,20 @@ def cache_folder(name):
     return Path(base) / "bullet_gazebo" / name
 
 
-def existing(folder, name):
-    """The path ``name`` in a cache's ``folder``, or else in the one of the same name that :data:`READY` names, if it is
-    there; None if it is in neither."""
+def existing(folder, name, cache):
+    """The path ``name`` in ``folder``, or else in the folder of ``cache`` that :data:`READY` has, if it is there; None
+    if it is in neither. ``cache``: as for :func:`cache_folder`."""
     ready = os.environ.get(READY)
-    for place in (folder, *([Path(ready) / folder.name] if ready else ())):
+    for place in (folder, *([Path(ready) / cache] if ready else ())):
         if os.path.exists(place / name):  # unlike Path.exists, False for a folder that may not be read
             return place / name
     return None
+
+
+def open_to_all(path):
+    """Let all users read a new file or folder, which tempfile makes for its own user alone: it may be another user's
+    :data:`READY`."""
+    os.chmod(path, 0o755 if os.path.isdir(path) else 0o644)
 
 
 class ResultCache:
@@ -37,14 +44,14 @@ class ResultCache:
 
     def __init__(self, folder=None):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/results``."""
-        self._folder = Path(folder or cache_folder("results"))
+        self._folder = Path(folder or cache_folder(_FOLDER))
 
     def array(self, calculation, inputs, calculate):
         """The array that ``calculate()`` returns, from the disk if it is there. ``calculation``: a name, with a number
         to be increased when the result for the same inputs changes; ``inputs``: arrays and numbers, on which alone it
         depends."""
         name = "%s-%s.npy" % (calculation, _digest(inputs))
-        path = existing(self._folder, name) or self._folder / name
+        path = existing(self._folder, name, _FOLDER) or self._folder / name
         # Missing, cut short, or of something else: it is calculated again.
         with contextlib.suppress(OSError, ValueError, EOFError):
             result = np.load(path, allow_pickle=False)
@@ -62,6 +69,7 @@ class ResultCache:
         try:
             with os.fdopen(number, "wb") as file:
                 np.save(file, result, allow_pickle=False)
+            open_to_all(draft)
             os.replace(draft, path)
         except BaseException:
             os.unlink(draft)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of calculations on disk."""
 import os
+import stat
 
 import numpy as np
 import pytest
@@ -26,6 +27,15 @@ def test_a_result_is_calculated_once(tmp_path, calculate):
     for _ in range(3):
         found = ResultCache(tmp_path / "a" / "b").array("sum-1", (np.eye(3), 2.0), calculate)
         assert found.dtype == bool and found.tolist() == [True, False, True]
+    assert calculate.calls == 1
+
+
+def test_another_user_may_read_results_and_a_spare_folder_takes_those_that_are_ready(tmp_path, calculate, monkeypatch):
+    ready, spare = tmp_path / "ready" / "results", tmp_path / "bullet_gazebo_results_1000"
+    ResultCache(ready).array("sum-1", (1,), calculate)
+    assert [stat.S_IMODE(path.stat().st_mode) for path in ready.iterdir()] == [0o644]
+    monkeypatch.setenv(READY, str(ready.parent))
+    ResultCache(spare).array("sum-1", (1,), calculate)
     assert calculate.calls == 1
 
 

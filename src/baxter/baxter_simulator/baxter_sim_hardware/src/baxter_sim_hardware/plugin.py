@@ -44,7 +44,7 @@ from .topics.status import StatusTopics
 from .topics.warnings import Warnings
 
 PARAMETERS = "/baxter_sim_hardware/"
-QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at 100 kHz
+QUEUE_DEPTH = 200  # messages between two ticks: 10 ms, the longest turn, of a client that writes at 20 kHz
 
 
 class BaxterPlugin(ModelPlugin):

@@ -232,6 +232,22 @@ def test_senseless_timeouts_are_refused(lab, seconds):
     assert lab.plugin._baxter.arms.timeout("left") == 0.2
 
 
+def test_raw_commands_that_come_together_are_one_step_of_their_stream(lab):
+    """A client at 200 Hz, of which two commands are read at a time, every 10 ms."""
+    start, begin, speed, seen = lab.position, lab.world.time_s, 0.3, []
+
+    def stream(lab):
+        now_s = lab.world.time_s - begin
+        if lab.world.tick % 5 == 0:
+            for ahead_s in (0.005, 0.010):
+                lab.command(RAW, start + speed * (now_s + ahead_s))
+        if now_s > 0.2:
+            seen.append(lab.velocity - speed)
+
+    lab.run(0.4, before=stream)
+    assert len(seen) > 50 and np.abs(seen).max() < 0.05
+
+
 def test_zero_torque_holds_still_for_ten_seconds(lab):
     start = lab.position
     position, _, _ = lab.record(10.0, before=lambda lab: lab.command(TORQUE, np.zeros(14)))

@@ -19,6 +19,10 @@ def arrived(names, stamp, positions=None):
     return UnreadJointState().deserialize(buffer.getvalue())
 
 
+def test_the_header_can_be_read_by_itself():
+    assert arrived(ARM, (7, 8)).header.stamp == genpy.Time(7, 8)
+
+
 @pytest.fixture
 def jumps():
     return []

@@ -17,13 +17,14 @@ class RawStream:
     def __init__(self, limits, dt):
         self._limits, self._dt = limits, dt
         count = len(limits.names)
-        self._stamp = np.full(count, -np.inf)
+        # Of the newest command, and of the newest one at an earlier time.
+        self._stamp, self._earlier = np.full(count, -np.inf), np.full(count, -np.inf)
         self._velocity = np.zeros(count)  # [rad/s]
         self._velocity_stamp = np.full(count, -np.inf)
 
     def reset(self):
         """Forget all set-points: after a reset of the clock they would seem recent."""
-        self._stamp[:] = self._velocity_stamp[:] = -np.inf
+        self._stamp[:] = self._earlier[:] = self._velocity_stamp[:] = -np.inf
 
     def feed_forward(self, index, velocities, time_s):
         """At time_s [s] the set-points of joints `index` move at velocities [rad/s], clipped to the limits."""
@@ -39,7 +40,10 @@ class RawStream:
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
         stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
         index = command.index
-        gap = np.maximum(time_s - self._stamp[index], self._dt)
+        # Commands that come between the same two ticks count as one, or the last would have only a tick for its way.
+        stamp = self._stamp[index]
+        earlier = np.where(stamp == time_s, self._earlier[index], stamp)
+        gap = np.maximum(time_s - earlier, self._dt)
         goes_on = (mode[index] == RAW_POSITION) & (gap <= STREAM_GAP_S)
         points.target[index] = np.where(goes_on, points.target[index], command.values)
         limit = self._limits.velocity[index]
@@ -49,4 +53,4 @@ class RawStream:
         goal = np.clip(command.values + ahead, self._limits.lower[index], self._limits.upper[index])
         points.pace[index] = np.clip((goal - points.target[index]) / gap, -limit, limit)
         points.goal[index] = goal
-        self._stamp[index] = time_s
+        self._stamp[index], self._earlier[index] = time_s, earlier

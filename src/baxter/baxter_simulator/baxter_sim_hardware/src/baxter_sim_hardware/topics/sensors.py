@@ -51,7 +51,7 @@ class SensorTopics(Part):
 
     def reset(self):
         self._ring.reset()
-        self._heard[:] = np.inf
+        self._heard[:], self._turn = np.inf, 0
 
     def update(self, time_s):
         """Show the ring's lights as they are at time_s [s]. The sonars listen in turns: to ask all of them each time
