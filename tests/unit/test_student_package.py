@@ -110,7 +110,7 @@ def test_catkin_make_does_not_wait_for_a_quiet_machine(workspace):
     assert run('. devel/setup.sh && echo "$ROS_PARALLEL_JOBS"', workspace, "sh", ROS_PARALLEL_JOBS="-j1") == "-j1\n"
 
 
-def test_messages_in_lisp_are_built_for_who_asks_for_them(workspace):
+def test_messages_in_lisp_are_built_on_request_only(workspace):
     assert run('. devel/setup.sh && echo "$ROS_LANG_DISABLE"', workspace, "sh") == "genlisp\n"
     assert run('. devel/setup.sh && echo "$ROS_LANG_DISABLE"', workspace, "sh", ROS_LANG_DISABLE="") == "\n"
 
