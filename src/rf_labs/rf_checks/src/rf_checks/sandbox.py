@@ -8,6 +8,7 @@ import collections
 import contextlib
 import ctypes
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -118,8 +119,11 @@ class Student:
             folder = _STARTUP_FOLDER if walls else startup.folder
             own.update(startup.environment,
                        PYTHONPATH=startup.python_path(folder, environment.get("PYTHONPATH", "")))
-        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0",
-                  "--nofile=%d" % FILES, "--"]
+        # A limit that a grader has for its judges must not be the program's: its verdict would depend on the machine.
+        most = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        data = "unlimited" if most == resource.RLIM_INFINITY else str(most)
+        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--data=" + data, "--fsize=%d" % FILE_BYTES,
+                  "--core=0", "--nofile=%d" % FILES, "--"]
         # Bubblewrap itself orders its end with this process's, too late where this one is killed meanwhile.
         command = with_parent([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments])
         return subprocess.Popen(command, env=own, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,

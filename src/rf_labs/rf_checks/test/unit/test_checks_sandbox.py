@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The process that a student's program runs in: its limits, its end, and what it cannot reach. No master."""
 import os
+import resource
 import subprocess
 import time
 
@@ -89,6 +90,16 @@ def test_endless_output_neither_fills_memory_nor_stops_the_judge(start):
     wait_until(lambda: student.excess() == "output", "%d bytes" % OUTPUT_BYTES)
     student.end()
     assert len(student.output) <= 2 * KEPT_BYTES + 8192
+
+
+def test_the_memory_of_a_judge_is_no_limit_of_the_program(start):
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(resource.RLIMIT_DATA, (3 << 30, hard))
+    try:
+        student = finished(start("import resource; print(resource.getrlimit(resource.RLIMIT_DATA)[0])"))
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+    assert student.output == "%d\n" % hard
 
 
 def test_memory_of_all_processes_together_has_a_limit(start, monkeypatch):
