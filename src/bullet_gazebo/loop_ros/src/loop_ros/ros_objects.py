@@ -48,6 +48,7 @@ class RosObjects:
             registered.append(registration)
             # rospy would put a queue and a thread between us and each connection.
             registration.impl.set_queue_size(None)
+            remove_only_what_is_there(registration.impl)
             registration.impl.add_subscriber_listener(_ConnectionNotice(self._publishers, publisher))
             publisher.attach(registration.impl)
 
@@ -179,6 +180,21 @@ def answering(name, handler, faults):
             raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
 
     return answer
+
+
+def remove_only_what_is_there(impl):
+    """Let rospy's publisher ``impl`` remove a connection once.
+
+    A connection that ends is at times removed twice. rospy then looks for one with the same file descriptor, which may
+    be that of a new subscriber by now: it would never get a message.
+    """
+    remove = impl.remove_connection
+
+    def remove_connection(connection):
+        if connection in impl.connections:
+            remove(connection)
+
+    impl.remove_connection = remove_connection
 
 
 def _read_in_loop(impl, subscribers, log, faults):

@@ -100,8 +100,8 @@ class Real:
         self.context = NodeHandle(self.ros)
 
     def _publisher(self, topic, msg_class, latch=False, queue_size=None):
-        impl = SimpleNamespace(connections=[], set_queue_size=lambda size: None,
-                               add_subscriber_listener=lambda listener: None)
+        impl = SimpleNamespace(connections=[], remove_connection=lambda connection: None,
+                               set_queue_size=lambda size: None, add_subscriber_listener=lambda listener: None)
         self._published[topic] = impl, msg_class
         return SimpleNamespace(impl=impl, unregister=lambda: None)
 

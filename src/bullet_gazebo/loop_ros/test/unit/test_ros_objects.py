@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import pytest
 import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
-from rospy.impl.tcpros_pubsub import TCPROSSub, robust_connect_subscriber
+from rospy.impl.tcpros_pubsub import TCPROSPub, TCPROSSub, robust_connect_subscriber
+from rospy.topics import _PublisherImpl
 from std_msgs.msg import String
 
 from lab_testing.waiting import wait_until
@@ -19,7 +20,7 @@ from loop_ros.faults import Faults
 from loop_ros.node_handle import NodeHandle
 from loop_ros.publisher import PublisherHub
 from loop_ros.request_queue import RequestQueue
-from loop_ros.ros_objects import RosObjects, _read_in_loop
+from loop_ros.ros_objects import RosObjects, _read_in_loop, remove_only_what_is_there
 from loop_ros.subscriber import SubscriberHub
 
 
@@ -174,7 +175,8 @@ class Registrations:
         self.open.append(topic)
         self.made.append(topic)
         impl = SimpleNamespace(set_queue_size=lambda size: None, add_subscriber_listener=lambda listener: None,
-                               add_connection=lambda connection: True, connections=[])
+                               add_connection=lambda connection: True, remove_connection=lambda connection: None,
+                               connections=[])
         self.on_make()
         return SimpleNamespace(impl=impl, get_num_connections=int, unregister=lambda: self.open.remove(topic),
                                shutdown=lambda reason: self.open.remove(topic))
@@ -346,3 +348,31 @@ def test_a_topic_that_is_withdrawn_is_no_longer_heard(objects, registrations):
     assert objects.withdraw("/states") is None
     assert objects.flush() and registrations.open == ["/more"]
     assert queue.drain() == []
+
+
+def test_the_end_of_a_connection_does_not_take_the_next_one_with_its_descriptor():
+    """Its subscriber has left and come back, and the system has given the new connection the old one's descriptor."""
+    impl = _PublisherImpl("/topic", String)
+    impl.set_queue_size(None)
+    remove_only_what_is_there(impl)
+
+    def connected(endpoint):
+        near, far = socket.socketpair()
+        transport = TCPROSTransport(TCPROSPub("/topic", String), "/topic")
+        transport.set_socket(near, endpoint)
+        impl.add_connection(transport)
+        return transport, far
+
+    with contextlib.ExitStack() as ending:
+        old, far = connected("/node")
+        ending.callback(far.close)
+        cleanup, old.cleanup_cb = old.cleanup_cb, None
+        old.close()  # as another thread does, between closing the socket and its callback
+        new, far = connected("/node")
+        ending.callback(far.close)
+        ending.callback(new.close)
+        new._fileno = old.fileno()
+        cleanup(old)
+        assert impl.connections == [new]
+        new.close()
+        assert impl.connections == []
