@@ -1,8 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The lab end to end with other arguments than the defaults."""
+import os
+import signal
 import unittest
+import xmlrpc.client
 
+import rosgraph
 import rospy
 import tf2_ros
 from robot_client import SIDES, Robot, joints
@@ -48,6 +52,17 @@ class BaxterWorldVariantTest(unittest.TestCase):
 
         subscriber = rospy.Subscriber("/tf", TFMessage, note)
         wait_until(lambda: len(stamps.get("left_upper_shoulder", ())) > 50, "tf")
+        # What the node missed while it had no processor must not be missing in tf.
+        api = rosgraph.Master(rospy.get_name()).lookupNode("/robot_state_publisher")
+        pid = xmlrpc.client.ServerProxy(api).getPid(rospy.get_name())[2]
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            missed = len(self.robot.history) + 5
+            wait_until(lambda: len(self.robot.history) >= missed, "joint states")
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        seen = len(stamps["left_upper_shoulder"])
+        wait_until(lambda: len(stamps["left_upper_shoulder"]) > seen + 20, "tf after the stop")
         subscriber.unregister()
         self.assertEqual(len(stamps), 2 * 7 + 1)
         for of_one in stamps.values():
