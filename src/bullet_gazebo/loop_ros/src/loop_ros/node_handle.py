@@ -57,6 +57,11 @@ class NodeHandle:
         self._noted.difference_update(numbers)
         return [self._subscriptions[number] for number in numbers]
 
+    def reads(self):
+        """Loop thread: how often the loop has read what has come for its subscriptions. It does so before a tick, but
+        not before each one while several follow each other at once."""
+        return self._ros.reads()
+
     def service(self, name, srv_class, handler):
         """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""
         return self._serving(self._ros.service, self.resolve(name), srv_class, handler)

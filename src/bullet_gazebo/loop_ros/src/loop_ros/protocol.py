@@ -126,5 +126,9 @@ class LoopRos(Protocol):
     def deliveries(self):
         """How many messages the subscriptions have received: {topic: count}."""
 
+    def reads(self):
+        """How often the loop has read what has come for its subscriptions. Between two ticks with the same number, no
+        message could arrive."""
+
     def flush(self, timeout_s=10.0):
         """Any thread but the loop's: wait until everything that was opened is registered; returns whether it is."""

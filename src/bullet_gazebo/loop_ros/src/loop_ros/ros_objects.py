@@ -127,6 +127,10 @@ class RosObjects:
         return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscriptions)
                 for topic, subscriptions in list(self._subscriptions.items())}
 
+    def reads(self):
+        """How often the loop has read the connections of its subscriptions."""
+        return self._subscribers.reads
+
     def flush(self, timeout_s=10.0):
         """Any thread but the loop's: wait until all registrations asked for so far are done."""
         done = threading.Event()

@@ -114,10 +114,14 @@ class Connection:
 
 
 class SubscriberHub:
-    """Reads all connections of the loop's subscriptions, once per turn."""
+    """Reads all connections of the loop's subscriptions, once per turn.
+
+    ``reads``: how often it has done so.
+    """
 
     def __init__(self, clock=time.perf_counter):
         """No connections yet. ``clock`` is replaceable for tests."""
+        self.reads = 0
         self._clock = clock
         self._new = collections.deque()
         self._closed = False
@@ -137,10 +141,11 @@ class SubscriberHub:
         if self._new:
             self._take_new()
         now = self._clock()
-        if not self._connections or now - self._looked_at < LOOK_PERIOD_S:
+        if now - self._looked_at < LOOK_PERIOD_S:
             return
         self._looked_at = now
-        if _poll(self._entries, len(self._connections), 0) <= 0:
+        self.reads += 1
+        if not self._connections or _poll(self._entries, len(self._connections), 0) <= 0:
             return
         ready = [connection for connection, entry in zip(self._connections, self._entries, strict=True)
                  if entry.revents]

@@ -72,6 +72,7 @@ class FakeRos:
         self._heard, self._clock = heard, clock
         self._handlers = {}  # name: (service, handler)
         self._delivered_before = {}
+        self._reads = 0
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
         first = self.publishers.get(topic)
@@ -119,6 +120,11 @@ class FakeRos:
     def deliveries(self):
         return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscribed.all)
                 for topic, subscribed in self.subscriptions.items()}
+
+    def reads(self):
+        # Messages arrive at any time.
+        self._reads += 1
+        return self._reads
 
     def flush(self, timeout_s=10.0):
         return True

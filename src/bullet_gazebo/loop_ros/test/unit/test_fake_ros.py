@@ -2,6 +2,7 @@
 """The fake behaves as the simulator's own code: the same cases run against both."""
 import contextlib
 import inspect
+import itertools
 import threading
 from types import SimpleNamespace
 
@@ -58,6 +59,9 @@ class Fake:
     def has_service(self, service):
         return service in self.ros.services
 
+    def turn(self):
+        """The loop looks for messages; here it always does."""
+
     def lines(self):
         return self.log.lines
 
@@ -96,7 +100,8 @@ class Real:
             transport=peer, send=peer.take, has_rest=False)))
         self.log = LoopLog(dict.fromkeys(("info", "warn", "error"), self._lines.append))
         self._requests, self._hub = RequestQueue(), PublisherHub()
-        self.ros = ros_objects.RosObjects(self._hub, SubscriberHub(), self._requests, self.log, Faults(self.log))
+        self._subscribers = SubscriberHub(itertools.count().__next__)
+        self.ros = ros_objects.RosObjects(self._hub, self._subscribers, self._requests, self.log, Faults(self.log))
         self.context = NodeHandle(self.ros)
 
     def _publisher(self, topic, msg_class, latch=False, queue_size=None):
@@ -151,6 +156,9 @@ class Real:
         self.ros.flush()
         return service in self._served
 
+    def turn(self):
+        self._subscribers.service()
+
     def lines(self):
         self.log.close()
         return list(self._lines)
@@ -190,6 +198,12 @@ def side(request, monkeypatch):
     made = request.param(monkeypatch)
     yield made
     made.close()
+
+
+def test_the_loop_counts_how_often_it_has_looked_for_messages(side):
+    before = side.context.reads()
+    side.turn()
+    assert side.context.reads() > before
 
 
 def test_without_a_depth_only_the_newest_counts(side):

@@ -134,10 +134,16 @@ def test_sockets_are_not_looked_at_more_often_than_said(line):
     wait_until(lambda: len(line.near.recv(100, socket.MSG_PEEK)) == 8, "the message to arrive", 10.0)
     clock.now += 0.9 * subscribing.LOOK_PERIOD_S
     hub.service()
-    assert line.got == [b"early"]
+    assert line.got == [b"early"] and hub.reads == 1
     clock.now += 0.2 * subscribing.LOOK_PERIOD_S
     hub.service()
-    assert line.got == [b"early", b"late"]
+    assert line.got == [b"early", b"late"] and hub.reads == 2
+    # Who has hung up sends nothing, which is to be noticed as well.
+    line.connection.end()
+    for number in (3, 4):
+        clock.now += subscribing.LOOK_PERIOD_S
+        hub.service()
+        assert hub.reads == number
 
 
 def test_a_publisher_that_goes_ends_its_connection_and_no_other(hub, line):

@@ -103,6 +103,7 @@ class BaxterPlugin(ModelPlugin):
         self._before = model.read_joints()
         # The joints that were driven to a position last, as the arms and as the model number them.
         self._driven = self._driven_index = None
+        self._reads = None  # the loop's count of them at the last tick
         self._has_started = before is not None
         #: Called in the loop with (side, message, JointCommand or None where it was refused) for each joint command.
         self.command_observers = self._arms.command_observers
@@ -217,6 +218,8 @@ class BaxterPlugin(ModelPlugin):
         self._before = self._model.read_joints()
         arm, measured = self._arm_index, self._baxter.measured
         measured.time_s, measured.position, measured.velocity = time_s, self._felt(), self._before[1][arm]
+        reads = self.context.reads()
+        measured.hears, self._reads = reads != self._reads, reads
         pending = self.context.pending()
         if pending or self._handling.waits:
             self._handling.handle(pending, time_s)

@@ -176,6 +176,24 @@ def test_streams_that_stop_expire_into_a_hold(lab, mode, values, timeout):
     assert np.abs(velocity).max() < 1e-3 and np.ptp(position, axis=0).max() < 1e-4
 
 
+def test_a_stream_expires_only_where_a_command_would_have_been_heard(lab, monkeypatch):
+    """A world that is late reads what has come once for several ticks."""
+    lab.set_timeout(0.02)
+    lab.run(0.01, before=lambda lab: lab.command(VELOCITY, np.full(14, 0.3)))
+    arms, count = lab.plugin._baxter.arms, lab.ros.reads()
+    monkeypatch.setattr(lab.ros, "reads", lambda: count)
+    lab.run(lab.world.time_step_s)
+    lab.run(0.04)
+    assert set(arms.modes("left")) == {VELOCITY}
+    monkeypatch.setattr(lab.ros, "reads", lambda: count + 1)
+    lab.command(VELOCITY, np.full(14, 0.3))
+    lab.run(0.02)
+    assert set(arms.modes("left")) == {VELOCITY}
+    monkeypatch.setattr(lab.ros, "reads", lambda: count + 2)
+    lab.run(lab.world.time_step_s)
+    assert set(arms.modes("left")) == {POSITION}
+
+
 def test_arm_too_heavy_to_brake_in_time_does_not_swing_back(lab):
     """The stretched-out arm turning at full speed overshoots the target of the stop, and then stays there."""
     lab.run(0.4, before=lambda lab: lab.command(VELOCITY, [1.5, 1.5], names=["left_s0", "right_s0"]))

@@ -344,7 +344,8 @@ class Arms:
         if self._is_settled:
             leads = any_beyond(self._reach_rad, points.output, points.output_rate, measured.position, self._dt)
         else:
-            expired = self._modes.expired(measured.time_s)
+            # While nothing is heard, a missing command is not its sender's fault.
+            expired = self._modes.expired(measured.time_s) if measured.hears else None
             if expired is not None:
                 self._hold(expired)
             leads = self._move_set_points()
