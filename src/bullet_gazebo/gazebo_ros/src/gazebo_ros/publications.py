@@ -20,8 +20,9 @@ _CLOCK_BYTES = 8
 MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s]. In a
-# world that is late they always do, and the clock has a message for each such time.
-MOST_AT_ONCE_S = 0.010
+# world that is late they always do, or those of the longer time where they do so anyway; the clock has a message for
+# each such time.
+MOST_AT_ONCE_S, MOST_LATE_AT_ONCE_S = 0.010, 0.020
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
@@ -64,8 +65,9 @@ class Publications:
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
         # Who gets the time less often than each tick sees no difference; commands wait a little longer.
-        most = max(1, int(MOST_AT_ONCE_S * tick_rate + 1e-6))
-        self._simulation.turn_lengths = min(self._clock_divisor, most), most
+        most, most_late = (max(1, int(time_s * tick_rate + 1e-6)) for time_s in (MOST_AT_ONCE_S, MOST_LATE_AT_ONCE_S))
+        usual = min(self._clock_divisor, most)
+        self._simulation.turn_lengths = usual, most if usual < most else most_late
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._contacts_divisor = ticks_between(CONTACTS_RATE, tick_rate)
 

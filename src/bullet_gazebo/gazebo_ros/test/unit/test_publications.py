@@ -48,8 +48,9 @@ class World:
 
 
 @pytest.mark.parametrize(("clock_rate", "step_s", "ticks"), [
-    (500.0, 0.002, (1, 5)), (250.0, 0.002, (2, 5)), (100.0, 0.002, (5, 5)), (50.0, 0.002, (5, 5)),
-    (250.0, 0.001, (4, 10)), (1000.0, 0.001, (1, 10)), (50.0, 0.01, (1, 1)), (20.0, 0.05, (1, 1))])
+    (500.0, 0.002, (1, 5)), (250.0, 0.002, (2, 5)), (100.0, 0.002, (5, 10)), (50.0, 0.002, (5, 10)),
+    (250.0, 0.001, (4, 10)), (1000.0, 0.001, (1, 10)), (100.0, 0.001, (10, 20)), (50.0, 0.01, (1, 2)),
+    (20.0, 0.05, (1, 1))])
 def test_ticks_follow_each_other_at_once_where_the_clock_has_fewer_messages(monkeypatch, clock_rate, step_s, ticks):
     world = World(monkeypatch, factor=1.0, clock_rate=clock_rate)
     world.simulation.step_s = step_s
