@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics that are not read while nobody looks, or less often: several messages at a time, of which the last one counts.
+"""Topics that are not read while nobody looks, or less often.
 
-Each message wakes its thread, and a simulated robot sends hundreds a second: a page's server without a page used 5 % of
-a core for them. A class has many such servers.
+A page's server without a page used 5 % of a core for them. A class has many such servers.
 """
 import time
 
 import rospy
 
+from rospy_limits.rest import Rest
+
 # How long topics are still read when nobody needs them any more: a page that is loaded again finds all as it was [s].
 LINGER_S = 10.0
 # Between two looks at who needs them [s].
 _LOOK_S = 0.1
-# A message that waited for its thread comes in less time than this after the one before it [s].
-_AT_ONCE_S = 0.001
 
 
 class OnDemand:
@@ -43,24 +42,6 @@ class OnDemand:
         while not ends():
             self.look()
             rospy.rostime.wallsleep(_LOOK_S)
-
-
-class Rest:
-    """Callback of a subscription: holds up the thread that reads its topic for ``rest_s`` [s], while ``is_needed()`` is
-    false.
-
-    Not where messages have waited for the thread: they are read to the last one first, so that none becomes old.
-    ``clock``, ``sleep`` are replaceable for tests.
-    """
-
-    def __init__(self, is_needed, rest_s, clock=time.monotonic, sleep=rospy.rostime.wallsleep):
-        self._is_needed, self._rest_s, self._clock, self._sleep = is_needed, rest_s, clock, sleep
-        self._last = clock()
-
-    def __call__(self, _message):
-        if self._clock() - self._last >= _AT_ONCE_S and not self._is_needed():
-            self._sleep(self._rest_s)
-        self._last = self._clock()
 
 
 def rest(topics, is_needed, rest_s):

@@ -1,46 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics that rest while no page is open: no subscriber, or the newest message counts and others get every one."""
+"""Topics that rest while no page is open: no subscriber, or the newest message counts."""
 from types import SimpleNamespace
 
 from lab_web import resting
-from lab_web.resting import LINGER_S, OnDemand, Rest, rest
+from lab_web.resting import LINGER_S, OnDemand, rest
+from rospy_limits.rest import Rest
 
-PERIOD_S, REST_S = 0.01, 0.05
-
-
-class Reader:
-    """A thread that reads messages which come each PERIOD_S, as rospy does: all that wait, one callback each."""
-
-    def __init__(self, needed):
-        self.now, self.reads, self.newest_s = 0.0, 0, 0.0
-        self._rest = Rest(lambda: needed, REST_S, lambda: self.now, self._sleep)
-
-    def _sleep(self, seconds):
-        self.now += seconds
-
-    def run(self, seconds):
-        """Returns the greatest age of a message when its callback has returned [s]."""
-        due, oldest = PERIOD_S, 0.0
-        while self.now < seconds:
-            self.now = max(self.now, due)
-            self.reads += 1
-            while due <= self.now:
-                self._rest(None)
-                oldest = max(oldest, self.now - due)
-                due += PERIOD_S
-        return oldest
-
-
-def test_without_a_page_several_messages_are_read_at_a_time_and_none_becomes_old():
-    reader = Reader(needed=False)
-    assert reader.run(60.0) <= REST_S + PERIOD_S
-    assert reader.reads < 0.4 * 60.0 / PERIOD_S
-
-
-def test_with_a_page_each_message_is_read_as_it_comes():
-    reader = Reader(needed=True)
-    assert reader.run(60.0) == 0.0
-    assert reader.reads >= 60.0 / PERIOD_S - 1
+REST_S = 0.05
 
 
 def test_a_topic_does_not_rest_where_another_client_has_subscribed_to_it(monkeypatch):

@@ -6,6 +6,7 @@ import math
 import random
 import struct
 import sys
+import threading
 import time
 import unittest
 
@@ -20,7 +21,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
 from baxter_sim_kinematics import Chain
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import beats, wait_until
 from urdf_model import parse_urdf
 from urdf_model.transforms import quaternion_from_matrix
 
@@ -38,6 +39,8 @@ WAIT_S = 90.0
 # twice as long.
 BURST = 1000
 BURST_TIMEOUT_S = 10.0
+# A robot's rate, and longer than a node reads all joint states after a request [s].
+RATE_HZ, SILENCE_S = 100.0, 3.0
 
 
 def pose(position, quaternion, frame="base"):
@@ -158,6 +161,29 @@ class PositionKinematics(unittest.TestCase):
         there = pose(tip[:3, 3], quaternion_from_matrix(tip))
         wait_until(lambda: np.allclose(self.ask("left", [there]).joints[0].position, last, atol=1e-5),
                    "the last of the burst to be the seed", BURST_TIMEOUT_S)
+
+    def test_first_request_after_a_silence_has_the_state_of_its_moment(self):
+        self.addCleanup(self.say_current)
+        stamp, over = 100.0, threading.Event()
+        said = [stamp]
+
+        def publish():
+            for _ in beats(RATE_HZ, over.is_set):
+                self.say(CURRENT, said[0] + 1.0 / RATE_HZ)
+                said[0] += 1.0 / RATE_HZ
+
+        publisher = threading.Thread(target=publish)
+        publisher.start()
+        try:
+            for _ in range(3):
+                until = said[0] + SILENCE_S
+                wait_until(lambda until=until: said[0] >= until, "a silence", WAIT_S)
+                before = said[0]
+                answer = self.ask("left", [pose(*LAB_POSE)])
+                self.assertGreaterEqual(answer.joints[0].header.stamp.to_sec(), before - 3.0 / RATE_HZ)
+        finally:
+            over.set()
+            publisher.join()
 
     def test_right_arm_without_joint_states_starts_at_neutral_and_says_so(self):
         neutral = self.chains["right"].fk(NEUTRAL)
