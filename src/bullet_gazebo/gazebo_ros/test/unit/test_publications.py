@@ -75,9 +75,15 @@ def test_longer_turns_of_a_late_world_are_told_once(monkeypatch):
     world.run(3.0)
     assert lines == []
     world.simulation.ticks_at_once = 5
-    world.run(3.0)
+    world.run(35.0)
+    assert lines == [], "a lab that starts is late for as long"
+    world.simulation.ticks_at_once = 1
+    world.run(100.0)
+    assert lines == []
+    world.simulation.ticks_at_once = 5
+    world.run(20.0)
     world.simulation.ticks_at_once = 10
-    world.run(3.0)
+    world.run(100.0)
     line, = lines
     assert "100 messages a second" in line and "10 ms" in line
 
