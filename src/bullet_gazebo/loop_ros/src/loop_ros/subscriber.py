@@ -116,7 +116,8 @@ class Connection:
 class SubscriberHub:
     """Reads all connections of the loop's subscriptions, once per turn.
 
-    ``reads``: how often it has done so.
+    ``reads``: how often it was asked to. It counts also where it left the sockets alone because the last look was too
+    near: what follows from the number must not depend on the wall clock.
     """
 
     def __init__(self, clock=time.perf_counter):
@@ -138,13 +139,13 @@ class SubscriberHub:
 
     def service(self):
         """Loop thread: deliver the messages that have arrived. Never waits."""
+        self.reads += 1
         if self._new:
             self._take_new()
         now = self._clock()
         if now - self._looked_at < LOOK_PERIOD_S:
             return
         self._looked_at = now
-        self.reads += 1
         if not self._connections or _poll(self._entries, len(self._connections), 0) <= 0:
             return
         ready = [connection for connection, entry in zip(self._connections, self._entries, strict=True)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The frames of a robot's links as messages of /tf, from the positions of its joints. ROS-free."""
 import struct
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,6 +9,9 @@ from urdf_model.transforms import quaternion_from_matrix
 _HEAD = "I"  # number of transforms, or length of a text
 _STAMPED = "III"  # sequence, seconds, nanoseconds
 _POSE = "7d"  # translation, quaternion x y z w
+# Sets of joints that are remembered: a robot has few, and who sends other names in each message must not fill the
+# memory.
+_MOST_SETS = 8
 
 
 class JointFrames:
@@ -30,9 +32,7 @@ class JointFrames:
         names = tuple(names)
         group = self._groups.get(names)
         if group is None:
-            # One at a time: who sends other names in each message must not fill the memory.
-            self._groups = {names: self._group(names)}
-            group = self._groups[names]
+            group = _remembered(self._groups, names, self._group(names))
         return group.packed(np.asarray(positions, dtype=float), time_ns)
 
     def fixed(self, time_ns):
@@ -85,16 +85,26 @@ class _Group:
         return self._layout.pack(*fields)
 
 
-@dataclass
 class Due:
-    """Which joint states are sent on, at ``period_ns`` [ns] at least from each other."""
+    """Which joint states are sent on, at ``period_ns`` [ns] at least from the last one of the same joints: the fingers
+    may come in a message of their own."""
 
-    period_ns: int
-    last_ns: int | None = None
+    def __init__(self, period_ns):
+        self._period_ns = period_ns
+        self._last_ns = {}
 
-    def __call__(self, time_ns):
-        """Whether the state of this time [ns] is due. Time may have gone back."""
-        if self.last_ns is not None and self.last_ns <= time_ns < self.last_ns + self.period_ns:
+    def __call__(self, names, time_ns):
+        """Whether the state of the joints ``names`` at this time [ns] is due. Time may have gone back."""
+        names = tuple(names)
+        last_ns = self._last_ns.get(names)
+        if last_ns is not None and last_ns <= time_ns < last_ns + self._period_ns:
             return False
-        self.last_ns = time_ns
+        _remembered(self._last_ns, names, time_ns)
         return True
+
+
+def _remembered(table, names, value):
+    if names not in table and len(table) >= _MOST_SETS:
+        table.clear()
+    table[names] = value
+    return value

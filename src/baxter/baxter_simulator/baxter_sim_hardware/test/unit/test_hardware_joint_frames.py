@@ -81,4 +81,19 @@ def test_every_link_of_baxter_has_one_frame(robot_file):
 
 def test_states_are_sent_on_at_the_rate_and_again_when_time_goes_back():
     due = Due(20)
-    assert [time for time in (5, 6, 24, 25, 40, 45, 90, 3, 4, 23) if due(time)] == [5, 25, 45, 90, 3, 23]
+    assert [time for time in (5, 6, 24, 25, 40, 45, 90, 3, 4, 23) if due(["a"], time)] == [5, 25, 45, 90, 3, 23]
+
+
+def test_fingers_in_a_message_of_their_own_are_sent_on_as_often_as_the_arms():
+    due = Due(20)
+    sent = [(names, time) for time in (0, 10, 20, 30, 40) for names in ("arms", "fingers") if due([names], time)]
+    assert sent == [(names, time) for time in (0, 20, 40) for names in ("arms", "fingers")]
+
+
+def test_who_sends_other_names_in_each_message_does_not_fill_the_memory(robot):
+    frames, due = JointFrames(robot), Due(20)
+    for number in range(1000):
+        names = ["slides", "x%d" % number]
+        assert due(names, 0)
+        assert read(frames.moving(names, [0.2, 0.0], TIME_NS)).keys() == {("b", "c")}
+    assert len(due._last_ns) < 10 and len(frames._groups) < 10

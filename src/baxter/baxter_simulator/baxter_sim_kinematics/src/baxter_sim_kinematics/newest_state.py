@@ -40,11 +40,14 @@ class NewestState:
         self._read = None, None  # the last result, and the message that it came from
 
     def take(self, message):
+        """Returns whether it has all of the joints, and so is the newest state now."""
         stamp = _STAMP.unpack_from(message.serialized)
         if stamp < self._stamp:
             self._time_went_back()
-        if all(name in message.serialized for name in self._needed):
+        counts = all(name in message.serialized for name in self._needed)
+        if counts:
             self._serialized, self._stamp = message.serialized, stamp
+        return counts
 
     def read(self):
         """Return the newest JointState, or None if there is none yet. Raises genpy.DeserializationError."""

@@ -166,10 +166,14 @@ class PositionKinematics(unittest.TestCase):
         self.addCleanup(self.say_current)
         stamp, over = 100.0, threading.Event()
         said = [stamp]
+        # As the physical robot, which has a message of their own for them.
+        fingers = JointState(name=["l_gripper_l_finger_joint"], position=[0.0])
 
         def publish():
             for _ in beats(RATE_HZ, over.is_set):
                 self.say(CURRENT, said[0] + 1.0 / RATE_HZ)
+                fingers.header.stamp = rospy.Time(said[0] + 1.0 / RATE_HZ)
+                self.joint_states.publish(fingers)
                 said[0] += 1.0 / RATE_HZ
 
         publisher = threading.Thread(target=publish)
