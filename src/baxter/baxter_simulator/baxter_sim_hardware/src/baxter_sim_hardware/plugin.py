@@ -44,7 +44,7 @@ from .topics.status import StatusTopics
 from .topics.warnings import Warnings
 
 PARAMETERS = "/baxter_sim_hardware/"
-QUEUE_DEPTH = 200  # messages between two ticks: 10 ms, the longest turn, of a client that writes at 20 kHz
+QUEUE_DEPTH = 400  # messages between two ticks: 20 ms, the longest turn, of a client that writes at 20 kHz
 
 
 class BaxterPlugin(ModelPlugin):
@@ -103,7 +103,7 @@ class BaxterPlugin(ModelPlugin):
         self._before = model.read_joints()
         # The joints that were driven to a position last, as the arms and as the model number them.
         self._driven = self._driven_index = None
-        self._reads = None  # the loop's count of them at the last tick
+        self._reads, self._read_s = None, 0.0  # the loop's count of reads at the last tick; the time of the last [s]
         self._has_started = before is not None
         #: Called in the loop with (side, message, JointCommand or None where it was refused) for each joint command.
         self.command_observers = self._arms.command_observers
@@ -218,8 +218,7 @@ class BaxterPlugin(ModelPlugin):
         self._before = self._model.read_joints()
         arm, measured = self._arm_index, self._baxter.measured
         measured.time_s, measured.position, measured.velocity = time_s, self._felt(), self._before[1][arm]
-        reads = self.context.reads()
-        measured.hears, self._reads = reads != self._reads, reads
+        measured.missing_s = self._missing(time_s)
         pending = self.context.pending()
         if pending or self._handling.waits:
             self._handling.handle(pending, time_s)
@@ -242,6 +241,15 @@ class BaxterPlugin(ModelPlugin):
             self._model.drive_effort(arm[drives.effort_driven], drives.exerted)
         self._head.update()
         self._grippers.update(self._before)
+
+    def _missing(self, time_s):
+        """`Measured.missing_s`. Where several ticks follow each other at once, a command that comes during them is read
+        after the last one: it is missing only if it is not there one read later, either."""
+        reads = self.context.reads()
+        if reads == self._reads:
+            return None
+        before_s, self._reads, self._read_s = self._read_s, reads, time_s
+        return before_s if 1.5 * self._dt < time_s - before_s else time_s
 
     def publish(self, time_s):
         self._procedures.update(time_s, self._feel_torques)

@@ -189,9 +189,10 @@ def test_a_stream_expires_only_where_a_command_would_have_been_heard(lab, monkey
     lab.command(VELOCITY, np.full(14, 0.3))
     lab.run(0.02)
     assert set(arms.modes("left")) == {VELOCITY}
-    monkeypatch.setattr(lab.ros, "reads", lambda: count + 2)
-    lab.run(lab.world.time_step_s)
-    assert set(arms.modes("left")) == {POSITION}
+    for number, mode in ((2, VELOCITY), (3, POSITION)):
+        monkeypatch.setattr(lab.ros, "reads", lambda number=number: count + number)
+        lab.run(0.02)
+        assert set(arms.modes("left")) == {mode}, "a command that came just after a read is there at the next one"
 
 
 def test_arm_too_heavy_to_brake_in_time_does_not_swing_back(lab):

@@ -344,8 +344,7 @@ class Arms:
         if self._is_settled:
             leads = any_beyond(self._reach_rad, points.output, points.output_rate, measured.position, self._dt)
         else:
-            # While nothing is heard, a missing command is not its sender's fault.
-            expired = self._modes.expired(measured.time_s) if measured.hears else None
+            expired = None if measured.missing_s is None else self._modes.expired(measured.missing_s)
             if expired is not None:
                 self._hold(expired)
             leads = self._move_set_points()

@@ -6,18 +6,19 @@ import numpy as np
 class Measured:
     """State of the arms' n joints. One object; each tick renews its values.
 
-    time_s: [s]; hears: whether commands have been read since the last tick; position: (n,) [rad]; velocity: (n,)
-    [rad/s]; gravity: (n,) [Nm] the torque that balances gravity.
+    time_s: [s]; missing_s: [s] the time at which a command that is missing now must have come, or None where none was
+    read since the last tick; position: (n,) [rad]; velocity: (n,) [rad/s]; gravity: (n,) [Nm] the torque that balances
+    gravity.
     dynamics: function (velocity (n,) [rad/s]) -> (inertia (n, n) [kg m^2], torque (n,) [Nm] that keeps the joints at
     that velocity), at the present position.
     """
 
-    __slots__ = ("time_s", "hears", "position", "velocity", "gravity", "dynamics")
+    __slots__ = ("time_s", "missing_s", "position", "velocity", "gravity", "dynamics")
 
     def __init__(self, position, dynamics):
         """At rest in ``position`` at time 0."""
         self.dynamics = dynamics
-        self.time_s, self.hears = 0.0, True
+        self.time_s = self.missing_s = 0.0
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position)
         self.gravity = np.zeros_like(self.position)
