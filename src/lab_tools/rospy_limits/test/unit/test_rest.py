@@ -11,7 +11,7 @@ class Reader:
     """A thread that reads messages which come each PERIOD_S, as rospy does: all that wait, one callback each."""
 
     def __init__(self, needed):
-        self.now, self.reads, self.newest_s = 0.0, 0, 0.0
+        self.now, self.reads = 0.0, 0
         self._rest = Rest(lambda: needed, REST_S, lambda: self.now, self._sleep)
 
     def _sleep(self, seconds):
