@@ -156,7 +156,11 @@ def _build(log, cleanup, line):
     ros.flush()
 
     diagnostics = Diagnostics(simulation, faults, ros)
-    parts = (("sending messages", publisher_hub.service), ("reading messages", subscriber_hub.service),
+
+    def send():
+        publisher_hub.service(is_paused=not simulation.is_stepping)
+
+    parts = (("sending messages", send), ("reading messages", subscriber_hub.service),
              ("publishing", publications.on_turn), ("services under /gazebo", services.take_commands))
 
     def on_turn():

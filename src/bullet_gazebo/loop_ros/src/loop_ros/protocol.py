@@ -13,6 +13,9 @@ class Publisher(Protocol):
 
     #: Whether a subscriber is connected. Callers check it before they make a message.
     has_listeners: bool
+    #: Function without arguments -> messages, or None. While the world is paused, when nothing else is published, who
+    #: connects gets these: the state that the world is in.
+    present: object
 
     def publish(self, message):
         """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` if it cannot be serialized."""

@@ -132,6 +132,9 @@ class LoopPublisher:
         #: True while a subscriber is connected, as of the hub's last turn. After the last one has gone, it stays True
         #: until the next message. A plain attribute for speed: a robot checks a hundred topics per tick.
         self.has_listeners = False
+        #: See :class:`loop_ros.protocol.Publisher`.
+        self.present = None
+        self._unserved = []
         self._hub = hub
         self._keep_last = latch or greet
         self._has_header = getattr(msg_class, "_has_header", False)
@@ -177,25 +180,30 @@ class LoopPublisher:
                     self._hub.backlog.add(self)
             if dead:
                 self._bury(dead)
+            if self._unserved:
+                self._unserved = []
         if self._keep_last:
             self._last = data
 
     def greet(self):
-        """Send the last message to connections made after it."""
+        """Send the last message to connections made after it. Returns True where :meth:`tell_present` is for them."""
         impl = self._impl
         if impl is None or impl.connections is self._known:
+            return False
+        newcomers = self._adopt(impl.connections)
+        if self._last is not None:
+            self._send_to(newcomers, self._last)
+        elif self.present is not None:
+            self._unserved += newcomers
+        return bool(self._unserved)
+
+    def tell_present(self):
+        """Send the messages of ``present`` to the connections that no message has been sent to yet."""
+        newcomers, self._unserved = self._unserved, []
+        if self.present is None or not any(peer in self._peers for peer in newcomers):
             return
-        dead = []
-        for peer in self._adopt(impl.connections):
-            if self._last is None:
-                continue
-            try:
-                peer.send(self._last)
-            except OSError:
-                dead.append(peer)
-            if peer.has_rest:
-                self._hub.backlog.add(self)
-        self._bury(dead)
+        for message in self.present():
+            self._send_to([peer for peer in newcomers if peer in self._peers], self._serialize(message))
 
     def flush(self):
         """Send the rests of earlier messages. Returns True while a rest is still pending."""
@@ -214,7 +222,7 @@ class LoopPublisher:
             return
         self.is_closed = True
         self._impl = self._known = None
-        self._peers = []
+        self._peers, self._unserved, self.present = [], [], None
         self.has_listeners = False
         self._hub.backlog.discard(self)
         self._release()
@@ -226,6 +234,17 @@ class LoopPublisher:
         self._known = connections
         self.has_listeners = bool(connections)
         return [peer for peer in self._peers if id(peer.transport) not in known]
+
+    def _send_to(self, peers, data):
+        dead = []
+        for peer in peers:
+            try:
+                peer.send(data)
+            except OSError:
+                dead.append(peer)
+            if peer.has_rest:
+                self._hub.backlog.add(self)
+        self._bury(dead)
 
     def _bury(self, dead):
         for peer in dead:
@@ -256,11 +275,18 @@ class PublisherHub:
         self.attention = collections.deque()
         #: Publishers with parts of messages still to send; loop thread only.
         self.backlog = set()
+        self._unserved = set()  # publishers with subscribers that only get what comes next, or the present state
 
-    def service(self):
-        """Send latched messages to new subscribers, and continue messages that were sent in part."""
+    def service(self, is_paused=False):
+        """Send latched messages to new subscribers, and the present state in a paused world; continue messages that
+        were sent in part."""
         while self.attention:
-            self.attention.popleft().greet()
+            publisher = self.attention.popleft()
+            if publisher.greet():
+                self._unserved.add(publisher)
+        if is_paused:
+            while self._unserved:
+                self._unserved.pop().tell_present()
         if self.backlog:
             for publisher in list(self.backlog):
                 if not publisher.flush():

@@ -162,6 +162,7 @@ class FakePublisher:
 
     def __init__(self, sent, msg_class, keeps_last, publishers, topic):
         self.topic, self.msg_class, self.is_closed = topic, msg_class, False
+        self.present = None
         self.keeps_last = keeps_last
         self._sent = sent
         self._publishers = publishers

@@ -244,6 +244,75 @@ def test_joiners_of_an_ordinary_topic_get_nothing_old(hub, impl):
     assert late.received() == []
 
 
+def present(hub, impl):
+    """A publisher of the state of a world, and what it was asked for."""
+    publisher, asked = make(hub, impl, FakeStamped), []
+
+    def state():
+        asked.append(len(asked))
+        return FakeStamped(), FakeStamped()
+
+    publisher.present = state
+    return publisher, asked
+
+
+def test_who_joins_a_paused_world_gets_its_state_once(hub, impl):
+    publisher, asked = present(hub, impl)
+    early = impl.connect()
+    publisher.publish(FakeStamped())
+    late = impl.connect()
+    hub.attention.append(publisher)
+    for _ in range(3):
+        hub.service(is_paused=True)
+    assert early.received() == [b"seq 1"] and late.received() == [b"seq 2", b"seq 3"] and asked == [0]
+    assert publisher.has_listeners
+
+
+def test_who_joins_before_the_pause_gets_the_state_at_the_pause_if_nothing_has_come(hub, impl):
+    publisher, asked = present(hub, impl)
+    peer = impl.connect()
+    hub.attention.append(publisher)
+    hub.service()
+    assert peer.received() == [] and asked == []
+    hub.service(is_paused=True)
+    assert peer.received() == [b"seq 1", b"seq 2"]
+    served = impl.connect()
+    hub.attention.append(publisher)
+    hub.service()
+    publisher.publish(FakeStamped())
+    hub.service(is_paused=True)
+    assert served.received() == [b"seq 3"] and asked == [0]
+
+
+def test_who_has_left_before_the_pause_costs_nothing(hub, impl):
+    publisher, asked = present(hub, impl)
+    gone = impl.connect()
+    hub.attention.append(publisher)
+    hub.service()
+    gone.close()
+    hub.attention.append(publisher)
+    hub.service()
+    hub.service(is_paused=True)
+    assert asked == []
+
+
+def test_a_dead_peer_and_a_state_that_cannot_be_made_leave_the_others(hub, impl):
+    publisher, _ = present(hub, impl)
+    other = make(hub, FakeImpl())
+    other.present = lambda: 1 / 0
+    broken, well = impl.connect(), impl.connect()
+    other._impl.connect()
+    hub.attention.extend([publisher, other])
+    hub.service()
+    broken.socket.close()
+    with contextlib.suppress(ZeroDivisionError):
+        hub.service(is_paused=True)
+    hub.service(is_paused=True)
+    assert well.received() == [b"seq 1", b"seq 2"]
+    publisher.publish(FakeStamped())
+    assert well.received() == [b"seq 3"] and not other._unserved
+
+
 def test_headers_are_numbered_from_one(hub, impl):
     publisher, peer = make(hub, impl, FakeStamped), impl.connect()
     for _ in range(3):
