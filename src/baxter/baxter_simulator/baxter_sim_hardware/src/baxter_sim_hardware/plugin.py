@@ -189,7 +189,7 @@ class BaxterPlugin(ModelPlugin):
         if "states" in self._effects:
             rate = max(rate, effects.positive(self._numbers["states"], "least_rate", "joint_states"))
         self._handling = Handling(self._warnings, None if self._delay is None else self._delay_of)
-        self._publishing = Publishing(self._snapshot, context.survived)
+        self._publishing = Publishing(self._snapshot, context.survived, lambda: context.world.time_s)
         if self._delay is not None:
             self._publishing.delay((interface.JOINT_STATE_RATE,), lambda: self._delay_of(0))
         for row in sorted(interface.TOPICS, key=lambda row: row.key == "started"):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Unexpected exceptions in the robot's code, at every place where a message or a tick enters."""
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -131,6 +132,30 @@ def test_a_message_that_cannot_be_made_leaves_the_others(loop):
         assert [where for where, _ in loop.lab.faults] == ["publishing " + name]
         assert [name for name in OUTPUTS if not loop.lab.publishers[name].messages] == [topic]
     assert loop.hosted.failures == 0
+
+
+def test_who_subscribes_in_a_paused_world_gets_the_state_also_before_the_first_tick(make_lab):
+    lab = make_lab()
+    for ticks in range(2):
+        for topic in OUTPUTS:
+            publisher = lab.publishers[topic]
+            publisher.has_listeners = True
+            message, = publisher.present()
+            publisher.publish(message)
+            assert isinstance(publisher.messages[-1], publisher.msg_class), topic
+        states = lab.publishers["joint_states"].messages[-1]
+        assert states.header.stamp.to_sec() == pytest.approx(lab.world.time_s) and lab.world.time_s == ticks * TICK_S
+        assert states.position == pytest.approx(lab.model.read_joints()[0][lab.model.index(states.name)])
+        lab.run(TICK_S)
+    assert lab.faults == []
+
+
+def test_a_state_that_cannot_be_made_is_counted_and_left_out(loop):
+    publisher = loop.lab.publishers["joint_states"]
+    publisher.present = partial(publisher.present.func, fail, *publisher.present.args[1:])
+    assert publisher.present() == ()
+    (where, error), = loop.lab.faults
+    assert where == "publishing " + publisher.topic and isinstance(error, RecursionError)
 
 
 @pytest.mark.parametrize("mode, values", [(1, 0.3), (2, 0.5), (3, 3.0), (4, 0.01)])

@@ -2,6 +2,7 @@
 """Publish each of the robot's topics at its rate, and none without a subscriber."""
 import itertools
 import math
+from functools import partial
 
 from baxter_sim_hardware.message_delay import Late
 from sim_time.pace import Schedule
@@ -10,18 +11,20 @@ from sim_time.pace import Schedule
 class Publishing:
     """Topics by rate."""
 
-    def __init__(self, take_snapshot, survived):
-        """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception)."""
-        self._take_snapshot, self._survived = take_snapshot, survived
+    def __init__(self, take_snapshot, survived, now_s):
+        """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception); now_s:
+        function -> simulation time [s]."""
+        self._take_snapshot, self._survived, self._now_s = take_snapshot, survived, now_s
         self._groups = {}  # rate of the table's rows -> (Schedule, [(function, component, publisher)])
         self._late, self._delay_of, self._delayed = Late(), None, ()
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due
 
     def add(self, rate, hz, function, component, publisher):
-        """Publish ``function(time_s, component, snapshot)``, a message or a tuple of them, at `hz`. rate: the row's,
-        which names the group."""
+        """Publish ``function(time_s, component, snapshot)``, a message or a tuple of them, at `hz`, and in a paused
+        world once for a new subscriber. rate: the row's, which names the group."""
         group = self._groups.setdefault(rate, (Schedule(hz), []))[1]
         group.append((function, component, publisher))
+        publisher.present = partial(self._present, function, component, publisher)
 
     def delay(self, rates, delay_of):
         """The messages of groups `rates` take delay_of() [s], asked at each time that one is due, until they are
@@ -54,9 +57,8 @@ class Publishing:
                 if snapshot is None:
                     snapshot = self._take_snapshot()
                 try:
-                    messages = function(time_s, component, snapshot)
                     ready += [(publisher, message)
-                              for message in (messages if isinstance(messages, tuple) else (messages,))]
+                              for message in _messages(function(time_s, component, snapshot))]
                 except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
                     self._survived("publishing %s" % publisher.topic, error)
             if rate in self._delayed:
@@ -67,9 +69,20 @@ class Publishing:
         self._idle_until_s = min(schedule.next_s for schedule, _ in self._groups.values())
         return True
 
+    def _present(self, function, component, publisher):
+        try:
+            return _messages(function(self._now_s(), component, self._take_snapshot()))
+        except Exception as error:  # noqa: BLE001  (as above)
+            self._survived("publishing %s" % publisher.topic, error)
+            return ()
+
     def _send(self, groups):
         for publisher, message in itertools.chain.from_iterable(groups):
             try:
                 publisher.publish(message)
             except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
                 self._survived("publishing %s" % publisher.topic, error)
+
+
+def _messages(made):
+    return made if isinstance(made, tuple) else (made,)
