@@ -1,71 +1,103 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics that nobody needs: the newest message counts; who needs them gets every one, at once."""
+"""Topics that are subscribed to on demand."""
 import threading
 
-from rospy_limits.rest import Demand, Rest
+import pytest
 
-PERIOD_S, REST_S, LINGER_S = 0.01, 0.05, 5.0
+from rospy_limits.rest import Demand
+
+LINGER_S = 5.0
 
 
-class Reader:
-    """A thread that reads messages which come each PERIOD_S, as rospy does: all that wait, one callback each."""
+class Lab:
+    """A Demand on a clock of its own."""
 
-    def __init__(self, needed):
-        self.now, self.reads = 0.0, 0
-        self._rest = Rest(lambda: needed, REST_S, lambda: self.now, self._sleep)
+    def __init__(self):
+        self.now, self.needed, self.calls, self._timers = 100.0, False, [], []
+        self.fails = False
+        self.demand = Demand(self._listen, lambda: self.calls.append("rest"), LINGER_S, lambda: self.needed,
+                             lambda: self.now, self._timer)
 
-    def _sleep(self, seconds):
-        self.now += seconds
+    def _listen(self):
+        if self.fails:
+            raise OSError("no master")
+        self.calls.append("listen")
+
+    def _timer(self, seconds, function):
+        lab, due = self, self.now + seconds
+
+        class Timer:
+            def start(self):
+                lab._timers.append((due, function))
+
+        return Timer()
 
     def run(self, seconds):
-        """Returns the greatest age of a message when its callback has returned [s]."""
-        due, oldest = PERIOD_S, 0.0
-        while self.now < seconds:
-            self.now = max(self.now, due)
-            self.reads += 1
-            while due <= self.now:
-                self._rest(None)
-                oldest = max(oldest, self.now - due)
-                due += PERIOD_S
-        return oldest
+        end = self.now + seconds
+        while due := [timer for timer in self._timers if timer[0] <= end]:
+            first = min(due, key=lambda timer: timer[0])
+            self._timers.remove(first)
+            self.now = first[0]
+            first[1]()
+        self.now = end
+        return self.calls
 
 
-def test_several_messages_are_read_at_a_time_and_none_becomes_old():
-    reader = Reader(needed=False)
-    assert reader.run(60.0) <= REST_S + PERIOD_S
-    assert reader.reads < 0.4 * 60.0 / PERIOD_S
+@pytest.fixture
+def lab():
+    return Lab()
 
 
-def test_where_it_is_needed_each_message_is_read_as_it_comes():
-    reader = Reader(needed=True)
-    assert reader.run(60.0) == 0.0
-    assert reader.reads >= 60.0 / PERIOD_S - 1
+def test_nobody_needs_it_at_first(lab):
+    assert lab.run(1000.0) == []
 
 
-def test_a_topic_is_needed_from_the_first_request_until_some_time_after_the_last():
-    now = [100.0]
-    demand = Demand(LINGER_S, lambda: now[0])
-    assert not demand.is_needed()
-    assert demand.need()
-    for _ in range(3):
-        now[0] += 0.9 * LINGER_S
-        assert demand.is_needed()
-        assert not demand.need()
-    now[0] += 1.1 * LINGER_S
-    assert not demand.is_needed()
-    assert demand.need()
+def test_it_listens_from_the_first_need_until_some_time_after_the_last(lab):
+    for _ in range(4):
+        lab.demand.need()
+        assert lab.run(0.9 * LINGER_S) == ["listen"]
+    assert lab.run(0.2 * LINGER_S) == ["listen", "rest"]
+    assert lab.run(1000.0) == ["listen", "rest"]
+    lab.demand.need()
+    assert lab.calls == ["listen", "rest", "listen"]
 
 
-def test_a_sleeping_thread_wakes_when_it_is_needed_and_does_not_sleep_again():
-    demand, slept = Demand(1000.0), []
+def test_it_does_not_rest_while_it_is_needed(lab):
+    lab.needed = True
+    lab.demand.need()
+    assert lab.run(1000.0) == ["listen"]
+    lab.needed = False
+    assert lab.run(2.0 * LINGER_S) == ["listen", "rest"]
 
-    def read():
-        for _ in range(2):
-            demand.sleep(1000.0)
-            slept.append(True)
 
-    thread = threading.Thread(target=read, daemon=True)
-    thread.start()
-    assert demand.need()
-    thread.join(60.0)
-    assert len(slept) == 2
+def test_a_failure_is_told_and_the_next_need_tries_again(lab):
+    lab.fails = True
+    with pytest.raises(OSError, match="no master"):
+        lab.demand.need()
+    lab.fails = False
+    lab.demand.need()
+    assert lab.run(LINGER_S) == ["listen", "rest"]
+
+
+def test_threads_that_need_it_at_once_find_it_listening():
+    calls, ready = [], threading.Barrier(8)
+    demand = Demand(lambda: calls.append("listen"), lambda: calls.append("rest"), 1000.0)
+    found = []
+
+    def need():
+        ready.wait(60.0)
+        demand.need()
+        found.append(list(calls))
+
+    threads = [threading.Thread(target=need) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60.0)
+    assert found == [["listen"]] * 8
+
+
+def test_it_rests_by_itself():
+    rested = threading.Event()
+    Demand(lambda: None, rested.set, 0.02).need()
+    assert rested.wait(60.0)

@@ -102,6 +102,10 @@ class Due:
         _remembered(self._last_ns, names, time_ns)
         return True
 
+    def forget(self):
+        """The next state of any joints is due."""
+        self._last_ns.clear()
+
 
 def _remembered(table, names, value):
     if names not in table and len(table) >= _MOST_SETS:

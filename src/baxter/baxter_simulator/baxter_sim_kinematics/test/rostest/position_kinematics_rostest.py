@@ -39,8 +39,8 @@ WAIT_S = 90.0
 # twice as long.
 BURST = 1000
 BURST_TIMEOUT_S = 10.0
-# A robot's rate, and longer than a node reads all joint states after a request [s].
-RATE_HZ, SILENCE_S = 100.0, 3.0
+# A robot's rate, and longer than a node listens to joint states after a request [s].
+RATE_HZ, SILENCE_S = 100.0, 7.0
 
 
 def pose(position, quaternion, frame="base"):
@@ -79,7 +79,6 @@ class PositionKinematics(unittest.TestCase):
         cls.broadcaster.sendTransform(shelf)
         # Only the left arm's joints are ever published: the right arm stands for a robot that has not published yet.
         cls.joint_states = rospy.Publisher("/robot/joint_states", JointState, queue_size=BURST, latch=True)
-        wait_until(lambda: cls.joint_states.get_num_connections() == 2, "both nodes to subscribe to joint states")
         cls.say_current()
 
     @classmethod

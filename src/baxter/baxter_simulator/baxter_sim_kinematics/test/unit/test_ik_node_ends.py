@@ -70,7 +70,7 @@ def is_pending(pid, number):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("call, subject", [
-    ("registerPublisher", "/rosout"), ("registerSubscriber", "/robot/joint_states"),
+    ("registerPublisher", "/rosout"), ("registerPublisher", "/ExternalTools/left/PositionKinematicsNode/IKReport"),
     ("registerService", "/ExternalTools/left/PositionKinematicsNode/IKService")])
 def test_a_signal_during_a_registration_ends_the_node(master, call, subject, number):
     reached = threading.Event()
