@@ -18,7 +18,6 @@ from urllib.parse import quote
 import rosgraph
 import rospkg
 import rospy
-from rosgraph_msgs.msg import Clock
 
 from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
@@ -30,7 +29,7 @@ from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
-from lab_web.loops import lasting
+from lab_web.loops import attended, lasting
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
 from lab_web.overlay import Overlay
@@ -38,11 +37,12 @@ from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
-from lab_web.resting import OnDemand, rest
+from lab_web.resting import OnDemand
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
 from lab_web.sights import Sights
+from lab_web.sim_clock import SimClock
 from lab_web.simulation import Simulation
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
@@ -64,10 +64,8 @@ from world_picture.snapshot import SnapshotError
 FIRST_PORT = 8090
 _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
-#: while nobody needs them.
-_POSES_S, _LOOK_S, _LOOK_UNSEEN_S = 0.05, 1.0, 5.0
-# Between reads of the robot's topics without a page, and of the clock without any client [s].
-_REST_S, _REST_OF_CLOCK_S = 0.25, 0.25
+#: while nobody needs them, and how often it is looked whether somebody does.
+_POSES_S, _LOOK_S, _LOOK_UNSEEN_S, _UNSEEN_S = 0.05, 1.0, 5.0, 0.25
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 # How long the comparison with a physical robot waits for the messages of some topics [s].
@@ -145,7 +143,7 @@ def serve(options, page, libraries):
     return_large_blocks()
     limit_ports()
     end_on_signals()
-    rospy.init_node("lab_web", disable_signals=True)
+    rospy.init_node("lab_web", disable_signals=True, disable_rostime=True)
     loop_thread = LoopThread("lab_web")
     access = Access({tokens[0]: True, tokens[1]: False})
     pages = Pages(access, loop_thread)
@@ -157,12 +155,16 @@ def serve(options, page, libraries):
     def is_needed():
         return len(pages) > 0 or equipment.recorder.is_running
 
-    rest(robot.topics, is_needed, _REST_S)
     graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
-    clients = Clients(bridge, loop_thread, SocketOptions(access))
-    rest({"/clock": Clock}, lambda: is_needed() or len(clients) > 0, _REST_OF_CLOCK_S)
+    clock = SimClock(lambda: is_needed() or len(clients) > 0)
+    clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: connected and clock.need())
+
+    def listen():
+        robot.listen()
+        clock.need()
+
     notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
                                       *_notebook_routes(notebooks, access),
@@ -172,8 +174,7 @@ def serve(options, page, libraries):
     except OSError as error:
         raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
-        ("the grippers", OnDemand(robot.listen, robot.rest, is_needed).run), ("the arms", pages.lab.run),
-        *equipment.loops.items(), ("the 3D view", partial(_follow, pages)))]
+        ("the robot's states", OnDemand(listen, robot.rest, is_needed).run), *equipment.loops.items())]
     for thread in threads:
         thread.start()
     address = ""
@@ -268,8 +269,11 @@ def _equip(pages, robot, faults):
                         **simulation.operations()}.items():
         lab.add(name, serve)
     return _Equipment(hands, simulation, recorder, guard, sights, {
-        "points and frames": overlay.run,
-        "the hands": hands.run, "errands": errands.run, "plans": plans.run, "comparison": comparisons.run,
+        **{name: attended(pages.present, loop) for name, loop in (
+            ("the arms", lab.run), ("the 3D view", partial(_follow, pages)), ("points and frames", overlay.run),
+            ("the hands", hands.run), ("errands", errands.run), ("plans", plans.run),
+            ("comparison", comparisons.run))},
+        # Those of a page that has gone are released after that.
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
 
@@ -335,7 +339,7 @@ def _watch(robot, equipment, pages, is_needed, ends):
         looked = time.monotonic()
         rospy.rostime.wallsleep(_LOOK_S)
         while not ends() and not is_needed() and time.monotonic() - looked < _LOOK_UNSEEN_S:
-            rospy.rostime.wallsleep(_POSES_S)
+            pages.present.wait(_UNSEEN_S)
 
 
 def _described(robot, equipment, published):
@@ -361,19 +365,18 @@ def _snapshot_folder():
 
 
 def _follow(pages, ends):
-    """Send poses while there are pages; across restarts of the simulator."""
+    """Send poses to the pages; across restarts of the simulator."""
     follower, picture = None, None
     while not ends():
         began = time.monotonic()
-        if len(pages):
-            try:
-                if follower is None or not follower.is_alive:
-                    follower, picture = SceneFollower(_snapshot_folder(), rospy.logwarn), None
-                if follower.follow() or follower.picture is not picture:
-                    picture = follower.picture
-                    pages.show_poses(picture, follower.poses())
-            # No simulator, or it is just starting or ending.
-            except (SnapshotError, OSError, rosgraph.MasterException):
-                follower = None
-                rospy.rostime.wallsleep(_LOOK_S)
+        try:
+            if follower is None or not follower.is_alive:
+                follower, picture = SceneFollower(_snapshot_folder(), rospy.logwarn), None
+            if follower.follow() or follower.picture is not picture:
+                picture = follower.picture
+                pages.show_poses(picture, follower.poses())
+        # No simulator, or it is just starting or ending.
+        except (SnapshotError, OSError, rosgraph.MasterException):
+            follower = None
+            rospy.rostime.wallsleep(_LOOK_S)
         rospy.rostime.wallsleep(max(0.0, _POSES_S - (time.monotonic() - began)))

@@ -55,8 +55,8 @@ class Overlay:
             self.settle()
             self.send_frames()
             time.sleep(max(0.0, FRAMES_S - (self._clock() - began)))
-        for subscription in self._subscriptions.values():
-            subscription.close()
+        while self._subscriptions:
+            self._subscriptions.popitem()[1].close()
 
     def settle(self):
         """Subscribe to the topics that somebody wants, and to no others; one thread calls it."""

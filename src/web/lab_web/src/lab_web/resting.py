@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics that are not read while nobody looks, or less often.
+"""Topics that are not read while nobody looks.
 
 A page's server without a page used 5 % of a core for them. A class has many such servers.
 """
 import time
 
 import rospy
-
-from rospy_limits.rest import Rest
 
 # How long topics are still read when nobody needs them any more: a page that is loaded again finds all as it was [s].
 LINGER_S = 10.0
@@ -42,18 +40,3 @@ class OnDemand:
         while not ends():
             self.look()
             rospy.rostime.wallsleep(_LOOK_S)
-
-
-def rest(topics, is_needed, rest_s):
-    """Let the topics {name: message class} rest while ``is_needed()`` is false and nobody else in this process has
-    subscribed to them since: rospy has one connection and one thread for all subscribers of a topic.
-    """
-    for topic, kind in topics.items():
-        shared = []
-        subscription = rospy.Subscriber(topic, kind, Rest(_need(is_needed, shared), rest_s), queue_size=1).impl
-        shared += [subscription, len(subscription.callbacks)]
-
-
-def _need(is_needed, shared):
-    # rospy may call back before ``shared`` is filled.
-    return lambda: is_needed() or not shared or len(shared[0].callbacks) > shared[1]

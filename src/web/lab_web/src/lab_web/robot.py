@@ -37,8 +37,8 @@ GRIPPER_STEP_PERCENT = 1.0
 
 
 class Baxter:
-    """Subscribes and advertises at once, but to the grippers with :meth:`listen`; what is not known yet is empty.
-    ``told(text)``: an error of a switch."""
+    """Advertises at once, subscribes with :meth:`listen`; what is not known yet is empty. ``told(text)``: an error of a
+    switch."""
 
     def __init__(self, told):
         self._told = told
@@ -62,28 +62,27 @@ class Baxter:
         self._head = rospy.Publisher("/robot/head/command_head_pan", HeadPanCommand, queue_size=1)
         self._hands = {side: rospy.Publisher("/robot/end_effector/%s_gripper/command" % side, EndEffectorCommand,
                                              queue_size=10) for side in SIDES}
-        rospy.Subscriber("/robot/joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("/robot/state", AssemblyState, self._on_state, queue_size=1, tcp_nodelay=True)
-        #: What it always reads: {topic: message class}.
-        self.topics = {"/robot/joint_states": JointState, "/robot/state": AssemblyState}
-        self._of_grippers = []
+        self._subscriptions = []
 
     def listen(self):
-        """Subscribe to the grippers, whose states take a simulator longer than all else here. Called by one thread, as
+        """Subscribe to the robot's states, which a simulator does not make for nobody. Called by one thread, as
         :meth:`rest`."""
         self.rest()
+        for topic, kind, callback in (("/robot/joint_states", JointState, self._on_joints),
+                                      ("/robot/state", AssemblyState, self._on_state)):
+            self._subscriptions.append(rospy.Subscriber(topic, kind, callback, queue_size=1, tcp_nodelay=True))
         for side in SIDES:
             for topic, kind, callback in (("state", EndEffectorState, self._on_gripper),
                                           ("properties", EndEffectorProperties, self._on_kind)):
-                self._of_grippers.append(rospy.Subscriber(
+                self._subscriptions.append(rospy.Subscriber(
                     "/robot/end_effector/%s_gripper/%s" % (side, topic), kind, callback, side, queue_size=1))
 
     def rest(self):
-        """Hear nothing of the grippers until the next :meth:`listen`; their states are forgotten."""
-        subscriptions, self._of_grippers = self._of_grippers, []
+        """Hear nothing until the next :meth:`listen`; what was heard of states is forgotten."""
+        subscriptions, self._subscriptions = self._subscriptions, []
         for subscription in subscriptions:
             subscription.unregister()
-        self._grippers = {}
+        self._state, self._positions, self._grippers = None, {}, {}
 
     @property
     def poses(self):

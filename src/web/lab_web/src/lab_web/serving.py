@@ -5,6 +5,7 @@ import base64
 import hashlib
 import json
 import re
+import threading
 
 from tornado import web
 
@@ -45,6 +46,8 @@ class Pages:
         self.picture = self.poses = None
         #: Called with the number of a page that has gone, in the loop; does not wait.
         self.when_closed = lambda number: None
+        #: Set while there is a page.
+        self.present = threading.Event()
         self._shared = {"robot": {"op": "robot"}}
         self._sockets = {}
 
@@ -62,10 +65,13 @@ class Pages:
 
     def opened(self, socket):
         self._sockets[socket.number] = socket
+        self.present.set()
         self.control_changed()
 
     def closed(self, socket):
         if self._sockets.pop(socket.number, None) is not None:
+            if not self._sockets:
+                self.present.clear()
             self.control_changed()
             self.when_closed(socket.number)
 

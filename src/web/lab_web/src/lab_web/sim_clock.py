@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""rospy's simulated time while somebody needs it. A simulator sends the clock up to 500 times a second, and a class has
+many servers without a page."""
+import threading
+import time
+
+import rospy
+from rosgraph_msgs.msg import Clock
+
+from lab_web.resting import LINGER_S
+from rospy_limits.rest import Demand
+
+# Who needs the time waits at most so long for the first message of the clock [s]; a paused simulator sends it at once.
+_FIRST_S = 0.5
+
+
+class SimClock:
+    """For a node that was started with ``disable_rostime``. Its time stands still while ``is_needed()`` is false."""
+
+    def __init__(self, is_needed):
+        """Without the parameter use_sim_time, rospy's time is the wall's."""
+        self._has_come, self._until, self._subscriber = threading.Event(), 0.0, None
+        self._demand = Demand(self._listen, lambda: self._subscriber.unregister(), LINGER_S, is_needed)
+        self._is_simulated = bool(rospy.get_param("/use_sim_time", False))
+        if self._is_simulated:
+            rospy.rostime._set_rostime(rospy.Time())
+
+    def need(self):
+        """Any thread: rospy's time is right when this returns, where there is a clock."""
+        if self._is_simulated:
+            self._demand.need()
+            self._has_come.wait(max(0.0, self._until - time.monotonic()))
+
+    def _listen(self):
+        self._has_come.clear()
+        self._subscriber = rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=1, tcp_nodelay=True)
+        self._until = time.monotonic() + _FIRST_S
+
+    def _on_clock(self, message):
+        rospy.rostime._set_rostime(message.clock)
+        self._has_come.set()
