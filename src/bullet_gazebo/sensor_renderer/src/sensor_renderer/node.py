@@ -25,8 +25,9 @@ from sensor_renderer.sensor_element import SensorEntry
 from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError, SnapshotReader
 
-# Polling periods [s]: of the snapshot with subscribers, of the snapshot without, and of the search for a simulator.
-_LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
+# Polling periods [s]: of the snapshot with subscribers, of the subscribers while there are none, of the snapshot
+# meanwhile, and of the search for a simulator.
+_LOOK_S, _IDLE_S, _UNSEEN_S, _SEEK_S = 0.004, 0.05, 0.25, 0.25
 
 # A sensor that fails this many times within this time [s, simulated time] is not restarted again.
 FAILURES, FAILURES_WITHIN_S = 3, 10.0
@@ -65,13 +66,16 @@ class SensorRenderer:
             if reader is None:
                 return
             self._revision = self._resets = None
+            turn_due = 0.0
             while not stop() and reader.is_alive:
                 began = time.monotonic()
-                try:
-                    self._turn(reader)
-                except SnapshotError as error:
-                    rospy.logwarn_throttle(10.0, str(error))
                 wanted = any(driver.has_listeners for driver in self._sensors.values())
+                if wanted or began >= turn_due:
+                    turn_due = began + _UNSEEN_S
+                    try:
+                        self._turn(reader)
+                    except SnapshotError as error:
+                        rospy.logwarn_throttle(10.0, str(error))
                 time.sleep(max(0.0005, (_LOOK_S if wanted else _IDLE_S) - (time.monotonic() - began)))
 
     def close(self):
