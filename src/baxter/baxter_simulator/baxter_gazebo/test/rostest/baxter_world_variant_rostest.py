@@ -9,7 +9,11 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import tf2_ros
+from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
+from gazebo_msgs.srv import GetWorldProperties
+from geometry_msgs.msg import PoseStamped
 from robot_client import SIDES, Robot, joints
+from std_srvs.srv import Empty as EmptyService
 from tf2_msgs.msg import TFMessage
 
 from lab_testing.waiting import wait_until
@@ -72,6 +76,39 @@ class BaxterWorldVariantTest(unittest.TestCase):
         for frame in ("left_gripper", "right_hand_camera", "head_camera", "reference/left_gripper"):
             wait_until(lambda frame=frame: buffer.can_transform("world", frame, rospy.Time()), "tf of " + frame)
         listener.unregister()
+
+    def test_b_a_paused_lab_tells_its_state_to_who_comes(self):
+        """Also where nobody has asked for joint states for a while."""
+        def first_frame():
+            stamps = []
+            subscriber = rospy.Subscriber("/tf", TFMessage, lambda message: stamps.extend(
+                one.header.stamp for one in message.transforms if one.child_frame_id == "left_upper_shoulder"))
+            try:
+                wait_until(lambda: stamps, "tf")
+            finally:
+                subscriber.unregister()
+            return stamps[0]
+
+        def resting():
+            subscribers = dict(rosgraph.Master(rospy.get_name()).getSystemState()[1])["/robot/joint_states"]
+            return subscribers == [rospy.get_name()]
+
+        pause, go_on = (rospy.ServiceProxy("/gazebo/%s_physics" % word, EmptyService) for word in ("pause", "unpause"))
+        wait_until(resting, "the lab's nodes to rest")
+        pause()
+        try:
+            now_s = rospy.ServiceProxy("/gazebo/get_world_properties", GetWorldProperties)().sim_time
+            frames = [first_frame() for _ in range(2)]
+            asked = rospy.ServiceProxy("/ExternalTools/left/PositionKinematicsNode/IKService", SolvePositionIK)
+            pose = PoseStamped()
+            pose.header.frame_id, pose.pose.orientation.y = "base", 1.0
+            pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = 0.6, 0.3, 0.1
+            answer = asked(SolvePositionIKRequest(pose_stamp=[pose]))
+        finally:
+            go_on()
+        for stamp in (*frames, answer.joints[0].header.stamp):
+            self.assertAlmostEqual(stamp.to_sec(), now_s, delta=1e-6)
+        wait_until(resting, "the lab's nodes to rest again")
 
     def test_c_position_mode_begins_at_the_robots_speed(self):
         robot = self.robot
