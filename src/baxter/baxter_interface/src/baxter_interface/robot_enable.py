@@ -54,6 +54,11 @@ class RobotEnable:
         with self._lock:
             return copy.copy(self._state)
 
+    def close(self):
+        """Listen to the robot's state no longer: for programs that need the switch only now and then. Not in the
+        vendor's SDK."""
+        self._subscriber.unregister()
+
     def silence_s(self):
         """Return the time since the robot's last state [s, wall]; a present robot publishes it all the time."""
         with self._lock:

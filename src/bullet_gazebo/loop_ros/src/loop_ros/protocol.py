@@ -20,6 +20,9 @@ class Publisher(Protocol):
     def publish(self, message):
         """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` if it cannot be serialized."""
 
+    def renew(self):
+        """The state that ``present`` tells is another one: in a paused world, everybody gets it."""
+
     def close(self):
         """Stop publishing."""
 

@@ -205,6 +205,12 @@ class LoopPublisher:
         for message in self.present():
             self._send_to([peer for peer in newcomers if peer in self._peers], self._serialize(message))
 
+    def renew(self):
+        """The state that ``present`` tells is another one: in a paused world, everybody gets it."""
+        if self._peers and self.present is not None:
+            self._unserved = list(self._peers)
+            self._hub.unserved.add(self)
+
     def flush(self):
         """Send the rests of earlier messages. Returns True while a rest is still pending."""
         dead = []
@@ -225,6 +231,7 @@ class LoopPublisher:
         self._peers, self._unserved, self.present = [], [], None
         self.has_listeners = False
         self._hub.backlog.discard(self)
+        self._hub.unserved.discard(self)
         self._release()
 
     def _adopt(self, connections):
@@ -275,7 +282,8 @@ class PublisherHub:
         self.attention = collections.deque()
         #: Publishers with parts of messages still to send; loop thread only.
         self.backlog = set()
-        self._unserved = set()  # publishers with subscribers that only get what comes next, or the present state
+        #: Publishers with subscribers that get what is published next, or the present state; loop thread only.
+        self.unserved = set()
 
     def service(self, is_paused=False):
         """Send latched messages to new subscribers, and the present state in a paused world; continue messages that
@@ -283,10 +291,10 @@ class PublisherHub:
         while self.attention:
             publisher = self.attention.popleft()
             if publisher.greet():
-                self._unserved.add(publisher)
+                self.unserved.add(publisher)
         if is_paused:
-            while self._unserved:
-                self._unserved.pop().tell_present()
+            while self.unserved:
+                self.unserved.pop().tell_present()
         if self.backlog:
             for publisher in list(self.backlog):
                 if not publisher.flush():

@@ -157,12 +157,12 @@ class FakePublisher:
     serialized raises.
 
     ``has_listeners`` may be set. Several publishers of a topic share both. ``keeps_last``: whether a late subscriber
-    gets the last message.
+    gets the last message. ``renewed``: how often :meth:`renew` was called; there is no pause here.
     """
 
     def __init__(self, sent, msg_class, keeps_last, publishers, topic):
         self.topic, self.msg_class, self.is_closed = topic, msg_class, False
-        self.present = None
+        self.present, self.renewed = None, 0
         self.keeps_last = keeps_last
         self._sent = sent
         self._publishers = publishers
@@ -188,6 +188,9 @@ class FakePublisher:
         self._sent.heard = heard
         if late and self._sent.last is not None:
             self._sent.send(self._sent.last)
+
+    def renew(self):
+        self.renewed += 1
 
     def publish(self, message):
         if self.is_closed or not (self.keeps_last or self._sent.heard):

@@ -284,6 +284,24 @@ def test_who_joins_before_the_pause_gets_the_state_at_the_pause_if_nothing_has_c
     assert served.received() == [b"seq 3"] and asked == [0]
 
 
+def test_a_new_state_is_told_to_everybody_in_a_paused_world_and_to_nobody_in_another(hub, impl):
+    publisher, asked = present(hub, impl)
+    peer = impl.connect()
+    publisher.publish(FakeStamped())
+    publisher.renew()
+    hub.service(is_paused=True)
+    hub.service(is_paused=True)
+    assert peer.received() == [b"seq 1", b"seq 2", b"seq 3"] and asked == [0]
+    publisher.renew()
+    hub.service()
+    publisher.publish(FakeStamped())
+    hub.service(is_paused=True)
+    assert peer.received() == [b"seq 4"] and asked == [0]
+    publisher.renew()
+    publisher.close()
+    assert not hub.unserved
+
+
 def test_who_has_left_before_the_pause_costs_nothing(hub, impl):
     publisher, asked = present(hub, impl)
     gone = impl.connect()

@@ -6,10 +6,13 @@ Each message wakes its thread, and a simulator does not even make those without 
 import threading
 import time
 
+# Between two looks at who needs it [s].
+_LOOK_S = 1.0
+
 
 class Demand:
     """Calls ``listen()`` at the first :meth:`need`, and ``rest()`` when nobody has needed it for ``linger_s`` [s]: no
-    :meth:`need` since then, and ``is_needed()`` is false.
+    :meth:`need` since then, and ``is_needed()``, which is asked once a second, was false.
 
     ``clock`` and ``timer``, a ``threading.Timer``, are replaceable for tests.
     """
@@ -28,7 +31,7 @@ class Demand:
             if not self._listens:
                 self._listen()
                 self._listens = True
-                self._look_in(self._linger_s)
+                self._look_in(min(_LOOK_S, self._linger_s))
 
     def _look_in(self, seconds):
         timer = self._timer(seconds, self._look)
@@ -37,9 +40,11 @@ class Demand:
 
     def _look(self):
         with self._lock:
-            left_s = self._linger_s if self._is_needed() else self._needed_until - self._clock()
-            if left_s > 0.0:
-                self._look_in(left_s)
+            now = self._clock()
+            if self._is_needed():
+                self._needed_until = now + self._linger_s
+            if now < self._needed_until:
+                self._look_in(min(_LOOK_S, self._needed_until - now))
             else:
                 # First: if the rest fails, the next need still listens.
                 self._listens = False

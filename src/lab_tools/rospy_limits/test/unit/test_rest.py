@@ -67,6 +67,11 @@ def test_it_does_not_rest_while_it_is_needed(lab):
     lab.demand.need()
     assert lab.run(1000.0) == ["listen"]
     lab.needed = False
+    # Also not at once: a page is loaded again.
+    assert lab.run(LINGER_S - 1.5) == ["listen"]
+    lab.needed = True
+    assert lab.run(1.5) == ["listen"]
+    lab.needed = False
     assert lab.run(2.0 * LINGER_S) == ["listen", "rest"]
 
 

@@ -161,9 +161,11 @@ def serve(options, page, libraries):
     clock = SimClock(lambda: is_needed() or len(clients) > 0)
     clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: connected and clock.need())
 
-    def listen():
-        robot.listen()
+    def is_watched():
+        if not is_needed():
+            return False
         clock.need()
+        return True
 
     notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
@@ -174,7 +176,7 @@ def serve(options, page, libraries):
     except OSError as error:
         raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
-        ("the robot's states", OnDemand(listen, robot.rest, is_needed).run), *equipment.loops.items())]
+        ("the robot's states", OnDemand(robot.listen, robot.rest, is_watched).run), *equipment.loops.items())]
     for thread in threads:
         thread.start()
     address = ""

@@ -83,6 +83,12 @@ class Baxter:
         for subscription in subscriptions:
             subscription.unregister()
         self._state, self._positions, self._grippers = None, {}, {}
+        # Its subscription, too; not during a switch.
+        if self._switching.acquire(blocking=False):
+            enabler, self._enabler = self._enabler, None
+            self._switching.release()
+            if enabler is not None:
+                enabler.close()
 
     @property
     def poses(self):

@@ -20,6 +20,8 @@ from lab_testing.waiting import wait_until
 
 # The joints' sensors count in 0.0004 rad and are noisy by as much, and a motor at rest creeps to its set-point.
 SEEN_RAD = 0.005
+# A state that was sent before the pause, in this profile up to so long ago, is not followed by a newer one [s].
+SENT_S = 0.05
 UNTUCKED = {"left": (-0.08, -1.0, -1.19, 1.94, 0.67, 1.03, -0.50), "right": (0.08, -1.0, 1.19, 1.94, -0.67, 1.03, 0.50)}
 
 
@@ -77,7 +79,7 @@ class BaxterWorldVariantTest(unittest.TestCase):
             wait_until(lambda frame=frame: buffer.can_transform("world", frame, rospy.Time()), "tf of " + frame)
         listener.unregister()
 
-    def test_b_a_paused_lab_tells_its_state_to_who_comes(self):
+    def test_b_a_paused_lab_tells_a_newcomer_its_state(self):
         """Also where nobody has asked for joint states for a while."""
         def first_frame():
             stamps = []
@@ -107,7 +109,7 @@ class BaxterWorldVariantTest(unittest.TestCase):
         finally:
             go_on()
         for stamp in (*frames, answer.joints[0].header.stamp):
-            self.assertAlmostEqual(stamp.to_sec(), now_s, delta=1e-6)
+            self.assertAlmostEqual(stamp.to_sec(), now_s, delta=SENT_S)
         wait_until(resting, "the lab's nodes to rest again")
 
     def test_c_position_mode_begins_at_the_robots_speed(self):

@@ -46,6 +46,10 @@ class Late:
             found.append(self._waiting.popleft()[1])
         return found
 
+    def waiting(self):
+        """[what is on its way], oldest first."""
+        return [what for _, what in self._waiting]
+
     def drop(self):
         """Lose everything that is on its way."""
         self._waiting.clear()

@@ -100,7 +100,7 @@ class BaxterPlugin(ModelPlugin):
             self._baxter.take_over()
         elif self._switch("enable", False):
             self._robot.apply(Event.ENABLE)
-        self._before = model.read_joints()
+        self._before = None  # the joints before the last step, if there was one since they were put where they are
         # The joints that were driven to a position last, as the arms and as the model number them.
         self._driven = self._driven_index = None
         self._reads, self._read_s = None, 0.0  # the loop's count of reads at the last tick; the time of the last [s]
@@ -327,6 +327,7 @@ class BaxterPlugin(ModelPlugin):
         self._measure()
         self._handling.handle(self.context.pending(), self.context.world.time_s)
         self._handling.forget()
+        self._before = None
         self._publishing.forget()
         self._baxter.put_elsewhere()
         self._collision.forget()

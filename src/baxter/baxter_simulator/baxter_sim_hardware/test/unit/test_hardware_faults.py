@@ -150,6 +150,47 @@ def test_who_subscribes_in_a_paused_world_gets_the_state_also_before_the_first_t
     assert lab.faults == []
 
 
+def test_joints_that_were_put_elsewhere_in_a_paused_world_feel_nothing(make_lab):
+    lab = make_lab()
+
+    def felt():
+        wrench = lab.publishers["limb/left/endpoint_state"].present()[0].wrench
+        force = lab.publishers["accelerometer/left_accelerometer/state"].present()[0].linear_acceleration
+        return np.linalg.norm([wrench.force.x, wrench.force.y, wrench.force.z]), np.linalg.norm(
+            [force.x, force.y, force.z])
+
+    assert felt() == pytest.approx((0.0, 9.81), abs=1e-6)
+    lab.command(1, lab.position + 0.3)
+    lab.run(0.1)
+    before = lab.publishers["joint_states"].renewed
+    lab.model.set_joint_positions(lab.arm, lab.position + 0.5)
+    lab.plugin.joints_set()
+    assert felt() == pytest.approx((0.0, 9.81), abs=1e-6)
+    assert lab.publishers["joint_states"].renewed == before + 1
+
+
+def stamps(messages):
+    return [message.header.stamp.to_sec() for message in messages]
+
+
+def test_no_state_is_newer_than_one_on_its_way(make_lab):
+    lab = make_lab(parameters={"profile": "robot"})
+    publisher = lab.publishers["joint_states"]
+    publisher.has_listeners = False
+    lab.run(0.1)
+    assert stamps(publisher.present()) == pytest.approx([lab.world.time_s] * 2)
+    publisher.has_listeners = True
+    for _ in range(50):
+        lab.run(TICK_S)
+        on_way = [message for ready in lab.plugin._publishing._late.waiting() for to, message in ready
+                  if to is publisher]
+        for present in stamps(publisher.present()):
+            assert present <= min(stamps(on_way), default=present)
+    assert publisher.present()
+    lab.plugin.joints_set()
+    assert stamps(publisher.present()) == pytest.approx([lab.world.time_s] * 2)
+
+
 def test_a_state_that_cannot_be_made_is_counted_and_left_out(loop):
     publisher = loop.lab.publishers["joint_states"]
     publisher.present = partial(publisher.present.func, fail, *publisher.present.args[1:])

@@ -17,6 +17,7 @@ class Publishing:
         self._take_snapshot, self._survived, self._now_s = take_snapshot, survived, now_s
         self._groups = {}  # rate of the table's rows -> (Schedule, [(function, component, publisher)])
         self._late, self._delay_of, self._delayed = Late(), None, ()
+        self._newest = {}  # publisher of a delayed group: the messages that were sent last
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due
 
     def add(self, rate, hz, function, component, publisher):
@@ -32,8 +33,13 @@ class Publishing:
         self._delayed, self._delay_of = rates, delay_of
 
     def forget(self):
-        """Drop what is on its way."""
+        """The joints were put elsewhere: drop what is on its way. In a paused world, subscribers get the state of
+        now."""
         self._late.drop()
+        self._newest.clear()
+        for _, topics in self._groups.values():
+            for _, _, publisher in topics:
+                publisher.renew()
 
     def set_rate(self, rate, hz):
         """Publish a group at another rate [Hz]."""
@@ -44,7 +50,9 @@ class Publishing:
         """Publish the messages that are due at time_s [s], and those that were on their way; one that cannot be made is
         left out. Returns whether one was due."""
         if self._late:
-            self._send(self._late.arrived(time_s))
+            for ready in self._late.arrived(time_s):
+                self._send([ready])
+                self._newest.update(_by_publisher(ready))
         if self._idle_since_s <= time_s < self._idle_until_s:
             return False
         snapshot = None
@@ -62,6 +70,9 @@ class Publishing:
                 except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
                     self._survived("publishing %s" % publisher.topic, error)
             if rate in self._delayed:
+                for _, _, publisher in topics:
+                    if not publisher.has_listeners:
+                        self._newest.pop(publisher, None)
                 self._late.send(time_s, self._delay_of(), ready)
             elif ready:
                 self._send([ready])
@@ -70,6 +81,9 @@ class Publishing:
         return True
 
     def _present(self, function, component, publisher):
+        if any(publisher is to for ready in self._late.waiting() for to, _ in ready):
+            # That comes after the pause, and must not be older.
+            return self._newest.get(publisher, ())
         try:
             return _messages(function(self._now_s(), component, self._take_snapshot()))
         except Exception as error:  # noqa: BLE001  (as above)
@@ -82,6 +96,13 @@ class Publishing:
                 publisher.publish(message)
             except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
                 self._survived("publishing %s" % publisher.topic, error)
+
+
+def _by_publisher(ready):
+    sent = {}
+    for publisher, message in ready:
+        sent.setdefault(publisher, []).append(message)
+    return sent
 
 
 def _messages(made):

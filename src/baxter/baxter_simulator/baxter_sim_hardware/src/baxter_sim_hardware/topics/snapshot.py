@@ -6,13 +6,15 @@ class Snapshot:
     """The model's joints after a step; expensive values are computed once, and only on demand.
 
     position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step
-    began; sense: function (position, velocity, effort) -> the same three as the robot says them; correct: function
-    (efforts, position) that makes efforts of the whole description those that the robot's controllers know of.
+    began, None where there was none since the joints were put there; sense: function (position, velocity, effort) ->
+    the same three as the robot says them; correct: function (efforts, position) that makes efforts of the whole
+    description those that the robot's controllers know of.
     """
 
     def __init__(self, model, before, dt, sense, correct):
         self.position, self.velocity, self.effort = model.read_joints()
-        self.before = before
+        self.before = (self.position, self.velocity, self.effort) if before is None else before
+        self._has_stepped = before is not None
         self._model, self._dt = model, dt
         self._sense, self._correct = sense, correct
         self._gravity = self._own_effort = self._sensed = None
@@ -36,6 +38,8 @@ class Snapshot:
     def own_effort(self):
         """(n,) effort for the robot's own weight, motion and joint damping in the last step [Nm, N]; the rest of the
         effort acts on touched bodies."""
+        if self._own_effort is None and not self._has_stepped:
+            self._own_effort = self.effort.copy()
         if self._own_effort is None:
             position, velocity, _ = self.before
             acceleration = (self.velocity - velocity) / self._dt
