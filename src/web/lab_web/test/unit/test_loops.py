@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A loop goes on after errors that nobody foresaw, until its end."""
 import threading
-import time
 from types import SimpleNamespace
 
 from lab_testing.waiting import wait_until
@@ -43,8 +42,7 @@ def test_a_loop_runs_while_there_is_a_page_and_ends_in_either_case():
     def loop(ends):
         rounds.append(len(rounds))
         running.set()
-        while not ends():
-            time.sleep(0.001)
+        wait_until(ends, "the loop's end")
         running.clear()
 
     thread = threading.Thread(target=attended(present, loop), args=(ended.is_set,))
