@@ -37,16 +37,16 @@ from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
-from lab_web.resting import OnDemand
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
 from lab_web.sights import Sights
-from lab_web.sim_clock import SimClock
+from lab_web.sim_clock import LINGER_S, SimClock
 from lab_web.simulation import Simulation
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from rospy_limits.node import limit_ports
+from rospy_limits.rest import Demand
 from rospy_start import end_on_signals
 from web_bridge import ros_graph
 from web_bridge.access import Access
@@ -66,6 +66,8 @@ _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
 #: while nobody needs them, and how often it is looked whether somebody does.
 _POSES_S, _LOOK_S, _LOOK_UNSEEN_S, _UNSEEN_S = 0.05, 1.0, 5.0, 0.25
+# Between two looks at whether somebody needs the robot's states [s].
+_NEED_S = 0.1
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 # How long the comparison with a physical robot waits for the messages of some topics [s].
@@ -161,11 +163,14 @@ def serve(options, page, libraries):
     clock = SimClock(lambda: is_needed() or len(clients) > 0)
     clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: connected and clock.need())
 
-    def is_watched():
-        if not is_needed():
-            return False
-        clock.need()
-        return True
+    states = Demand(robot.listen, robot.rest, LINGER_S, is_needed)
+
+    def watch(ends):
+        while not ends():
+            if is_needed():
+                clock.need()
+                states.need()
+            rospy.rostime.wallsleep(_NEED_S)
 
     notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
@@ -176,7 +181,7 @@ def serve(options, page, libraries):
     except OSError as error:
         raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
-        ("the robot's states", OnDemand(robot.listen, robot.rest, is_watched).run), *equipment.loops.items())]
+        ("the robot's states", watch), *equipment.loops.items())]
     for thread in threads:
         thread.start()
     address = ""

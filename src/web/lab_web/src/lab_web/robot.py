@@ -65,8 +65,8 @@ class Baxter:
         self._subscriptions = []
 
     def listen(self):
-        """Subscribe to the robot's states, which a simulator does not make for nobody. Called by one thread, as
-        :meth:`rest`."""
+        """Subscribe to the robot's states, which a simulator does not make for nobody. Not called
+        together with :meth:`rest`."""
         self.rest()
         for topic, kind, callback in (("/robot/joint_states", JointState, self._on_joints),
                                       ("/robot/state", AssemblyState, self._on_state)):

@@ -7,9 +7,10 @@ import time
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from lab_web.resting import LINGER_S
 from rospy_limits.rest import Demand
 
+#: How long topics are still read when nobody needs them any more: a page that is loaded again finds all as it was [s].
+LINGER_S = 10.0
 # Who needs the time waits at most so long for the first message of the clock [s]; a paused simulator sends it at once.
 _FIRST_S = 0.5
 
