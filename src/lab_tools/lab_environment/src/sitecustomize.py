@@ -9,12 +9,12 @@ import atexit
 import os
 import sys
 
-# Module that is amended on import -> our module, whose `amend(module)` is called then.
+# Module that is amended on import -> our modules, by spaces, whose `amend(module)` is called then.
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "rospy.impl.masterslave": "lab_environment.one_connection",
            "rospy.impl.tcpros_pubsub": "lab_environment.late_subscribers",
-           "rospy.topics": "lab_environment.signals",
+           "rospy.topics": "lab_environment.signals lab_environment.closed_connections",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "actionlib.action_client": "lab_environment.lost_goals",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
@@ -27,28 +27,29 @@ class AmendingFinder:
 
     @staticmethod
     def find_spec(name, path=None, target=None):
-        amendment = AMENDED.pop(name, None)
-        if amendment is None:
+        amendments = AMENDED.pop(name, None)
+        if amendments is None:
             return None
         for finder in sys.meta_path:
             spec = None if finder is AmendingFinder else finder.find_spec(name, path, target)
             if spec is not None:
-                _amend_when_loaded(spec.loader, amendment)
+                _amend_when_loaded(spec.loader, amendments.split())
                 return spec
         return None
 
 
-def _amend_when_loaded(loader, amendment):
+def _amend_when_loaded(loader, amendments):
     load = loader.exec_module
 
     def exec_module(module):
         load(module)
         # A program must not fail because of an amendment; without it, it runs as in plain ROS.
-        try:
-            __import__(amendment)
-            sys.modules[amendment].amend(module)
-        except Exception as error:
-            sys.stderr.write("%s: not amended by %s: %r\n" % (module.__name__, amendment, error))
+        for amendment in amendments:
+            try:
+                __import__(amendment)
+                sys.modules[amendment].amend(module)
+            except Exception as error:
+                sys.stderr.write("%s: not amended by %s: %r\n" % (module.__name__, amendment, error))
 
     loader.exec_module = exec_module
 
