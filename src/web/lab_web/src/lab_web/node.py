@@ -157,11 +157,16 @@ def serve(options, page, libraries):
     def is_needed():
         return len(pages) > 0 or equipment.recorder.is_running
 
-    graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
+    clock = SimClock(is_needed)
+
+    def now():
+        clock.need()
+        return ros_graph.now()
+
+    graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
-    clock = SimClock(lambda: is_needed() or len(clients) > 0)
-    clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: connected and clock.need())
+    clients = Clients(bridge, loop_thread, SocketOptions(access))
 
     states = Demand(robot.listen, robot.rest, LINGER_S, is_needed)
 

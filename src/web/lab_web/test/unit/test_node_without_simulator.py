@@ -10,6 +10,7 @@ import threading
 import urllib.request
 from pathlib import Path
 
+import cbor2
 import lab_arms
 import numpy as np
 import pytest
@@ -114,8 +115,9 @@ class Page:
 class Hall:
     """A master, a robot, and the page's server."""
 
-    def __init__(self, folder, *world):
-        """``world``: a folder for the snapshot of a world, or nothing."""
+    def __init__(self, folder, *world, clock_s=None):
+        """``world``: a folder for the snapshot of a world, or nothing; ``clock_s``: where the simulated time stands [s].
+        """
         port = free_port()
         self._environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % port, ROS_HOSTNAME="localhost",
                                  ROS_LOG_DIR=str(folder), PYTHONUNBUFFERED="1", ROS_HOME=str(folder / "home"))
@@ -129,6 +131,9 @@ class Hall:
             wait_until(self.master.is_online, "the master", START_S)
             self.robot = self._start(sys.executable, str(HERE / "fake_baxter.py"), *map(str, world))
             wait_until(lambda: self.master.hasParam("/robot_description"), "the robot", START_S)
+            if clock_s is not None:
+                self.master.setParam("/use_sim_time", True)
+                self._start("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock", "clock: {secs: %d}" % clock_s)
             self.server = self._start(sys.executable, str(PACKAGE / "nodes" / "lab_web"), "--token", "drive",
                                       "--view-token", "look")
             self.port = int(wait_until(lambda: self.server.found(r"localhost:(\d+)/\?token=drive"), "the address",
@@ -146,10 +151,10 @@ class Hall:
         rows = [json.loads(line) for line in list(self.robot.lines) if line.startswith("[\"")]
         return [values for kind, *values in rows if kind == what]
 
-    def subscriptions(self):
-        """The robot's topics that the page's server has subscribed to."""
+    def subscriptions(self, below="/robot/"):
+        """The robot's topics, or others, that the page's server has subscribed to."""
         return {topic for topic, nodes in self.master.getSystemState()[1]
-                if topic.startswith("/robot/") and "/lab_web" in nodes}
+                if topic.startswith(below) and "/lab_web" in nodes}
 
     def drive(self):
         """A page that has the control of an enabled robot."""
@@ -187,6 +192,25 @@ def world(libraries, tmp_path):
     made = Hall(tmp_path, tmp_path)
     yield made
     made.close()
+
+
+def test_the_clock_is_read_for_a_client_that_needs_the_time(libraries, tmp_path):
+    hall = Hall(tmp_path, clock_s=77)
+    client = websocket.create_connection("ws://127.0.0.1:%d/rosbridge?token=look" % hall.port, timeout=stretched(60))
+
+    def received(compression):
+        client.send(json.dumps({"op": "subscribe", "topic": "/robot/state", "compression": compression}))
+        return client.recv()
+    try:
+        assert json.loads(received("none"))["topic"] == "/robot/state"
+        assert hall.subscriptions("/clock") == set()
+        # The first ones may be ready before the clock's publisher has connected.
+        wait_until(lambda: isinstance(frame := received("cbor-raw"), bytes) and cbor2.loads(frame)["msg"]["secs"] == 77,
+                   "the simulated time")
+        assert hall.subscriptions("/clock") == {"/clock"}
+    finally:
+        client.close()
+        hall.close()
 
 
 def test_arms_move_and_parts_follow_and_what_is_missing_is_told(hall):
