@@ -5,9 +5,11 @@ import ctypes
 import time
 
 # A longer stall is not caught up: simulation time then stays behind [s].
-MAX_DEBT_S = 0.2
-# While it catches up, the world runs at most this many times as fast as requested.
-MAX_CATCH_UP = 2.0
+MAX_DEBT_S = 1.0
+# While it catches up, the world runs at most this many times as fast as requested: a short stall is made up for at once,
+# a longer one [s] so that nobody sees the robot hurry.
+SHORT_DEBT_S = 0.2
+MAX_CATCH_UP, GENTLE_CATCH_UP = 2.0, 1.25
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
 # A world that is later than this [s] for so long [s, wall time], and gets no better, makes its turns longer; it tries
@@ -85,7 +87,8 @@ class Pacer:
             self._due = now - MAX_DEBT_S
         if self.real_time_factor <= 1.0:  # a world that should be faster than that has as much as there is
             self.lag.update(now - self._due, now)
-        wake = max(self._due, self._last + ticks * self._period / MAX_CATCH_UP)
+        catch_up = MAX_CATCH_UP if now - self._due <= SHORT_DEBT_S else GENTLE_CATCH_UP
+        wake = max(self._due, self._last + ticks * self._period / catch_up)
         if wake > now:
             self._sleep(wake - now)
             now = self._clock()

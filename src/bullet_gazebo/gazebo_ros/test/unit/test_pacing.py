@@ -8,8 +8,10 @@ import pytest
 from gazebo_ros.pacing import (
     LATE_S,
     LONGER_AFTER_S,
+    GENTLE_CATCH_UP,
     MAX_CATCH_UP,
     MAX_DEBT_S,
+    SHORT_DEBT_S,
     SHORTER_AFTER_S,
     YIELD_PERIOD_S,
     Lag,
@@ -93,12 +95,26 @@ def test_a_short_stall_is_made_up_for_at_a_bounded_speed(clock):
     assert clock.now == pytest.approx(101.0)
 
 
+def test_a_longer_stall_is_made_up_for_gently(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    clock.now += 0.9
+    pacer.wait()
+    speeds = []
+    for _ in range(2000):
+        before, behind = clock.now, clock.now - (100.0 + 0.002 * (len(speeds) + 1))
+        pacer.wait()
+        speeds.append((behind, 0.002 / (clock.now - before)))
+    assert all(speed == pytest.approx(GENTLE_CATCH_UP) for behind, speed in speeds if behind > SHORT_DEBT_S + 0.003)
+    assert all(speed < MAX_CATCH_UP + 1e-6 for _, speed in speeds)
+    assert clock.now == pytest.approx(100.0 + 2001 * 0.002)
+
+
 def test_a_long_stall_is_given_up(clock):
     pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
     clock.now += 10.0
-    for _ in range(1000):
+    for _ in range(3000):
         pacer.wait()
-    assert clock.now == pytest.approx(110.0 + 1000 * 0.002 - MAX_DEBT_S, abs=0.005)
+    assert clock.now == pytest.approx(110.0 + 3000 * 0.002 - MAX_DEBT_S, abs=0.005)
 
 
 def test_restart_forgets_what_is_owed(clock):
