@@ -6,8 +6,8 @@ import time
 
 # A longer stall is not caught up: simulation time then stays behind [s].
 MAX_DEBT_S = 1.0
-# While it catches up, the world runs at most this many times as fast as requested: a short stall is made up for at once,
-# a longer one [s] so that nobody sees the robot hurry.
+# While it catches up, the world runs at most this many times as fast as requested: a short stall [s] is made up for at
+# once, a longer one so that nobody sees the robot hurry.
 SHORT_DEBT_S = 0.2
 MAX_CATCH_UP, GENTLE_CATCH_UP = 2.0, 1.25
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].

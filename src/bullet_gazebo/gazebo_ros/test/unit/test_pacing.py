@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from gazebo_ros.pacing import (
+    GENTLE_CATCH_UP,
     LATE_S,
     LONGER_AFTER_S,
-    GENTLE_CATCH_UP,
     MAX_CATCH_UP,
     MAX_DEBT_S,
     SHORT_DEBT_S,

@@ -116,8 +116,7 @@ class Hall:
     """A master, a robot, and the page's server."""
 
     def __init__(self, folder, *world, clock_s=None):
-        """``world``: a folder for the snapshot of a world, or nothing; ``clock_s``: where the simulated time stands [s].
-        """
+        """``world``: a folder for the snapshot of a world, or nothing; ``clock_s``: where simulated time stands [s]."""
         port = free_port()
         self._environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % port, ROS_HOSTNAME="localhost",
                                  ROS_LOG_DIR=str(folder), PYTHONUNBUFFERED="1", ROS_HOME=str(folder / "home"))
@@ -133,7 +132,8 @@ class Hall:
             wait_until(lambda: self.master.hasParam("/robot_description"), "the robot", START_S)
             if clock_s is not None:
                 self.master.setParam("/use_sim_time", True)
-                self._start("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock", "clock: {secs: %d}" % clock_s)
+                self._start("rostopic", "pub", "--latch", "/clock", "rosgraph_msgs/Clock",
+                            "clock: {secs: %d}" % clock_s)
             self.server = self._start(sys.executable, str(PACKAGE / "nodes" / "lab_web"), "--token", "drive",
                                       "--view-token", "look")
             self.port = int(wait_until(lambda: self.server.found(r"localhost:(\d+)/\?token=drive"), "the address",
