@@ -41,7 +41,13 @@ class Demand:
     def _look(self):
         with self._lock:
             now = self._clock()
-            if self._is_needed():
+            try:
+                is_needed = self._is_needed()
+            except Exception:
+                # The error is the timer's thread's; who needs it is asked again.
+                self._look_in(_LOOK_S)
+                raise
+            if is_needed:
                 self._needed_until = now + self._linger_s
             if now < self._needed_until:
                 self._look_in(min(_LOOK_S, self._needed_until - now))

@@ -14,9 +14,14 @@ class Lab:
 
     def __init__(self):
         self.now, self.needed, self.calls, self._timers = 100.0, False, [], []
-        self.fails = False
-        self.demand = Demand(self._listen, lambda: self.calls.append("rest"), LINGER_S, lambda: self.needed,
+        self.fails = self.does_not_know = False
+        self.demand = Demand(self._listen, lambda: self.calls.append("rest"), LINGER_S, self._is_needed,
                              lambda: self.now, self._timer)
+
+    def _is_needed(self):
+        if self.does_not_know:
+            raise KeyError("a page that has gone")
+        return self.needed
 
     def _listen(self):
         if self.fails:
@@ -106,3 +111,12 @@ def test_it_rests_by_itself():
     rested = threading.Event()
     Demand(lambda: None, rested.set, 0.02).need()
     assert rested.wait(60.0)
+
+
+def test_who_needs_it_is_asked_again_after_an_error(lab):
+    lab.demand.need()
+    lab.does_not_know = True
+    with pytest.raises(KeyError, match="a page that has gone"):
+        lab.run(LINGER_S)
+    lab.does_not_know = False
+    assert lab.run(2 * LINGER_S) == ["listen", "rest"]
