@@ -157,16 +157,11 @@ def serve(options, page, libraries):
     def is_needed():
         return len(pages) > 0 or equipment.recorder.is_running
 
-    clock = SimClock(is_needed)
-
-    def now():
-        clock.need()
-        return ros_graph.now()
-
-    graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, now)
+    graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
-    clients = Clients(bridge, loop_thread, SocketOptions(access))
+    clock = SimClock(lambda: is_needed() or clients.need_time)
+    clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: clients.need_time and clock.need())
 
     states = Demand(robot.listen, robot.rest, LINGER_S, is_needed)
 

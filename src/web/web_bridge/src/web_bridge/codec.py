@@ -29,11 +29,10 @@ def deserialized(empty, data):
 
 
 class Codec:
-    """``class_of(type name)`` returns a message class or raises UnknownType; ``now()`` is asked for the time only where
-    a header or a client needs it."""
+    """``class_of(type name)`` returns a message class or raises UnknownType; ``now()`` the time for headers."""
 
     def __init__(self, class_of, now):
-        self.class_of, self.now = class_of, now
+        self.class_of = class_of
         self.json = Writer(class_of, JsonForm())
         self.cbor = Writer(class_of, CborForm())
         self.reader = Reader(class_of, now)

@@ -66,9 +66,8 @@ class Packet:
 
     def _made(self, compression, fragment_size):
         if compression == "cbor-raw":
-            # As in rosbridge, the time at which it is made ready for the client.
-            now = self._codec.now()
-            return [self._publish_cbor({"bytes": self._arrival.data, "secs": now.secs, "nsecs": now.nsecs})]
+            secs, nsecs = self._arrival.received
+            return [self._publish_cbor({"bytes": self._arrival.data, "secs": secs, "nsecs": nsecs})]
         if self._message is None:
             self._message = self._codec.decoded(self._arrival)
         if compression == "cbor":

@@ -66,6 +66,11 @@ class Clients:
     def __len__(self):
         return len(self._open)
 
+    @property
+    def need_time(self):
+        """Any thread: whether a client is connected that has not said ``time=none`` in its address."""
+        return any(socket.needs_time for socket in list(self._open))
+
     def application(self, *routes, socket=None):
         """A tornado application that serves ``socket`` (a ClientSocket; None: rosbridge) at its PATHS, after further
         ``routes``.
@@ -175,6 +180,11 @@ class ClientSocket(BufferedSocket):
     def initialize(self, clients):
         self._clients = clients
         self._session = None
+
+    @property
+    def needs_time(self):
+        """False for a client that only reads what comes, and said so."""
+        return self.request.query_arguments.get("time") != [b"none"]
 
     def new_session(self, rules):
         """The session of a client that has been let in; in the loop, so it must not wait for the master."""
