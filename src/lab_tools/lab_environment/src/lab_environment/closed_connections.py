@@ -39,12 +39,18 @@ def _transport(connection):
 
 
 def _locked(check):
-    """``check``, which asks which descriptors are broken and then closes these: without a connection made between."""
+    """``check``, which asks which descriptors are broken and then closes these: without a connection made between.
+
+    It does not wait for the lock: rospy's caller holds the one of all topics, for which a listener of the thread that
+    makes or ends a connection may wait. It is called twice a second.
+    """
     @functools.wraps(check)
     def locked(self):
         lock = self.c_lock
-        if lock is None:  # the topic is closed
+        if lock is None or not lock.acquire(blocking=False):  # the topic is closed, or its connections are changing
             return
-        with lock:
+        try:
             check(self)
+        finally:
+            lock.release()
     return locked

@@ -121,3 +121,26 @@ def test_a_closed_topic_is_not_asked(topic):
     topic.add_connection(Connection(5, "/listener"))
     topic.close()
     topic.check()
+
+
+def test_the_check_does_not_wait_for_a_connection_that_is_being_made(topic):
+    topic.add_connection(Connection(5, "/listener"))
+    topic.connection_poll.broken = [5]
+    held, checked = threading.Event(), threading.Event()
+
+    def hold():
+        with topic.c_lock:
+            held.set()
+            checked.wait(DEADLINE_S)
+
+    holder = threading.Thread(target=hold, daemon=True)
+    holder.start()
+    assert held.wait(DEADLINE_S)
+    checker = threading.Thread(target=topic.check, daemon=True)
+    checker.start()
+    checker.join(DEADLINE_S)
+    assert not checker.is_alive() and len(topic.connections) == 1
+    checked.set()
+    holder.join(DEADLINE_S)
+    topic.check()
+    assert topic.connections == []
