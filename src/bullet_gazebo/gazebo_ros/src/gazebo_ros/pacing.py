@@ -10,6 +10,9 @@ MAX_DEBT_S = 1.0
 # once, a longer one so that nobody sees the robot hurry.
 SHORT_DEBT_S = 0.2
 MAX_CATCH_UP, GENTLE_CATCH_UP = 2.0, 1.25
+# Delays that are shorter than this do not count for the gentle speed, which is a mean [s]: a world that is held up again
+# and again would only fall behind by them.
+_GENTLE_SLACK_S = 0.1
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
 # A world that is later than this [s] for so long [s, wall time], and gets no better, makes its turns longer; it tries
@@ -62,7 +65,8 @@ class Pacer:
 
     def restart(self):
         """Forget the delay: time counts from now on. For the start and after a pause."""
-        self._due = self._last = self._clock()
+        # When the next tick is due, and when it may happen at the gentle speed.
+        self._due = self._gentle = self._last = self._clock()
         self.lag.forget(self._last)
 
     def forget_lag(self):
@@ -87,8 +91,11 @@ class Pacer:
             self._due = now - MAX_DEBT_S
         if self.real_time_factor <= 1.0:  # a world that should be faster than that has as much as there is
             self.lag.update(now - self._due, now)
-        catch_up = MAX_CATCH_UP if now - self._due <= SHORT_DEBT_S else GENTLE_CATCH_UP
-        wake = max(self._due, self._last + ticks * self._period / catch_up)
+        if now - self._due <= SHORT_DEBT_S:
+            self._gentle = self._due
+        else:
+            self._gentle = max(self._gentle + ticks * self._period / GENTLE_CATCH_UP, now - _GENTLE_SLACK_S)
+        wake = max(self._gentle, self._last + ticks * self._period / MAX_CATCH_UP)
         if wake > now:
             self._sleep(wake - now)
             now = self._clock()
