@@ -10,8 +10,8 @@ MAX_DEBT_S = 1.0
 # once, a longer one so that nobody sees the robot hurry.
 SHORT_DEBT_S = 0.2
 MAX_CATCH_UP, GENTLE_CATCH_UP = 2.0, 1.25
-# Delays that are shorter than this do not count for the gentle speed, which is a mean [s]: a world that is held up again
-# and again would only fall behind by them.
+# The gentle speed is a mean, for which shorter delays than this do not count [s]: else a world that is held up again
+# and again would fall behind by each of them.
 _GENTLE_SLACK_S = 0.1
 # At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
