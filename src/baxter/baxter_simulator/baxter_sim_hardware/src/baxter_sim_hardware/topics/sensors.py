@@ -18,7 +18,7 @@ from .row import STATE_RATE_HZ, Part, Topic
 
 SONAR_FRAME = "sonar_ring"
 SONAR_RATE_HZ = 10.0
-LIGHT_TURNS = 4  # in which all sonars have listened for the lights that pictures show
+LIGHT_TURNS = 12  # in which all sonars have listened for the lights that pictures show
 _UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of an Imu's missing measurement
 
 
@@ -54,7 +54,7 @@ class SensorTopics(Part):
         self._heard[:], self._turn = np.inf, 0
 
     def update(self, time_s):
-        """Show the ring's lights as they are at time_s [s]. The sonars listen in turns: to ask all of them each time
+        """Show the ring's lights as they are at time_s [s]. The sonars listen one by one: to ask all of them each time
         takes as long as eight physics steps, and mostly nobody takes a picture."""
         if self._drawn is None or not self._drawing.due(time_s):
             return
