@@ -23,11 +23,12 @@ NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv pip meshes overlay build urdf kernels pictures)
-# Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
-# and run one after the other, the groups beside each other.
-COMPILED=("baxter_sim_kinematics baxter_sim_hardware" motion_planning)
 # Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
+# Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
+# and run one after the other, the groups beside each other. The collision spheres are cached beside the compiled code.
+COMPILED=("python3 -m baxter_sim_kinematics && python3 -m baxter_sim_hardware"
+    "python3 -m motion_planning && rosrun motion_planning prepare_robots $(printf '%q ' "${PLANNED_FOR[@]}")")
 # Robots whose meshes are made ready for pictures.
 PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf.xacro")
 declare -A TITLES=(
@@ -266,18 +267,14 @@ step_urdf() {
 
 # Compiling takes about ten seconds; without this, the first launch would seem to hang.
 step_kernels() {
-    local package
+    local group
     # On all cores, and then once more one after the other: numba does not compile again what is in the cache, and what
     # fails, perhaps for lack of memory, is repeated alone and told.
-    run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\n" "$@" | xargs -P "$(nproc)" -I GROUP \
-        bash -c "for package in GROUP; do python3 -m \$package || exit; done" || true' compile "$LAB_ROOT" "${COMPILED[@]}"
-    # shellcheck disable=SC2068
-    for package in ${COMPILED[@]}; do
-        run bash -c 'source "$1/tools/environment.bash" && use_build && python3 -m "$2"' compile "$LAB_ROOT" "$package"
+    run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\0" "$@" |
+        xargs -0 -P "$(nproc)" -n 1 bash -c || true' compile "$LAB_ROOT" "${COMPILED[@]}"
+    for group in "${COMPILED[@]}"; do
+        run bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' compile "$LAB_ROOT" "$group"
     done
-    # The collision spheres are cached in the same way, beside the compiled code.
-    run bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
-        rosrun motion_planning prepare_robots "$@"' prepare "$LAB_ROOT" "${PLANNED_FOR[@]}"
     # Message packages are much generated code, 9 MB for moveit_msgs alone. Where Python is not to write bytecode, each node
     # would compile it at every start: a second, and 20 MB.
     if [[ -d devel/lib/python3/dist-packages ]]; then
