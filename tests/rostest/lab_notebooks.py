@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every notebook about Baxter, from top to bottom, twice in one kernel, on one robot; and the commands in a
-terminal."""
+"""Every notebook about Baxter, from top to bottom, on one robot; and the commands in a terminal."""
 import subprocess
 import tempfile
 import unittest

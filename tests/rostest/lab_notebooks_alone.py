@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The notebooks that start their own simulator, from top to bottom, twice in one kernel; Jupyter. No process may be
-left."""
+"""The notebooks that start their own simulator, from top to bottom; Jupyter. No process may be left."""
 import json
 import os
 import re

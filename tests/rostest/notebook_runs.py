@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shared by the tests of the labs' notebooks: run one twice in one kernel, and check its pictures.
+"""Shared by the tests of the labs' notebooks: run one, with LAB_NOTEBOOK_ROUNDS=2 twice in one kernel, and check its
+pictures.
 
 The pictures go to .baxter/pictures, and with them those of docs/labs.md.
 """
@@ -22,6 +23,7 @@ from lab_environment import jupyter  # noqa: E402
 
 PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150
+ROUNDS = int(os.environ.get("LAB_NOTEBOOK_ROUNDS", "1"))
 # Those that leave Baxter's arms alone, those that move them, and those whose robot is another one.
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
@@ -60,11 +62,11 @@ class Run:
         self.client = NotebookClient(self.notebook, timeout=CELL_TIMEOUT_S, kernel_name=jupyter.KERNEL,
                                      resources={"metadata": {"path": str(path.parent)}})
 
-    def twice(self):
-        """Execute everything twice; return the errors, one per line."""
+    def rounds(self):
+        """Execute everything ROUNDS times; return the errors, one per line."""
         faults = []
         with self.client.setup_kernel(env=self.environment):
-            for number in (1, 2):
+            for number in range(1, ROUNDS + 1):
                 faults += ["%s, round %d: %s" % (self.path.stem, number, text) for text in self._once(number)]
             if self.path.stem in DRAWN and not faults:
                 name, figure = DRAWN[self.path.stem]
@@ -102,7 +104,7 @@ def prepare():
 def faults_of(*rows, environment=lambda: dict(os.environ)):
     """Run lists of notebooks in parallel, those of one list in turn; return the errors, one per line."""
     def run(names):
-        return [fault for name in names for fault in Run(tool.find(name), environment()).twice()]
+        return [fault for name in names for fault in Run(tool.find(name), environment()).rounds()]
 
     with ThreadPoolExecutor(len(rows)) as pool:
         return [fault for found in pool.map(run, rows) for fault in found]
