@@ -255,8 +255,8 @@ def mesh_samples(vertices, triangles, spacing):
         points.append((some[:, None, 0] * (1.0 - i - j)[:, None] + some[:, None, 1] * i[:, None]
                        + some[:, None, 2] * j[:, None]).reshape(-1, 3))
     points = np.concatenate(points)
-    # One sample is enough for a cube with such sides; small triangles have many in one. The cubes' numbers have the order
-    # of their rows, which would take np.unique ten times as long.
+    # One sample is enough for a cube with such sides; small triangles have many in one. The numbers of cubes have the
+    # order of their rows, which take np.unique ten times as long.
     cubes = np.floor(points / (_CUBES * spacing)).astype(np.int64)
     cubes -= cubes.min(axis=0)
     _, first = np.unique(np.ravel_multi_index(tuple(cubes.T), cubes.max(axis=0) + 1), return_index=True)
