@@ -9,10 +9,11 @@ from lab_environment.family import is_running, with_parent
 from lab_testing.waiting import wait_until
 
 # Makes the command, and a child that executes it; both wait for their turns.
-STARTS = """import os, sys
+STARTS = """import os, signal, sys
 from lab_environment.family import with_parent
 before, text = os.getpid(), "import sys; print('it runs', flush=True); sys.stdin.read()"
-command = with_parent([sys.executable, "-c", text])
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in a script's background job
+command = with_parent([sys.executable, "-c", text], %r)
 if os.fork() == 0:
     while %s: pass
     os.execvp(command[0], command)
@@ -24,9 +25,9 @@ if os.fork() == 0:
 def start():
     started = []
 
-    def run(until, then):
-        started.append(subprocess.Popen([sys.executable, "-c", STARTS % (until, then)], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True))
+    def run(until, then, sign="KILL"):
+        started.append(subprocess.Popen([sys.executable, "-c", STARTS % (sign, until, then)], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True))
         return started[-1]
 
     yield run
@@ -39,8 +40,9 @@ def test_a_command_whose_starter_has_ended_meanwhile_does_not_begin(start):
     assert start("os.getppid() == before", "os._exit(0)").communicate(timeout=60)[0] == ""
 
 
-def test_a_command_ends_with_its_starter(start):
-    starter = start("False", "os.wait()")
+@pytest.mark.parametrize("sign", ["KILL", "INT"])
+def test_a_command_ends_with_its_starter(start, sign):
+    starter = start("False", "os.wait()", sign)
     assert starter.stdout.readline() == "it runs\n"
     with open("/proc/%d/task/%d/children" % (starter.pid, starter.pid), encoding="ascii") as file:
         child = int(file.read())
