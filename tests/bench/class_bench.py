@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Labs of a class, as ./baxter.sh labs up starts them: 6 with a program each that moves both arms, then 16 of which 12
 stay paused. Their clients wake the others. Real-time factor through the front door, processors and memory of all
-processes of the class.
+processes of the class, over two minutes.
 
 The environment variable BENCH_CLASS names other classes: "6,16:4" is 6 labs, then 16 of which 4 go on.
 """
@@ -25,7 +25,8 @@ from lab_testing.waiting import wait_until
 from rf_checks.pacing import cpu_time_s
 
 CLASSES, QUICK_CLASSES = "6,16:4", "2,3:1"
-SECONDS, QUICK_SECONDS = 30.0, 6.0
+# A lab makes up for up to 1 s in which it got no processor: where that comes at an end of 30 s, it is 3 % of them.
+SECONDS, QUICK_SECONDS = 120.0, 6.0
 SETTLE_S = 5.0  # simulated, from the first moment at which all labs run
 START_S, ANSWER_S, DOWN_S = 900.0, 60.0, 120.0
 GB = 1e9

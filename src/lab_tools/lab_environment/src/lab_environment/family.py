@@ -12,12 +12,12 @@ def with_parent(command, sign="KILL"):
     """The command (list) that runs another one and ends it by a signal at the end of the process that starts it.
 
     Also where that process ends before the signal is ordered: then the command does not begin. sign: the signal's name.
-    To be called by the process that starts it; of its threads, the one that starts it must last as long. The command gets
-    the signal also where this process ignores it, as everything does with Ctrl-C in a script's background job.
+    To be called by the process that starts it; of its threads, the one that starts it must last as long. The command
+    gets the signal also where this process ignores it, as everything ignores Ctrl-C's in a script's background job.
     """
     heeds = [] if sign == "KILL" else ["env", "--default-signal=" + sign]
-    return [*heeds, "setpriv", "--pdeathsig", sign, "--", "/bin/sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"', str(os.getpid()),
-            *command]
+    return [*heeds, "setpriv", "--pdeathsig", sign, "--", "/bin/sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"',
+            str(os.getpid()), *command]
 
 
 def direct_children(pid):
