@@ -34,6 +34,14 @@ def test_init_node_is_amended_wherever_it_is_taken_from(tmp_path):
     assert done.stdout.startswith("True <function init_node") and done.stderr == ""
 
 
+def test_every_amendment_is_applied_to_the_installed_module():
+    program = ("import importlib, sitecustomize, sys; rows = dict(sitecustomize.AMENDED); "
+               "[importlib.import_module(name) for name in rows]; "
+               "print([name for row in rows.values() for name in row.split() if name not in sys.modules])")
+    done = run(program)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
 def test_an_amendment_that_fails_leaves_the_module_as_it_is(tmp_path):
     a_rospy(tmp_path)
     (tmp_path / "rospy/client.py").write_text("def start():\n    pass\n")
