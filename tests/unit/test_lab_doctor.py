@@ -326,6 +326,12 @@ def test_own_and_foreign_addresses_are_told_apart():
     assert resolve("no-such-host.invalid") == (None, False)
 
 
+def test_a_workspace_that_was_never_set_up_has_one_fault():
+    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=PythonFacts("/usr/bin/python3"))
+    wrong = [finding for finding in examine(facts) if finding.level is Level.WRONG]
+    assert [(finding.topic, finding.fix) for finding in wrong] == [("build", "./baxter.sh setup")]
+
+
 @pytest.fixture
 def silent_server():
     """A port that takes connections and never answers, as a hung master does."""

@@ -53,6 +53,8 @@ def check_python(facts):
     if facts.users_python:
         what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs started there find no rospy")
         yield Finding("python", Level.NOTE, what, f"start them with {_entry(facts)}, or source devel/setup.bash first")
+    if not facts.is_built:
+        return  # set-up, which the missing build asks for, makes Python's environment, too
     if "python" in facts.timed_out:
         yield _busy("python", "python3 has not finished importing what nodes import")
         return
