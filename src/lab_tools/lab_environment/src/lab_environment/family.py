@@ -15,7 +15,7 @@ def with_parent(command, sign="KILL"):
     To be called by the process that starts it; of its threads, the one that starts it must last as long. The command
     gets the signal also where this process ignores it, as everything ignores Ctrl-C's in a script's background job.
     """
-    heeds = [] if sign == "KILL" else ["env", "--default-signal=" + sign]
+    heeds = [] if sign.removeprefix("SIG") == "KILL" else ["env", "--default-signal=" + sign]
     return [*heeds, "setpriv", "--pdeathsig", sign, "--", "/bin/sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"',
             str(os.getpid()), *command]
 

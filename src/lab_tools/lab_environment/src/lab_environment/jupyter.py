@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 from lab_environment import keeper
+from lab_environment.page_files import replace_text
 
 #: The kernel that the labs' notebooks name.
 KERNEL = "baxter"
@@ -48,7 +49,8 @@ def write_kernel(folder, command):
     kernel = Path(folder) / "kernels" / KERNEL
     kernel.mkdir(parents=True, exist_ok=True)
     spec = {"argv": [*command, "-f", "{connection_file}"], "display_name": "Baxter lab", "language": "python"}
-    (kernel / "kernel.json").write_text(json.dumps(spec, indent=1) + "\n", encoding="utf-8")
+    # Another server, or its kernel, may just be reading it.
+    replace_text(kernel / "kernel.json", json.dumps(spec, indent=1) + "\n")
 
 
 def environment(state, kernels):
@@ -61,7 +63,7 @@ def environment(state, kernels):
         made[variable] = str(state / name)
     defaults = state / "config" / "labconfig" / "default_setting_overrides.json"
     defaults.parent.mkdir(exist_ok=True)
-    defaults.write_text(json.dumps(_SETTINGS, indent=1) + "\n", encoding="utf-8")
+    replace_text(defaults, json.dumps(_SETTINGS, indent=1) + "\n")
     return made
 
 

@@ -24,7 +24,7 @@ def folder():
 
 def write_address(master_uri, address):
     """The page of this master's lab is at ``address``, which holds a token. Raises OSError."""
-    _replace(_address_file(master_uri), address)
+    replace_text(_address_file(master_uri), address)
 
 
 def remove_address(master_uri, address):
@@ -54,15 +54,15 @@ def result_file():
 
 def write_result(text):
     """An exercise has been checked. Raises OSError."""
-    _replace(result_file(), text)
+    replace_text(result_file(), text)
 
 
 def _address_file(master_uri):
     return folder() / ("address-" + re.sub(r"[^\w.-]+", "_", master_uri))
 
 
-def _replace(path, text):
-    """Write a file that only the user can read; nobody finds half of it."""
+def replace_text(path, text):
+    """Write a file (Path) that only the user can read; nobody finds half of it. Raises OSError."""
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as draft:
         draft.write(text)
     os.replace(draft.name, path)
