@@ -11,6 +11,8 @@ export LAB_ROOT
 # shellcheck source=tools/environment.bash
 source "$LAB_ROOT/tools/environment.bash"
 
+# The one table of modes: two spaces begin a mode, deeper lines belong to it. `MODE --help` and the words of "did you mean"
+# come from here.
 usage() {
     cat <<'TEXT'
 Usage: ./baxter.sh [MODE] [COMMAND…]
@@ -21,28 +23,98 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
                         the same, open to other machines, which use it with ./baxter.sh ADDRESS
   HOST [COMMAND…]       a robot, by host name or IP address. ROS_IP is found from the route to it;
                         ROS_IP or ROS_HOSTNAME, if you have set one, wins.
-  setup                 install and build what is missing; runs by itself the first time anything is used
+  setup [STEP…]         install and build what is missing; runs by itself the first time anything is used
   setup --with FILE     also fetch the packages of a rosinstall file, and prefer them to ours: rosinstall/README.md
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k;
                         --busy[=PERCENT]: with that share of one core (default 40), the main flows
   notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
-  web                   the lab's page in a browser, beside a running lab: prints its address; --help
-  check LAB PROGRAM     run a student's program in a separate lab and judge the result; --list, --help
+  web                   the lab's page in a browser, beside a running lab: prints its address
+  check LAB PROGRAM     run a student's program in a separate lab and judge the result; --list shows the exercises
   grade FOLDER [LAB [EXERCISE…]]
-                        judge the submissions of a class, several at a time, and write results and pages; --help
+                        judge the submissions of a class, several at a time, and write results and pages
   labs up N | list | start | pause | stop | renew | down | logs
-                        labs for a class on this machine, behind one front door; --help
+                        labs for a class on this machine, behind one front door
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
-  batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs, --help the options
-  batch-node            this machine as one of several for 'batch --engine ray', until Ctrl-C; --help
+  batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs
+  batch-node            this machine as one of several for 'batch --engine ray', until Ctrl-C
   bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
   conformance [HOST]    compare the robot with a physical Baxter's interface, and print a score by group
-  doctor [HOST]         check master, network, clock, build, Python and robot; print a fix for each problem
-  help                  this text
+  doctor [HOST]         check master, network, clock, build, Python and robot; print a fix for each problem.
+                        Without HOST: the master of ROS_MASTER_URI, or else this machine's
+  help                  this text; MODE --help says more about a mode; --version
 
   ./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch
   ./baxter.sh sim rosrun baxter_tools enable_robot.py -e
 TEXT
+}
+
+# help_of MODE: its lines of the table
+help_of() {
+    printf 'One of the modes of ./baxter.sh (./baxter.sh help shows all):\n\n'
+    usage | awk -v mode="$1" '/^$/ { of_mode = 0 } /^  [^ ]/ { of_mode = $1 == mode } of_mode'
+    if [[ $1 == setup ]]; then sed -n 's/^STEPS=(\(.*\))$/\n  A STEP is one of: \1/p' "$LAB_ROOT/tools/setup.bash"; fi
+}
+
+# nearest WORD: the mode that is at most two wrong, missing or additional letters away from WORD; empty if there is none
+nearest() {
+    usage | awk -v word="$1" '
+        function least(a, b) { return a < b ? a : b }
+        function distance(a, b,    i, j, d) {
+            for (i = 0; i <= length(a); i++) d[i, 0] = i
+            for (j = 0; j <= length(b); j++) d[0, j] = j
+            for (i = 1; i <= length(a); i++)
+                for (j = 1; j <= length(b); j++)
+                    d[i, j] = least(d[i - 1, j - 1] + (substr(a, i, 1) != substr(b, j, 1)), 1 + least(d[i - 1, j], d[i, j - 1]))
+            return d[length(a), length(b)]
+        }
+        BEGIN { best = least(3, length(word)) }
+        /^  [a-z]/ { if ((found = distance(word, $1)) < best) { best = found; mode = $1 } }
+        END { print mode }'
+}
+
+version() {
+    sed -n 's:.*<version>\(.*\)</version>.*:Baxter lab stack \1:p' "$LAB_ROOT/src/lab_tools/lab_environment/package.xml"
+}
+
+# The program behind a mode; it runs in the workspace's environment, with a master on this machine.
+declare -A PROGRAMS=(
+    [test]="python3 $LAB_ROOT/tools/run_tests.py"
+    [notebook]="python3 $LAB_ROOT/tools/notebook.py"
+    [web]="rosrun lab_web lab_web"
+    [check]="python3 $LAB_ROOT/src/rf_labs/rf_checks/scripts/check"
+    # -P: no module is taken from the current folder, which may hold submissions.
+    [grade]="python3 -P -m rf_grading"
+    [labs]="python3 -P -m lab_class"
+    [batch]="python3 -m lab_batch"
+    [batch-node]="python3 -m lab_batch.ray_node"
+    [bench]="python3 $LAB_ROOT/tests/bench/run.py"
+    [conformance]="rosrun baxter_conformance conformance"
+)
+
+# run_program MODE [WORD…]
+run_program() {
+    local mode=$1 command
+    shift
+    read -ra command <<<"${PROGRAMS[$mode]}"
+    if asks_only "$mode" "$@"; then
+        if ! has_earlier_build; then help_of "$mode" && exit; fi
+        use_loopback
+    elif [[ $mode == test ]]; then
+        bring_up_to_date --strict || exit
+        use_loopback
+    elif [[ $mode == batch-node ]]; then
+        bring_up_to_date || exit
+    elif [[ $mode == conformance && ${1:--} != -* && $1 != localhost ]]; then
+        use_robot "$1" || exit
+        shift
+        bring_up_to_date || exit
+    else
+        if [[ $mode == conformance && ${1:-} == localhost ]]; then shift; fi
+        bring_up_to_date || exit
+        use_loopback
+    fi
+    use_build || exit
+    exec "${command[@]}" "$@"
 }
 
 # Replace this process by a command in the workspace's environment, or by a shell with the lab's prompt.
@@ -57,11 +129,27 @@ enter() {
     fi
 }
 
-# needs_no_lab WORDS…: do these arguments of the check only request a skeleton, the list or the help?
-needs_no_lab() {
-    local word
-    for word; do
-        case $word in --start | --start=* | --list | -h | --help) return 0 ;; esac
+# refuse_option [WORD…]: no command begins with a dash
+refuse_option() {
+    [[ ${1:-} != -* ]] || { echo "baxter.sh: unknown option '$1'. ./baxter.sh help shows those that it has" >&2; return 2; }
+}
+
+# suggest WORD…: the line that may have been meant
+suggest() {
+    local mode
+    mode=$(nearest "$1")
+    shift
+    if [[ -n $mode ]]; then
+        set -- "$mode" "$@"
+        echo "baxter.sh: did you mean ./baxter.sh $*?" >&2
+    fi
+}
+
+# asks_only MODE WORD…: do the words only ask, for help or, of the check, a list or a skeleton? Then nothing is set up.
+asks_only() {
+    local mode=$1 word
+    for word in "${@:2}"; do
+        case $mode:$word in *:-h | *:--help | check:--list | check:--start | check:--start=*) return 0 ;; esac
     done
     return 1
 }
@@ -80,10 +168,23 @@ refuse_sudo() {
 main() {
     local mode=${1:-sim}
     [[ $# -gt 0 ]] && shift
-    case $mode in help | -h | --help | doctor) ;; *) refuse_sudo || exit ;; esac
+    case $mode in
+        help | -h | --help | --version | doctor) ;;
+        *) refuse_sudo || exit ;;
+    esac
+    case $mode in
+        local | localhost | 127.*) mode=sim ;;
+    esac
+    # What stands behind a command is the command's.
+    case $mode:${1:-} in
+        sim:-h | sim:--help | setup:-h | setup:--help | doctor:-h | doctor:--help) help_of "$mode" && exit ;;
+    esac
     case $mode in
         help | -h | --help)
             usage
+            ;;
+        --version)
+            version
             ;;
         setup)
             exec bash "$LAB_ROOT/tools/setup.bash" "$@"
@@ -91,7 +192,12 @@ main() {
         doctor)
             # Works on a half-built workspace, so it sets nothing up. The doctor itself reports a host that does not
             # resolve or has no route.
-            if [[ $# -gt 0 ]]; then use_robot "$1" 2>/dev/null || export ROS_MASTER_URI=http://$1:11311; fi
+            refuse_option "$@" || exit
+            if is_loopback "${1:-}"; then
+                use_loopback
+            elif [[ $# -gt 0 ]]; then
+                use_robot "$1" 2>/dev/null || export ROS_MASTER_URI=http://$1:11311
+            fi
             # The Python of programs that are started outside of this environment.
             LAB_USERS_PYTHON=$(command -v python3)
             export LAB_USERS_PYTHON
@@ -104,90 +210,21 @@ main() {
             fi
             exec python3 "$LAB_ROOT/tools/doctor.py"
             ;;
-        test)
-            bring_up_to_date --strict || exit
-            use_loopback
-            use_build || exit
-            exec python3 "$LAB_ROOT/tools/run_tests.py" "$@"
-            ;;
-        check)
-            # With a build, a skeleton or the list of exercises needs no set-up.
-            { needs_no_lab "$@" && has_earlier_build; } || bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec python3 "$LAB_ROOT/src/rf_labs/rf_checks/scripts/check" "$@"
-            ;;
-        grade)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            # -P: no module is taken from the current folder, which may hold submissions.
-            exec python3 -P -m rf_grading "$@"
-            ;;
-        labs)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec python3 -P -m lab_class "$@"
-            ;;
         handout)
             # Needs no set-up, so it takes the system's Python: the first one in PATH may be conda's.
             PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec /usr/bin/python3 -m rf_checks.handout "$@"
             ;;
-        bench)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec python3 "$LAB_ROOT/tests/bench/run.py" "$@"
-            ;;
-        conformance)
-            # Without a host, or with options first: the simulator on this machine.
-            if [[ $# -gt 0 && $1 != -* && $1 != localhost ]]; then
-                use_robot "$1" || exit
-                shift
-            else
-                [[ ${1:-} == localhost ]] && shift
+        sim)
+            local public=
+            case ${1:-} in --public | --public=*) public=${1#--} && shift ;; esac
+            refuse_option "$@" || exit
+            bring_up_to_date "$@" || exit
+            if [[ -z $public ]]; then
                 use_loopback
+            else
+                public=${public#public}
+                use_public "${public#=}" || exit
             fi
-            bring_up_to_date || exit
-            use_build || exit
-            exec rosrun baxter_conformance conformance "$@"
-            ;;
-        batch)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec python3 -m lab_batch "$@"
-            ;;
-        batch-node)
-            bring_up_to_date || exit
-            use_build || exit
-            exec python3 -m lab_batch.ray_node "$@"
-            ;;
-        notebook)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec python3 "$LAB_ROOT/tools/notebook.py" "$@"
-            ;;
-        web)
-            bring_up_to_date || exit
-            use_loopback
-            use_build || exit
-            exec rosrun lab_web lab_web "$@"
-            ;;
-        sim | local | localhost | 127.*)
-            local command=("$@")
-            if [[ ${1:-} == --public* ]]; then command=("${@:2}"); fi
-            bring_up_to_date ${command[@]+"${command[@]}"} || exit
-            case ${1:-} in
-                --public | --public=*)
-                    local address=${1#--public}
-                    use_public "${address#=}" || exit
-                    shift
-                    ;;
-                *) use_loopback ;;
-            esac
             use_build || exit
             enter "$@"
             ;;
@@ -201,7 +238,13 @@ main() {
             exit 2
             ;;
         *)
-            use_robot "$mode" || exit
+            if [[ -n ${PROGRAMS[$mode]:-} ]]; then run_program "$mode" "$@"; fi
+            # A host need not be there for that; a slip is told.
+            if ! asks_only host "${1:-}" || [[ -n $(nearest "$mode") ]]; then
+                use_robot "$mode" || { suggest "$mode" "$@"; exit 2; }
+            fi
+            if asks_only host "${1:-}"; then help_of HOST && exit; fi
+            refuse_option "$@" || exit
             bring_up_to_date "$@" || exit
             use_build || exit
             enter "$@"

@@ -58,7 +58,8 @@ use_public() {
     echo "Open to every machine that reaches $address (docs/security.md). There: ./baxter.sh $address" >&2
 }
 
-# use_robot HOST: a master on another machine, which must be able to connect to the address that we announce.
+# use_robot HOST: a master on another machine, which must be able to connect to the address that we announce. The port of a
+# ROS_MASTER_URI that names HOST is kept.
 use_robot() {
     local host=$1 address source_address
     address=$(getent ahostsv4 "$host" | awk '{ print $1; exit }')
@@ -67,7 +68,8 @@ use_robot() {
              "IPv4 address that this machine can resolve. Add the robot to /etc/hosts or give its address." >&2
         return 2
     fi
-    export ROS_MASTER_URI=http://$host:11311
+    [[ $(host_of "${ROS_MASTER_URI:-}") == "$host" ]] || ROS_MASTER_URI=http://$host:11311
+    export ROS_MASTER_URI
     # A loopback name is a left-over of sim mode; no robot could connect to it.
     if [[ -n ${ROS_HOSTNAME:-} ]] && is_loopback "$ROS_HOSTNAME"; then unset ROS_HOSTNAME; fi
     if [[ -n ${ROS_IP:-} ]] && is_loopback "$ROS_IP"; then unset ROS_IP; fi

@@ -3,6 +3,7 @@
 
 import fcntl
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -80,8 +81,11 @@ ROBOT = {"ROS_MASTER_URI": "http://baxter.local:11311"}
         ({"ROS_HOSTNAME": "desk.local"}, {**ROBOT, "ROS_HOSTNAME": "desk.local"}),
         ({"ROS_HOSTNAME": "localhost"}, {**ROBOT, "ROS_IP": "10.42.0.1"}),
         ({"ROS_IP": "127.0.0.1"}, {**ROBOT, "ROS_IP": "10.42.0.1"}),
+        ({"ROS_MASTER_URI": "http://baxter.local:11411"},
+         {"ROS_MASTER_URI": "http://baxter.local:11411", "ROS_IP": "10.42.0.1"}),
     ],
-    ids=["found from the route", "own address wins", "own name wins", "left over from sim", "loopback address"],
+    ids=["found from the route", "own address wins", "own name wins", "left over from sim", "loopback address",
+         "another port there"],
 )
 def test_robot_is_told_an_address_that_it_can_reach(variables_after, given, expected):
     assert variables_after("use_robot baxter.local", **given) == expected
@@ -128,8 +132,45 @@ def test_help_needs_no_set_up_and_works_through_a_link(tmp_path):
         assert f"\n  {mode}" in done.stdout
 
 
+def modes():
+    """The modes of the table, without HOST."""
+    return sorted({line.split()[0] for line in baxter("help").stdout.splitlines() if re.match("  [a-z]", line)})
+
+
+def test_each_mode_has_help_without_a_build(tmp_path):
+    copy = copy_of_tools(tmp_path / "ws")
+    assert {"sim", "setup", "test", "labs", "doctor"} < set(modes())
+    for mode in [*modes(), "localhost", "some-robot"]:
+        if mode == "handout":  # its own help needs its package
+            continue
+        done = baxter(mode, "--help", script=copy / "baxter.sh")
+        assert (done.returncode, done.stderr) == (0, ""), mode
+        assert f"  {dict(localhost='sim').get(mode, mode if mode in modes() else 'HOST')}" in done.stdout
+    assert "meshes" in baxter("setup", "-h", script=copy / "baxter.sh").stdout  # one of its steps
+
+
+@pytest.mark.parametrize(("words", "meant"), [
+    ("notebok 7_waving", "notebook 7_waving"), ("tset", "test"), ("chek --list", "check --list"),
+    ("lab up 3", "labs up 3"), ("notebok --help", "notebook --help"), ("no-such-host.invalid true", None),
+    ("x", None),
+])
+def test_a_slip_in_a_mode_is_told_with_the_line_that_was_meant(words, meant):
+    done = baxter(*words.split())
+    assert done.returncode == 2 and words.split()[0] in done.stderr
+    assert ("did you mean" in done.stderr) == bool(meant)
+    assert not meant or f"./baxter.sh {meant}?" in done.stderr
+
+
+def test_version_is_that_of_all_packages():
+    version = baxter("--version").stdout.split()[-1]
+    manifests = subprocess.run(["grep", "-rhoP", "--include=package.xml", "(?<=<version>).*(?=</version>)",
+                                *sorted(map(str, (ROOT / "src").glob("*/")))], capture_output=True, text=True).stdout
+    assert set(manifests.split()) == {version}
+
+
 def test_unknown_option_and_unknown_host_are_refused():
-    assert baxter("--simulate").returncode == 2
+    for words in (["--simulate"], ["sim", "--pubic"], ["localhost", "-x"], ["doctor", "--hosts"]):
+        assert baxter(*words).returncode == 2
     done = baxter("no-such-host.invalid", "true")
     assert done.returncode == 2
     assert "no-such-host.invalid" in done.stderr and "help" in done.stderr
@@ -324,6 +365,15 @@ def test_the_doctor_of_a_fresh_clone_names_the_missing_set_up_and_no_variables(t
                           capture_output=True, text=True)
     assert done.returncode == 1, done.stderr
     assert "./baxter.sh setup" in done.stdout and "ROS_MASTER_URI is" not in done.stdout
+
+
+@pytest.mark.parametrize(("words", "uri"), [
+    ([], "http://localhost:9"), ([], "http://127.0.0.1:9"), (["localhost"], "http://localhost:9"),
+])
+def test_the_doctor_looks_at_the_master_that_the_user_has_named(tmp_path, words, uri):
+    copy = copy_of_tools(tmp_path / "ws")
+    done = baxter("doctor", *words, script=copy / "baxter.sh", env={"PATH": "/usr/bin:/bin", "ROS_MASTER_URI": uri})
+    assert f"{uri} does not answer" in done.stdout and "11311" not in done.stdout
 
 
 def test_a_forgotten_sim_is_put_in_front_of_the_command():

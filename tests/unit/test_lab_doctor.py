@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The doctor's findings in fake environments, and its deadline."""
 
+import fcntl
 import socket
 import threading
 import time
@@ -18,6 +19,7 @@ from lab_doctor.facts import (
     OtherMaster,
     PythonFacts,
     Sensor,
+    SetUp,
     Topics,
 )
 from lab_doctor.probe import (
@@ -28,6 +30,7 @@ from lab_doctor.probe import (
     master_ports,
     parse_listeners,
     resolve,
+    set_up_at_work,
     users_python,
 )
 
@@ -86,6 +89,9 @@ def test_healthy_lab_has_nothing_wrong(facts):
 SICK = {
     # name: (facts, topic of the finding, text in what, text in fix)
     "not built": (replace(HEALTHY_LAB, is_built=False), "build", "not built", "setup"),
+    "set-up cut off": (
+        replace(HEALTHY_LAB, is_fresh=False, set_up=SetUp("pip", is_running=False)), "build", "step 'pip'", "setup",
+    ),
     "stale build": (replace(HEALTHY_LAB, is_fresh=False), "build", "changed", "setup"),
     "pyenv first": (replace(HEALTHY_LAB, python=PythonFacts("/opt/pyenv/python3")), "python", "/opt/pyenv", "setup"),
     "python does not start": (replace(HEALTHY_LAB, python=None), "python", "cannot be run", "setup"),
@@ -330,6 +336,24 @@ def test_a_workspace_that_was_never_set_up_has_one_fault():
     facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=PythonFacts("/usr/bin/python3"))
     wrong = [finding for finding in examine(facts) if finding.level is Level.WRONG]
     assert [(finding.topic, finding.fix) for finding in wrong] == [("build", "./baxter.sh setup")]
+
+
+def test_a_set_up_that_runs_is_told_with_its_step_and_nothing_is_wrong():
+    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=None, set_up=SetUp("apt", "Unpacking numpy"))
+    finding, = (one for one in examine(facts) if one.level is not Level.OK)
+    assert (finding.topic, finding.level) == ("build", Level.BUSY)
+    assert "step 'apt'" in finding.what and "Unpacking numpy" in finding.what and "apt.log" in finding.fix
+
+
+def test_the_lock_tells_a_running_set_up_from_one_that_was_cut_off(tmp_path):
+    assert set_up_at_work(tmp_path) is None
+    (tmp_path / ".baxter/logs").mkdir(parents=True)
+    (tmp_path / ".baxter/at_work").write_text("apt\n")
+    (tmp_path / ".baxter/logs/apt.log").write_bytes(b"x" * 10_000 + b"\nGet: 1\rGet: 2 \xff\n\n")
+    with open(tmp_path / ".baxter/lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert set_up_at_work(tmp_path) == SetUp("apt", "Get: 2 \ufffd")
+    assert set_up_at_work(tmp_path) == SetUp("apt", is_running=False)
 
 
 @pytest.fixture

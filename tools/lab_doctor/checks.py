@@ -37,7 +37,15 @@ def _busy(topic, what):
 
 
 def check_build(facts):
-    if not facts.is_built:
+    if facts.set_up is not None:
+        log = f"{facts.root}/.baxter/logs/{facts.set_up.step}.log"
+    if facts.set_up is not None and facts.set_up.is_running:
+        what = f"set-up is running, in step '{facts.set_up.step}': {facts.set_up.last_line or 'it has just begun'}"
+        yield Finding("build", Level.BUSY, what, f"wait until it has ended; tail -f {log} shows what it does")
+    elif facts.set_up is not None:
+        what = f"the last set-up was cut off in step '{facts.set_up.step}' (log: {log})"
+        yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
+    elif not facts.is_built:
         yield Finding("build", Level.WRONG, "the workspace is not built", "./baxter.sh setup")
     elif "is_fresh" in facts.timed_out:
         yield _busy("build", "reading all packages takes too long")
@@ -53,7 +61,7 @@ def check_python(facts):
     if facts.users_python:
         what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs started there find no rospy")
         yield Finding("python", Level.NOTE, what, f"start them with {_entry(facts)}, or source devel/setup.bash first")
-    if not facts.is_built:
+    if not facts.is_built or facts.set_up is not None:
         return  # set-up, which the missing build asks for, makes Python's environment, too
     if "python" in facts.timed_out:
         yield _busy("python", "python3 has not finished importing what nodes import")

@@ -75,6 +75,15 @@ class PythonFacts:
 
 
 @dataclass(frozen=True)
+class SetUp:
+    """A set-up that has not ended: its step, the last line of that step's log, and whether it runs or was cut off."""
+
+    step: str
+    last_line: str = ""
+    is_running: bool = True
+
+
+@dataclass(frozen=True)
 class OtherMaster:
     """A ROS master of this machine at another port than ROS_MASTER_URI's."""
 
@@ -103,6 +112,7 @@ class Facts:
     move_group: MoveGroup | None = None  # also None if no move_group runs
     is_built: bool = False
     is_fresh: bool | None = None
+    set_up: SetUp | None = None  # None: the last one ended, or there was none
     python: PythonFacts | None = None
     # Path of `python3` outside the lab's environment, if it is not the system's.
     users_python: str = ""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gather the facts in parallel, each with a deadline: the doctor must not hang on a dead network."""
 
+import fcntl
 import http.client
 import json
 import re
@@ -24,6 +25,7 @@ from lab_doctor.facts import (
     OtherMaster,
     PythonFacts,
     Sensor,
+    SetUp,
     Topics,
 )
 
@@ -32,6 +34,8 @@ DEADLINE_S = 15.0
 PATIENCE_S = 4.0
 CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
+# Of the log of a running set-up: the end that is read, and the most of its last line that is shown.
+LOG_TAIL_BYTES, LINE_LENGTH = 4096, 100
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
 ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2?|rviz|robot_state_publisher|rosout)")
 # A node with this service is a move_group.
@@ -52,6 +56,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         "topics": lambda: listen(root, ros["ROS_MASTER_URI"]),
         "move_group": lambda: ask_move_group(root, ros["ROS_MASTER_URI"]),
         "is_fresh": lambda: is_fresh(root),
+        "set_up": lambda: set_up_at_work(root),
         "python": ask_python,
         "listeners": list_listeners,
         "other_masters": lambda: find_masters(ros["ROS_MASTER_URI"]),
@@ -68,6 +73,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         move_group=answers.get("move_group"),
         is_built=(root / "devel" / "setup.bash").is_file(),
         is_fresh=answers.get("is_fresh"),
+        set_up=answers.get("set_up"),
         python=answers.get("python"),
         listeners=answers.get("listeners"),
         other_masters=answers.get("other_masters") or [],
@@ -272,6 +278,30 @@ def is_fresh(root: Path) -> bool:
     """Whether the fingerprint of the last set-up is still valid, by baxter.sh's own function."""
     script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; [[ $(<"$1/.baxter/done") == "$(fingerprint)" ]]'
     return subprocess.run(["bash", "-c", script, "fresh", str(root)], capture_output=True).returncode == 0
+
+
+def set_up_at_work(root: Path) -> SetUp | None:
+    """The set-up that runs or was cut off: it names its step in a file, and holds a lock while it runs."""
+    state = root / ".baxter"
+    try:
+        step = (state / "at_work").read_text().strip()
+        lock = (state / "lock").open()
+    except OSError:
+        return None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return SetUp(step, _last_line(state / "logs" / f"{step}.log"))
+    return SetUp(step, is_running=False)
+
+
+def _last_line(log: Path) -> str:
+    try:
+        lines = log.read_bytes()[-LOG_TAIL_BYTES:].decode(errors="replace").splitlines()
+    except OSError:
+        return ""
+    return next((line.strip()[:LINE_LENGTH] for line in reversed(lines) if line.strip()), "")
 
 
 def ask_python() -> PythonFacts:
