@@ -6,6 +6,7 @@ Among external packages, those of ROS and of Debian are checked; pip's are in re
 """
 
 import ast
+import importlib.util
 import re
 from functools import cache
 from pathlib import Path
@@ -80,6 +81,13 @@ def test_package_xml_names_what_is_imported():
         if needed not in (always | in_tests if is_in_tests(file) else always):
             unnamed.append((file, needed))
     assert unnamed == []
+
+
+@pytest.mark.parametrize("module", [
+    "angles", "diagnostic_updater", "image_geometry", "laser_geometry", "map_msgs", "message_filters", "resource_retriever",
+    "scipy", "stereo_msgs", "tf2_geometry_msgs", "tf2_kdl", "tf2_sensor_msgs", "tf_conversions", "topic_tools"])
+def test_set_up_installs_what_programs_for_a_ros_desktop_import(module):
+    assert importlib.util.find_spec(module) is not None
 
 
 def circle(edges):
