@@ -6,14 +6,12 @@ import contextlib
 import hashlib
 import locale
 import os
-import stat
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, read_file
-from urdf_model.files import kind_of
+from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, check_file, read_file
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import BulletSimError
@@ -153,13 +151,14 @@ class MeshFiles:
         self._cache = cache or MeshCache()
 
     def path(self, mesh):
-        """Return the path of the file; raises BulletSimError if it does not exist or is not a regular file."""
+        """Return the path of the file; raises BulletSimError if it does not exist, or is no file that is read."""
         path = self._find_mesh(mesh.filename)
         if path is None:
             raise BulletSimError("mesh %s cannot be found%s" % (mesh.filename, _reason(mesh.filename)))
-        mode = os.stat(path).st_mode
-        if not stat.S_ISREG(mode):
-            raise BulletSimError("mesh %s cannot be used: it is %s, not a file" % (mesh.filename, kind_of(mode)))
+        try:
+            check_file(path, MOST_BYTES)
+        except OSError as error:
+            raise BulletSimError("mesh %s cannot be used: %s" % (mesh.filename, error.strerror)) from None
         return path
 
     def wavefront(self, mesh, planes=(), hollow=True):

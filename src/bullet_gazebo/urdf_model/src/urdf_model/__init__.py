@@ -3,7 +3,7 @@
 
 from .bounds import OutOfBounds, check_robot
 from .errors import UrdfError
-from .files import description_text, read_file
+from .files import check_file, description_text, read_file, read_text
 from .merge import MergedFrame, MergedLink, MergedRobot, merge_fixed
 from .model import (
     Box,
@@ -48,6 +48,7 @@ __all__ = [
     "Transmission",
     "UrdfError",
     "XmlRefused",
+    "check_file",
     "check_robot",
     "description_text",
     "drawing_urdf",
@@ -55,5 +56,6 @@ __all__ = [
     "parse_urdf",
     "parse_xml",
     "read_file",
+    "read_text",
     "refuse_entities",
 ]

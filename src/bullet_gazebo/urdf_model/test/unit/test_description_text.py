@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The text of a description's file."""
+import os
+
 import pytest
 
 from urdf_model import UrdfError, description_text, parse_urdf
@@ -33,3 +35,12 @@ def test_a_file_that_is_missing_or_no_text_is_named(tmp_path):
     (tmp_path / "r.urdf").write_bytes(b"\xff\xfe")
     with pytest.raises(ValueError, match="utf-8"):
         description_text(tmp_path / "r.urdf")
+
+
+def test_a_device_and_a_pipe_are_not_waited_for(tmp_path):
+    (tmp_path / "r.urdf").symlink_to("/dev/zero")
+    with pytest.raises(OSError, match="a device"):
+        description_text(tmp_path / "r.urdf")
+    os.mkfifo(tmp_path / "r.xacro")
+    with pytest.raises(OSError, match="a named pipe"):
+        description_text(tmp_path / "r.xacro")

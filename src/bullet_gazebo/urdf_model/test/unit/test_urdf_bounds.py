@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Numbers out of bounds and endless descriptions are refused, with the bound in the message."""
 
-import os
 
 import numpy as np
 import pytest
 
-from urdf_model import OutOfBounds, UrdfError, XmlRefused, bounds, parse_urdf, parse_xml, read_file
+from urdf_model import OutOfBounds, UrdfError, XmlRefused, bounds, parse_urdf, parse_xml
 
 ROBOT = """<robot name="r"><link name="base"/><link name="tip">
   <inertial><origin xyz="0 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
@@ -92,20 +91,3 @@ def test_bounds_belong_to_what_they_bound_and_have_a_reason(name):
     bound = ALL[name]
     assert bound.check(bound.low, "it") == bound.low and bound.check(bound.high, "it") == bound.high
     assert len(bound.reason) > 10
-
-
-@pytest.mark.parametrize("make, message", [
-    (lambda path: os.mkfifo(path), "a named pipe, not a file"),
-    (lambda path: path.symlink_to("/dev/zero"), "a device, not a file"),
-    (lambda path: path.write_bytes(b""), "it is empty"),
-    (lambda path: path.write_bytes(b"a" * 11), "11 bytes, expected at most 10"),
-])
-def test_only_files_are_read_and_no_more_of_them_than_expected(tmp_path, make, message):
-    make(tmp_path / "thing")
-    with pytest.raises(OSError, match=message):
-        read_file(tmp_path / "thing", 10)
-
-
-def test_a_file_is_read(tmp_path):
-    (tmp_path / "thing").write_bytes(b"a" * 10)
-    assert read_file(tmp_path / "thing", 10) == b"a" * 10
