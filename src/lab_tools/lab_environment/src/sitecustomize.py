@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run by every Python that starts in the lab's environment: amends some modules when they are imported, and lets a
-program whose output nobody reads any more end without an error.
+program whose output nobody reads any more end without an error. Debian's Python gets the workspace's packages as well.
 
 It imports only what Python has loaded or built in, so other programs are not slowed down. docs/decisions/0008 says why
 it is done this way.
@@ -54,6 +54,23 @@ def _amend_when_loaded(loader, amendments):
     loader.exec_module = exec_module
 
 
+def _add_the_workspaces_packages() -> None:
+    """Let a script that begins with `#!/usr/bin/python3` find what set-up took from PyPI.
+
+    The virtual environment is the one that comes first in PATH. Its packages come last here: the system's own programs
+    keep theirs.
+    """
+    if sys.prefix != sys.base_prefix:
+        return  # a virtual environment, the workspace's or the user's own
+    for folder in os.environ.get("PATH", "").split(os.pathsep):
+        if os.path.isfile(os.path.join(folder, "python3")):
+            environment = os.path.dirname(folder)
+            packages = "%s/lib/python%d.%d/site-packages" % (environment, *sys.version_info[:2])
+            if os.path.isfile(os.path.join(environment, "pyvenv.cfg")) and os.path.isdir(packages):
+                sys.path.append(packages)
+            return
+
+
 def _run_the_next():
     """Run the sitecustomize that this one hides: the system's, or one that the user has put in PYTHONPATH."""
     for folder in sys.path:
@@ -85,6 +102,7 @@ def _flush():
         pass  # there is none, or it is closed; Python itself reports what else is wrong with it
 
 
+_add_the_workspaces_packages()
 sys.meta_path.insert(0, AmendingFinder)
 sys.excepthook = _report
 # The first function that is registered is the last one that runs.

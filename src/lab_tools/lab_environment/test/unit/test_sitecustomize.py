@@ -56,6 +56,26 @@ def test_the_sitecustomize_that_is_hidden_runs_once(tmp_path):
     assert done.stdout == f"the next, sitecustomize {tmp_path}/sitecustomize.py\n"
 
 
+def of_system_python(program, first_in_path):
+    done = subprocess.run(["/usr/bin/python3", "-c", program], capture_output=True, text=True,
+                          env={"PYTHONPATH": str(OURS), "PATH": "%s:/usr/bin:/bin" % first_in_path})
+    return done.stdout, done.stderr
+
+
+def test_debians_python_finds_the_packages_of_the_virtual_environment_after_its_own(tmp_path):
+    found = tmp_path / ("lib/python%d.%d/site-packages" % sys.version_info[:2])
+    found.mkdir(parents=True)
+    for name in ("only_in_the_workspace", "numpy"):
+        (found / (name + ".py")).write_text("")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/python3").write_text("")
+    program = "import sys, only_in_the_workspace, numpy; print(sys.path[-1], len(numpy.zeros(3)))"
+    assert "ModuleNotFoundError" in of_system_python(program, tmp_path / "bin")[1]  # a folder, no virtual environment
+    (tmp_path / "pyvenv.cfg").write_text("")
+    assert of_system_python(program, tmp_path / "bin") == ("%s 3\n" % found, "")
+    assert "ModuleNotFoundError" in of_system_python(program, "/usr/bin")[1]
+
+
 def without_reader(program, *options):
     """(exit code, errors) of a program whose output nobody reads."""
     read, write = os.pipe()
