@@ -7,7 +7,7 @@ import numpy as np
 
 from baxter_model.description import finger_openings
 from baxter_model.self_collision import spawn_options
-from bullet_sim import World
+from bullet_sim import LOG, World
 from bullet_sim.solids import with_solids
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
@@ -26,7 +26,7 @@ class SelfClearance:
 
     FAR, SEEN_M = 1.0, 0.02
 
-    def __init__(self, urdf_xml, names, warn=lambda text: None):
+    def __init__(self, urdf_xml, names, warn=LOG.warning):
         robot = parse_urdf(urdf_xml, source="robot_description")
         self._world = World(find_mesh=ResourceFinder(), warn=warn, contact_ahead_m=self.SEEN_M)
         options = spawn_options(robot.links)

@@ -4,11 +4,11 @@
 One thread owns a World and all its Models; nothing here locks.
 """
 
-from .errors import BulletSimError
+from .errors import LOG, BulletSimError
 from .model import Contact, Model
 from .pose import Pose
 from .shapes import MeshCache, MeshFiles
 from .stand_ins import with_stand_ins
 from .world import World
 
-__all__ = ["BulletSimError", "Contact", "MeshCache", "MeshFiles", "Model", "Pose", "World", "with_stand_ins"]
+__all__ = ["LOG", "BulletSimError", "Contact", "MeshCache", "MeshFiles", "Model", "Pose", "World", "with_stand_ins"]

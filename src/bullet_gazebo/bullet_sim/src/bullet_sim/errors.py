@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one error of this package."""
+"""The one error of this package, and the log of what it repairs."""
+
+import logging
 
 from urdf_model import OutOfBounds
+
+#: Gets the warnings of worlds that were given no other way to say them. Python prints them on stderr.
+LOG = logging.getLogger("bullet_sim")
 
 
 class BulletSimError(Exception):

@@ -14,7 +14,7 @@ import numpy as np
 from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, check_file, read_file
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
-from .errors import BulletSimError
+from .errors import LOG, BulletSimError
 from .gathered import Part, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
@@ -41,7 +41,7 @@ class MeshCache:
     the folder cannot be written, or its disk is full, files are made in a folder for temporary files.
     """
 
-    def __init__(self, folder=None, warn=lambda text: None):
+    def __init__(self, folder=None, warn=LOG.warning):
         """``warn(text)`` is called for meshes that are simplified, and once for a folder that cannot be written."""
         self._warn = warn
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")

@@ -8,7 +8,7 @@ import numpy as np
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
 from .builder import Blueprint, build, is_wheel, link_collisions
-from .errors import BulletSimError, within
+from .errors import LOG, BulletSimError, within
 from .model import Contact, Model
 from .overlaps import come_out
 from .pose import Pose
@@ -23,7 +23,8 @@ SOLVER_ITERATIONS = 20
 
 
 def plain_path(uri):
-    """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages."""
+    """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages, whose
+    meshes others find (``model_files.resources.ResourceFinder``)."""
     path = uri[len("file://") :] if uri.startswith("file://") else uri
     return path if os.path.isfile(path) else None
 
@@ -51,7 +52,8 @@ class World:
         costs time for contacts that never happen. For small bodies it is at most a fiftieth of their size.
     :param seed: of ``World.random``, for noise
     :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
-    :param warn: function of one line of text, called after a repair
+    :param warn: function of one line of text, called after a repair, as where a box replaces a mesh that
+        ``find_mesh`` does not find; the default prints it
     :param error: function of one line of text, called for a model that got an impossible state
     """
 
@@ -64,8 +66,8 @@ class World:
         seed=0,
         contact_ahead_m=0.004,
         find_mesh=plain_path,
-        warn=lambda text: None,
-        error=lambda text: None,
+        warn=LOG.warning,
+        error=LOG.error,
     ):
         self.time_step_s = within(bounds.TIME_STEP, time_step_s, "the time step")
         self._step_since = 0, 0.0  # the tick and the time [s] that the present length of a tick counts from

@@ -189,6 +189,13 @@ def test_a_chain_without_meshes_collides_after_one_warning():
     world.close()
 
 
+def test_a_world_that_is_given_nothing_to_warn_with_says_what_it_replaces(caplog):
+    world = World()
+    world.spawn(robot_of(LINK % ("a", INERTIAL % (1, 1, 1, 1), "a", "a")), "chain", static=True)
+    assert "a.stl" in caplog.text and "replaces it in link 'a'" in caplog.text
+    world.close()
+
+
 def test_a_moving_link_without_mass_is_one_line_and_falls_like_any_other():
     told = []
     world = World(warn=told.append)

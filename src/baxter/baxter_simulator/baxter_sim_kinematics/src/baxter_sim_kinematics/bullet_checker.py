@@ -9,7 +9,7 @@ import numpy as np
 
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics.collision import Touch
-from bullet_sim import World
+from bullet_sim import LOG, World
 from urdf_model import Mesh
 
 # Random postures in which the hull of a fixed link's mesh must touch what the mesh touches, to replace it.
@@ -39,7 +39,7 @@ class BulletChecker:
 
     @classmethod
     def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None,
-                 warn=lambda text: None):
+                 warn=LOG.warning):
         """Return a checker with a separate world, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
 
         ``find_mesh``, ``warn``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
@@ -49,7 +49,8 @@ class BulletChecker:
         model = world.spawn(robot, robot.name or "robot", static=True, **options)
         rough = None
         if mesh_cuts is None and _has_meshes(model.merged.links[model.merged.root]):
-            rough_world = World(**({} if find_mesh is None else {"find_mesh": find_mesh}))
+            # The first world has said what it lacks.
+            rough_world = World(warn=lambda text: None, **({} if find_mesh is None else {"find_mesh": find_mesh}))
             # Meshes of a body that moves are convex; without a step it stays.
             rough = rough_world, rough_world.spawn(robot, robot.name or "robot", static=False)
         return cls(world, model, self_collision_pairs, margin_m, rough)
@@ -161,7 +162,7 @@ def _has_meshes(link):
     return any(isinstance(one.geometry, Mesh) for one in link.collisions)
 
 
-def self_checker(robot, find_mesh, warn=lambda text: None):
+def self_checker(robot, find_mesh, warn=LOG.warning):
     """Return a BulletChecker of a robot alone: with Baxter's own pairs and convex pieces, or of another robot with all
     pairs that make sense. ``robot``: urdf_model.Robot; ``find_mesh``, ``warn``: as for ``bullet_sim.World``.
     """

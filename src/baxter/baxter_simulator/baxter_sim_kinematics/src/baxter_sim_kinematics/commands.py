@@ -163,7 +163,7 @@ def _ik(parser, options):
     return 0
 
 
-def self_collision_checker(robot, warn=lambda text: None):
+def self_collision_checker(robot, warn):
     """Return a BulletChecker of ``robot`` alone; ``warn`` is called with a text where a mesh is missing."""
     from baxter_sim_kinematics.bullet_checker import self_checker
     from model_files.resources import ResourceFinder

@@ -84,7 +84,8 @@ def _reach(options):
     if settings.self_collision:
         # The worker processes make their own; this one tells once what they will lack.
         self_collision_checker(robot, tell).close()
-    values = compute(chain, settings, options.out, options.jobs, _Bar(), lambda: self_collision_checker(robot))
+    values = compute(chain, settings, options.out, options.jobs, _Bar(),
+                     lambda: self_collision_checker(robot, lambda text: None))
     found = ReachMap(np.array(settings.lower), settings.cell_m, settings.rotations(),
                      values.reached.reshape(*settings.shape, -1), values.manipulability.reshape(settings.shape),
                      chain.base, chain.tip, settings.self_collision)
