@@ -7,6 +7,7 @@ it is done this way.
 """
 import atexit
 import os
+import site
 import sys
 
 # Module that is amended on import -> our modules, by spaces, whose `amend(module)` is called then.
@@ -21,6 +22,9 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
            "rosgraph.roslogging": "lab_environment.full_disk",
            "roslaunch.parent": "lab_environment.launch_guard"}
+
+#: Folders of the system's programs.
+SYSTEM_FOLDERS = ("/usr/bin/", "/usr/sbin/", "/usr/lib/", "/usr/share/", "/bin/", "/sbin/", "/opt/ros/")
 
 
 class AmendingFinder:
@@ -56,20 +60,27 @@ def _amend_when_loaded(loader, amendments):
 
 
 def _add_the_workspaces_packages() -> None:
-    """Let a script that begins with `#!/usr/bin/python3` find what set-up took from PyPI.
+    """Let a user's script that begins with `#!/usr/bin/python3` import what `python3` does.
 
-    The virtual environment is the one that comes first in PATH. Its packages come last here: the system's own programs
-    keep theirs.
+    The virtual environment is the one that comes first in PATH. Its packages come before Debian's, as for its own
+    Python: a package's parts from both would not fit each other. The system's programs keep Debian's alone.
     """
-    if sys.prefix != sys.base_prefix:
-        return  # a virtual environment, the workspace's or the user's own
+    if sys.prefix != sys.base_prefix or not _runs_a_users_program(sys.orig_argv[1:]):
+        return
     for folder in os.environ.get("PATH", "").split(os.pathsep):
         if os.path.isfile(os.path.join(folder, "python3")):
             environment = os.path.dirname(folder)
             packages = "%s/lib/python%d.%d/site-packages" % (environment, *sys.version_info[:2])
             if os.path.isfile(os.path.join(environment, "pyvenv.cfg")) and os.path.isdir(packages):
-                sys.path.append(packages)
+                debians = [place for place, entry in enumerate(sys.path) if entry in site.getsitepackages()]
+                sys.path.insert(min(debians, default=len(sys.path)), packages)
             return
+
+
+def _runs_a_users_program(words: list[str]) -> bool:
+    """Whether Python, called with `words`, runs something else than a module or a program of the system."""
+    program = next((word for word in words if not word.startswith("-")), "")
+    return "-m" not in words[:1] and not program.startswith(SYSTEM_FOLDERS)
 
 
 def _run_the_next():

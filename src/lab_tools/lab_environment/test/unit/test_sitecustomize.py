@@ -56,24 +56,32 @@ def test_the_sitecustomize_that_is_hidden_runs_once(tmp_path):
     assert done.stdout == f"the next, sitecustomize {tmp_path}/sitecustomize.py\n"
 
 
-def of_system_python(program, first_in_path):
-    done = subprocess.run(["/usr/bin/python3", "-c", program], capture_output=True, text=True,
+def of_system_python(first_in_path, *words):
+    done = subprocess.run(["/usr/bin/python3", *words], capture_output=True, text=True,
                           env={"PYTHONPATH": str(OURS), "PATH": "%s:/usr/bin:/bin" % first_in_path})
     return done.stdout, done.stderr
 
 
-def test_debians_python_finds_the_packages_of_the_virtual_environment_after_its_own(tmp_path):
+def test_a_users_script_for_debians_python_finds_what_python3_finds(tmp_path):
     found = tmp_path / ("lib/python%d.%d/site-packages" % sys.version_info[:2])
     found.mkdir(parents=True)
-    for name in ("only_in_the_workspace", "numpy"):
-        (found / (name + ".py")).write_text("")
+    (found / "numpy.py").write_text("FROM = 'the workspace'")
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/python3").write_text("")
-    program = "import sys, only_in_the_workspace, numpy; print(sys.path[-1], len(numpy.zeros(3)))"
-    assert "ModuleNotFoundError" in of_system_python(program, tmp_path / "bin")[1]  # a folder, no virtual environment
+    script = tmp_path / "script.py"
+    script.write_text("import numpy, yaml; print(getattr(numpy, 'FROM', 'Debian'))")
+    assert of_system_python(tmp_path / "bin", script) == ("Debian\n", "")  # a folder, no virtual environment
     (tmp_path / "pyvenv.cfg").write_text("")
-    assert of_system_python(program, tmp_path / "bin") == ("%s 3\n" % found, "")
-    assert "ModuleNotFoundError" in of_system_python(program, "/usr/bin")[1]
+    for words in ((script,), ("-u", script), ("-c", script.read_text())):
+        assert of_system_python(tmp_path / "bin", *words) == ("the workspace\n", "")
+    assert of_system_python("/usr/bin", script) == ("Debian\n", "")
+
+
+def test_the_systems_programs_keep_debians_packages():
+    # They would find parts of cffi from both: the package of one version, its extension module of another.
+    path = os.environ["PATH"].split(":")[0]
+    done = of_system_python(path, "/usr/bin/rosbag", "-h")
+    assert "Traceback" not in done[1] and "play" in done[0]
 
 
 def without_reader(program, *options):
