@@ -4,7 +4,7 @@ caller.
 """
 import io
 
-from web_bridge.errors import BridgeError
+from web_bridge.errors import BridgeError, UnknownType
 from web_bridge.values import CborForm, JsonForm, Reader, Writer
 
 
@@ -26,6 +26,18 @@ def deserialized(empty, data):
     if length != len(data):
         raise BridgeError("%d bytes are no %s: it ends after %d" % (len(data), empty._type, length))
     return message
+
+
+def are_the_same(class_of, one, other):
+    """Whether two names stand for the same messages, as rospy decides it: by the MD5 of their definitions.
+
+    ``class_of(type name)`` returns a message class or raises UnknownType; a name that is not known here is the same as
+    itself alone.
+    """
+    try:
+        return one == other or class_of(one)._md5sum == class_of(other)._md5sum
+    except UnknownType:
+        return False
 
 
 class Codec:

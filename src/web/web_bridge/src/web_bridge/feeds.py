@@ -126,6 +126,13 @@ class ClientFeed:
             self._timer.cancel()
             self._timer = None
 
+    def send(self, packet):
+        """Send a message now, whatever the throttle says."""
+        with self._lock:
+            wish = self._wish
+        if wish is not None:
+            self._send(packet, wish)
+
     def offer(self, packet):
         """Send a message now, later or not at all."""
         with self._lock:
@@ -209,16 +216,15 @@ class Feed:
             client.offer(packet)
 
     def add(self, client, name, wish):
-        """A subscription of a client; a new client gets the latched messages of publishers that are still there."""
+        """A subscription of a client; each gets the latched messages of publishers that are still there."""
         with self._lock:
             share = self._clients.get(client)
-            packets = []
             if share is None:
                 share = self._clients[client] = ClientFeed(client, self._topic, self._later, self._clock)
-                packets = self._latched.of(self.subscription)
             share.add(name, wish)
+            packets = self._latched.of(self.subscription)
         for packet in packets:
-            share.offer(packet)
+            share.send(packet)
 
     def remove(self, client, name=None):
         """Forget one subscription of a client (None: all of its). Returns whether the client had any."""

@@ -8,6 +8,12 @@ _LARGEST_NUMBER = 1e12
 _NEEDED = object()
 
 
+def type_field(operation, default=_NEEDED):
+    """The field ``type``; rosbridge_suite reads "/std_msgs//String" as well. Raises FieldError."""
+    given = field(operation, "type", str, default)
+    return given and "/".join(part for part in given.split("/") if part)
+
+
 def field(operation, name, kind, default=_NEEDED):
     """A field of an operation (dict); ``kind``: a type, or NUMBER. JSON's null counts as missing. Raises FieldError."""
     value = operation.get(name)

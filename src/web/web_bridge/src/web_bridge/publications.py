@@ -3,6 +3,7 @@
 import threading
 from collections import deque
 
+from web_bridge.codec import are_the_same
 from web_bridge.errors import BridgeError, NoSuchTopic
 
 
@@ -52,11 +53,11 @@ class Publications:
         """``options`` (latched, queue size) count for the first client of a topic. Raises BridgeError."""
         with self._lock:
             found = self._publications.get(topic)
-        if found is None or found.publisher.type != type_name:
+        if found is None or not self._fits(found, type_name):
             self._graph.check_type(topic, type_name)
         with self._lock:
             found = self._publications.get(topic)
-            if found is not None and found.publisher.type != type_name:
+            if found is not None and not self._fits(found, type_name):
                 if found.names:
                     raise BridgeError("%s has the type %s here, not %s" % (topic, found.publisher.type, type_name))
                 self._close(topic)
@@ -67,6 +68,9 @@ class Publications:
                 found.timer.cancel()
                 found.timer = None
             found.names.setdefault(client, set()).add(name)
+
+    def _fits(self, publication, type_name):
+        return are_the_same(self._codec.class_of, publication.publisher.type, type_name)
 
     def unadvertise(self, client, topic, name=None):
         """Forget one advertisement of a client (None: all of its). Returns whether there was one."""
@@ -89,8 +93,8 @@ class Publications:
             self.unadvertise(client, topic)
 
     def publish(self, client, topic, values, options):
-        """Publish ``values`` (a dict); a topic that the client did not advertise needs a known type. Raises
-        BridgeError.
+        """Publish ``values`` (a dict); a topic that the client did not advertise needs a known type. Returns what of
+        them was not read, as texts. Raises BridgeError.
         """
         publisher = self._publisher(client, topic)
         if publisher is None:
@@ -99,7 +103,9 @@ class Publications:
                 raise NoSuchTopic("the type of %s is not known: advertise it first" % topic)
             self.advertise(client, None, topic, type_name, options)
             publisher = self._publisher(client, topic)
-        publisher.publish(self._codec.reader.fill(publisher.new_message(), values))
+        unread = []
+        publisher.publish(self._codec.reader.fill(publisher.new_message(), values, unread))
+        return unread
 
     def publish_made(self, client, topic, make):
         """Publish ``make(empty message)`` on a topic that the client has advertised. Raises BridgeError."""

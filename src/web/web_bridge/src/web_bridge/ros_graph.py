@@ -13,7 +13,7 @@ import roslib.message
 import rospy
 import rosservice
 
-from web_bridge.codec import serialized
+from web_bridge.codec import are_the_same, serialized
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType, shown
 from web_bridge.feeds import Arrival
 from web_bridge.publications import FirstMessages
@@ -116,7 +116,7 @@ class RosGraph:
             return
         # A list that is not the newest refuses nothing.
         established = self.topic_type(topic)
-        if established not in (None, type_name):
+        if established is not None and not are_the_same(message_class, established, type_name):
             raise BridgeError("%s has the type %s, not %s" % (topic, established, type_name))
 
     def _newest_types(self):

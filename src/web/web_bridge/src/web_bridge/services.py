@@ -93,11 +93,11 @@ class CallPool:
 
 
 class _Request:
-    def __init__(self, client, service):
+    def __init__(self, client, key):
         self.client = client
-        self.service = service
+        self.key = key
         self.done = threading.Event()
-        self.answer = None  # (worked, values)
+        self.answer = None  # (client that answered, worked, values)
 
 
 class OfferedServices:
@@ -107,58 +107,61 @@ class OfferedServices:
         self._graph = graph
         self._codec = codec
         self._lock = threading.Lock()
-        self._offers = {}  # service -> (client, handle)
+        self._offers = {}  # resolved name of the service -> (client, handle)
         self._requests = {}  # id -> _Request
         self._numbers = itertools.count()
 
     def advertise(self, client, service, type_name):
-        """Raises BridgeError, where another client offers the service, for instance."""
+        """Raises BridgeError, where a node offers the service, for instance. A service of another client goes over to
+        this one: a page that was reloaded does not wait for the end of its old connection.
+        """
+        key = self._graph.resolve(service)
         with self._lock:
-            holder, handle = self._offers.get(service, (None, None))
-            if holder is not None:
-                if holder is not client:
-                    raise BridgeError("another client offers the service %s" % service)
+            holder, handle = self._offers.pop(key, (None, None))
+            if handle is not None:
                 handle.close()
-                del self._offers[service]
+                if holder is not client:
+                    holder.status("warning", "another client offers the service %s from now on" % service, None)
 
             def handler(request, new_response):
-                return self._ask(client, service, request, new_response)
-            self._offers[service] = (client, self._graph.advertise_service(service, type_name, handler))
+                return self._ask(client, service, key, request, new_response)
+            self._offers[key] = (client, self._graph.advertise_service(service, type_name, handler))
 
-    def unadvertise(self, client, service):
-        """Returns whether the client offered it. Waiting callers get an error."""
+    def unadvertise(self, service):
+        """Returns whether a client offered it. Waiting callers get an error."""
+        key = self._graph.resolve(service)
         with self._lock:
-            holder, handle = self._offers.get(service, (None, None))
-            if holder is not client:
+            _, handle = self._offers.pop(key, (None, None))
+            if handle is None:
                 return False
-            del self._offers[service]
-            self._give_up(lambda request: request.client is client and request.service == service)
+            self._give_up(lambda request: request.key == key)
             handle.close()
             return True
 
     def forget(self, client):
         """Withdraw everything that a client offers."""
         with self._lock:
-            mine = [service for service, (holder, _) in self._offers.items() if holder is client]
+            mine = [key for key, (holder, _) in self._offers.items() if holder is client]
             self._give_up(lambda request: request.client is client)
-        for service in mine:
-            self.unadvertise(client, service)
+            for key in mine:
+                self._offers.pop(key)[1].close()
 
     def answer(self, client, name, worked, values):
-        """A client's answer to request ``name``. Raises BridgeError where that waits for none."""
+        """The answer to request ``name``, whichever client it was sent to. Raises BridgeError where that waits for
+        none.
+        """
         with self._lock:
-            request = self._requests.get(name)
-            if request is None or request.client is not client:
-                raise BridgeError("no service request with id %s waits for an answer" % shown(name))
-            del self._requests[name]
-        request.answer = (worked, values)
+            request = self._requests.pop(name, None)
+        if request is None:
+            raise BridgeError("no service request with id %s waits for an answer" % shown(name))
+        request.answer = (client, worked, values)
         request.done.set()
 
-    def _ask(self, client, service, request, new_response):
+    def _ask(self, client, service, key, request, new_response):
         """On ROS's thread: the response to a request. Raises ServiceFailed."""
-        waiting = _Request(client, service)
+        waiting = _Request(client, key)
         with self._lock:
-            if self._offers.get(service, (None,))[0] is not client:
+            if self._offers.get(key, (None,))[0] is not client:
                 raise ServiceFailed("the client that offered %s has gone" % service)
             name = "service_request:%s:%d" % (service, next(self._numbers))
             self._requests[name] = waiting
@@ -166,13 +169,16 @@ class OfferedServices:
         waiting.done.wait()
         if waiting.answer is None:
             raise ServiceFailed("the client that offered %s has gone" % service)
-        worked, values = waiting.answer
+        answerer, worked, values = waiting.answer
         if not worked:
             raise ServiceFailed(str(values) if values else "the client answered with result false")
         try:
-            return self._codec.reader.fill(new_response(), values)
+            unread = []
+            response = self._codec.reader.fill(new_response(), values, unread)
+            answerer.warn_of("the answer to " + service, unread, name)
+            return response
         except BridgeError as error:
-            client.status("error", "the answer to %s: %s" % (service, error), name)
+            answerer.status("error", "the answer to %s: %s" % (service, error), name)
             raise ServiceFailed("the client's answer does not fit: %s" % error) from None
 
     def _give_up(self, concerns):

@@ -14,7 +14,7 @@ block on the master and raise BridgeError:
 - ``advertise_service(service, type, handler)``: ``handler(request, new_response)`` returns the response or raises
   ServiceFailed; returns an object with ``close()``
 """
-import math
+import json
 import threading
 import time
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from web_bridge.access import Rules
 from web_bridge.codec import Codec
 from web_bridge.errors import BridgeError, FieldError, shown
 from web_bridge.feeds import COMPRESSIONS, Feeds, Wish
-from web_bridge.fields import NUMBER, field
+from web_bridge.fields import NUMBER, field, type_field
 from web_bridge.frames import Fragments, cbor, from_base64, json_text, packed_png, read_frame, split, text_of_png
 from web_bridge.publications import Publications
 from web_bridge.services import CallPool, OfferedServices
@@ -84,6 +84,11 @@ class Session:
         # A client that floods with mistakes and reads nothing loses the oldest.
         self.outgoing.offer([json_text(operation)])
 
+    def warn_of(self, subject, texts, name):
+        """Say what of ``subject`` was passed over, of the operation ``name``."""
+        for text in texts:
+            self.status("warning", "%s: passed over: %s" % (subject, text), name)
+
     def tell_fault(self, text):
         """The server failed at an operation."""
         self.status("error", text, None)
@@ -128,8 +133,7 @@ class Session:
 
     def _serve(self, operation, depth):
         name, op = operation.get("id"), operation.get("op")
-        # NaN and infinities have no form in JSON; the answer would be one that no page can read.
-        if not isinstance(name, str | int | float | None) or (isinstance(name, float) and not math.isfinite(name)):
+        if not _is_plain(name) or (op in _FOUND_BY_ID and not isinstance(name, str | int | float | None)):
             self.status("error", "id is %s; a text or a finite number is expected" % shown(name), None)
             return
         serve = _OPERATIONS.get(op) if isinstance(op, str) else None
@@ -165,7 +169,7 @@ class Session:
         self._level = level
 
     def _advertise(self, operation, name):
-        topic, type_name = field(operation, "topic", str), field(operation, "type", str)
+        topic, type_name = field(operation, "topic", str), type_field(operation)
         self._may_publish(topic)
         self._bridge.publications.advertise(self, name, topic, type_name, _publisher_options(operation))
 
@@ -174,10 +178,11 @@ class Session:
         if not self._bridge.publications.unadvertise(self, topic, name):
             self.status("warning", "unadvertise: %s is not advertised by this client" % topic, name)
 
-    def _publish(self, operation, _name):
+    def _publish(self, operation, name):
         topic = field(operation, "topic", str)
         self._may_publish(topic)
-        self._bridge.publications.publish(self, topic, operation.get("msg"), _publisher_options(operation))
+        unread = self._bridge.publications.publish(self, topic, operation.get("msg"), _publisher_options(operation))
+        self.warn_of("publish on " + topic, unread, name)
 
     def _may_publish(self, topic):
         self._rules.check_may_act("publish")
@@ -186,12 +191,13 @@ class Session:
     def _subscribe(self, operation, name):
         topic = field(operation, "topic", str)
         self._rules.check_topic(self._bridge.graph.resolve(topic))
-        type_name = field(operation, "type", str, None)
+        type_name = type_field(operation, None)
         wish = Wish(max(0, field(operation, "throttle_rate", NUMBER, 0)),
                     max(0, int(field(operation, "queue_length", NUMBER, 0))),
-                    _fragment_size(operation), _compression(operation))
-        # "*" is how ROS writes: any type.
-        self._bridge.feeds.subscribe(self, name, topic, None if type_name in ("", "*") else type_name, wish)
+                    _fragment_size(operation), self._compression(operation, name))
+        # "*" is how ROS writes: any type; and bytes are sent as they come, whatever the client calls them.
+        is_any = type_name in ("", "*") or wish.compression == "cbor-raw"
+        self._bridge.feeds.subscribe(self, name, topic, None if is_any else type_name, wish)
 
     def _unsubscribe(self, operation, name):
         topic = field(operation, "topic", str)
@@ -200,7 +206,13 @@ class Session:
 
     def _call_service(self, operation, name):
         service = field(operation, "service", str)
-        compression, size = _compression(operation), _fragment_size(operation)
+        # Old clients write the id behind the service's name.
+        called, _, tag = service.partition("#")
+        name = tag or None if name is None else name
+        compression, size, args = self._compression(operation, name), _fragment_size(operation), operation.get("args")
+        if args is not None and not isinstance(args, dict | list):
+            self.warn_of("call_service of " + called, ["args is %s, neither an object nor a list" % shown(args)], name)
+            args = None
 
         def answer(values, worked, in_cbor=None):
             response = {"op": "service_response", "service": service, "values": values, "result": worked}
@@ -208,36 +220,52 @@ class Session:
                 response["id"] = name
             self.outgoing.keep(_packed(response, in_cbor or values, compression, size))
 
+        def fill(request):
+            unread = []
+            self._bridge.codec.reader.fill(request, args, unread)
+            self.warn_of("call_service of " + called, unread, name)
+            return request
+
         def call(under_way):
             try:
-                response = self._bridge.graph.call_service(
-                    service, lambda request: self._bridge.codec.reader.fill(request, operation.get("args")), under_way)
+                response = self._bridge.graph.call_service(called, fill, under_way)
                 answer(self._bridge.codec.json.values(response), True, self._bridge.codec.cbor.values(response))
             # A call always gets an answer; the graph runs code of others.
             except Exception as error:
                 answer(str(error) or type(error).__name__, False)
 
         try:
-            self._rules.check_service(self._bridge.graph.resolve(service))
+            self._rules.check_service(self._bridge.graph.resolve(called))
             self._bridge.calls.run(self, call)
         except BridgeError as error:
             answer(str(error), False)
 
     def _advertise_service(self, operation, _name):
-        service, type_name = field(operation, "service", str), field(operation, "type", str)
+        service, type_name = field(operation, "service", str), type_field(operation)
         self._rules.check_may_act("offer services")
         self._rules.check_service(self._bridge.graph.resolve(service))
         self._bridge.services.advertise(self, service, type_name)
 
     def _unadvertise_service(self, operation, name):
         service = field(operation, "service", str)
-        if not self._bridge.services.unadvertise(self, service):
-            self.status("warning", "unadvertise_service: this client does not offer %s" % service, name)
+        self._rules.check_may_act("withdraw services")
+        if not self._bridge.services.unadvertise(service):
+            self.status("warning", "unadvertise_service: no client offers %s" % service, name)
 
     def _service_response(self, operation, name):
+        # From any connection of a program: its requests may have come over another one.
+        self._rules.check_may_act("answer for services")
         # A page may answer with anything true, or with values alone; without both it has failed.
         worked = bool(operation.get("result", "values" in operation))
         self._bridge.services.answer(self, name, worked, operation.get("values"))
+
+    def _compression(self, operation, name):
+        compression = field(operation, "compression", str, "none")
+        if compression in COMPRESSIONS:
+            return compression
+        self.warn_of(operation["op"], ["compression is %s, none of %s" % (shown(compression), ", ".join(COMPRESSIONS))],
+                     name)
+        return "none"
 
     def _auth(self, _operation, _name):
         raise FieldError("this server does not use rosauth; where it has a token, it asks for it in the address "
@@ -252,11 +280,17 @@ _OPERATIONS = {
     "service_response": Session._service_response}
 
 
-def _compression(operation):
-    compression = field(operation, "compression", str, "none")
-    if compression not in COMPRESSIONS:
-        raise FieldError("compression is %s; %s are known" % (shown(compression), ", ".join(COMPRESSIONS)))
-    return compression
+#: Operations whose ids are compared with earlier ones; other ids are only handed back.
+_FOUND_BY_ID = ("advertise", "unadvertise", "subscribe", "unsubscribe", "fragment", "service_response")
+
+
+def _is_plain(name):
+    """Has an id a form in JSON? NaN, infinities and bytes have none: no page could read the answer."""
+    try:
+        json.dumps(name, allow_nan=False)
+    except (TypeError, ValueError, RecursionError):
+        return False
+    return True
 
 
 def _fragment_size(operation):
@@ -264,7 +298,7 @@ def _fragment_size(operation):
 
 
 def _publisher_options(operation):
-    return field(operation, "latch", bool, False), max(1, int(field(operation, "queue_size", NUMBER, 100)))
+    return bool(operation.get("latch")), max(1, int(field(operation, "queue_size", NUMBER, 100)))
 
 
 def _packed(response, in_cbor, compression, fragment_size):

@@ -155,45 +155,53 @@ class Reader:
         self._class_of = class_of
         self._now = now
 
-    def fill(self, message, values):
-        """Lay ``values``, a dict, or a list in the order of the fields, over a message. Raises FieldError."""
+    def fill(self, message, values, unread=None):
+        """Lay ``values``, a dict, or a list in the order of the fields, over a message. Raises FieldError.
+
+        rosbridge_suite passes over some values without a word: those of a list that are too many, and what is no time
+        where one is expected. With ``unread``, a list, they are passed over and a text about each is appended to it;
+        without, they raise.
+        """
         if values is None:
             return message
         if isinstance(values, list | tuple):
             if len(values) > len(message.__slots__):
-                raise FieldError("%d values for %s, which has %d fields"
-                                 % (len(values), message._type, len(message.__slots__)))
+                _pass_over("%d values for %s, which has %d fields"
+                           % (len(values), message._type, len(message.__slots__)), unread)
             values = dict(zip(message.__slots__, values, strict=False))
-        self._lay(message, values, "")
+        self._lay(message, values, "", unread)
         return message
 
-    def _lay(self, message, values, path):
+    def _lay(self, message, values, path, unread):
         if not isinstance(values, dict):
             raise FieldError("%s is %s; an object with the fields of %s is expected"
                              % (path or "the message", shown(values), message._type))
+        if message._type == "std_msgs/Header":
+            now = self._now()
+            message.stamp.secs, message.stamp.nsecs = now.secs, now.nsecs
         types = dict(zip(message.__slots__, message._slot_types, strict=True))
         for name, value in values.items():
             if name not in types:
                 raise FieldError("%s has no field %s; it has %s"
                                  % (message._type, shown(name), ", ".join(types) or "none"))
             where = path + "." + name if path else name
-            setattr(message, name, self._value(types[name], value, getattr(message, name), where))
+            setattr(message, name, self._value(types[name], value, getattr(message, name), where, unread))
 
-    def _value(self, slot_type, value, default, path):
+    def _value(self, slot_type, value, default, path, unread):
         base, length = parts_of(slot_type)
         if length is None:
-            return self._one(base, value, default, path)
+            return self._one(base, value, default, path, unread)
         if base in _OF_BYTES:
             found = _bytes(base, value, path)
         elif isinstance(value, list | tuple):
-            found = self._many(base, value, path)
+            found = self._many(base, value, path, unread)
         else:
             raise FieldError("%s is %s; a list is expected (%s)" % (path, shown(value), slot_type))
         if length and len(found) != length:
             raise FieldError("%s has %d elements; %d are expected" % (path, len(found), length))
         return found
 
-    def _many(self, base, values, path):
+    def _many(self, base, values, path, unread):
         kinds = set(map(type, values))
         # Long arrays of numbers are checked without a call for each.
         if base in _FLOATS and kinds <= {float}:
@@ -203,31 +211,42 @@ class Reader:
             if least <= min(values) and max(values) <= greatest:
                 return list(values)
         if base in _TIMES or "/" in base:
-            return [self._one(base, value, self._class_of(base)(), "%s[%d]" % (path, i))
+            return [self._one(base, value, self._empty(base), "%s[%d]" % (path, i), unread)
                     for i, value in enumerate(values)]
         return [_scalar(base, value, "%s[%d]" % (path, i)) for i, value in enumerate(values)]
 
-    def _one(self, base, value, default, path):
+    def _empty(self, base):
+        """An element of an array. Times come from the caller's clock, as no type of a message has their names."""
+        if base not in _TIMES:
+            return self._class_of(base)()
+        now = self._now()
+        return type(now)() if base == "time" else now - now
+
+    def _one(self, base, value, default, path, unread):
         if base in _TIMES:
-            return self._time(base, value, default, path)
+            return self._time(base, value, default, path, unread)
         if "/" not in base:
             return _scalar(base, value, path)
-        if base == "std_msgs/Header":
-            now = self._now()
-            default.stamp.secs, default.stamp.nsecs = now.secs, now.nsecs
-        self._lay(default, value, path)
+        self._lay(default, value, path, unread)
         return default
 
-    def _time(self, base, value, default, path):
+    def _time(self, base, value, default, path, unread):
         if value == "now":
             now = self._now()
             value = {"secs": now.secs, "nsecs": now.nsecs}
         if not isinstance(value, dict) or not set(value) <= {"secs", "nsecs"}:
-            raise FieldError('%s is %s; {"secs": …, "nsecs": …} or "now" is expected' % (path, shown(value)))
+            _pass_over('%s is %s; {"secs": …, "nsecs": …} or "now" is expected' % (path, shown(value)), unread)
+            value = {part: value[part] for part in ("secs", "nsecs") if isinstance(value, dict) and part in value}
         for part in value:
             _integer(value[part], _TIMES[base], "%s.%s" % (path, part), base)
         default.secs, default.nsecs = value.get("secs", default.secs), value.get("nsecs", default.nsecs)
         return default
+
+
+def _pass_over(text, unread):
+    if unread is None:
+        raise FieldError(text)
+    unread.append(text)
 
 
 def _bytes(base, value, path):

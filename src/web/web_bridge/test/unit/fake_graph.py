@@ -6,6 +6,7 @@ import threading
 import genpy
 import roslib.message
 
+from web_bridge.codec import are_the_same
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType
 from web_bridge.feeds import Arrival
 
@@ -56,7 +57,8 @@ class FakeGraph:
     def check_type(self, topic, type_name):
         if type_name is not None:
             message_class(type_name)
-            if self.topic_type(topic) not in (None, type_name):
+            established = self.topic_type(topic)
+            if established is not None and not are_the_same(message_class, established, type_name):
                 raise BridgeError("%s has the type %s, not %s" % (topic, self.topic_type(topic), type_name))
 
     def subscribe(self, topic, arrived):
@@ -97,6 +99,8 @@ class FakeGraph:
         cls = roslib.message.get_service_class(type_name)
         if cls is None:
             raise UnknownType("the service type %s is not here" % type_name)
+        if self.resolve(service) in self.offered:
+            raise BridgeError("this node offers %s already" % service)
         self.offered[self.resolve(service)] = lambda request: handler(request, cls._response_class)
         return FakeService(self, self.resolve(service))
 

@@ -4,6 +4,7 @@ import math
 import struct
 
 import cbor2
+import genpy
 import pytest
 from fake_graph import message_class, now
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan, PointCloud2
@@ -80,6 +81,32 @@ def test_arguments_may_be_a_list_or_nothing():
     assert read(SetBoolRequest(), None).data is False
     with pytest.raises(FieldError, match="2 values for std_srvs/SetBoolRequest, which has 1 fields"):
         read(SetBoolRequest(), [True, False])
+
+
+def test_what_is_passed_over_is_said_and_the_rest_is_read():
+    unread = []
+    assert READER.fill(SetBoolRequest(), [True, 5], unread).data is True
+    found = READER.fill(JointState(), {"header": {"stamp": {"sec": 5, "nsecs": 6}}, "name": ["a"]}, unread)
+    assert (found.header.stamp.secs, found.header.stamp.nsecs, found.name) == (now().secs, 6, ["a"])
+    assert READER.fill(Time(), {"data": None}, unread).data == genpy.Time()
+    assert [text.partition(" ")[0] for text in unread] == ["2", "header.stamp", "data"]
+    with pytest.raises(FieldError, match="data.secs is 'x'"):
+        READER.fill(Time(), {"data": {"secs": "x"}}, unread)
+
+
+def test_arrays_of_times_are_read():
+    class Times(genpy.Message):
+        _type, __slots__, _slot_types = "test_msgs/Times", ["times", "durations"], ["time[]", "duration[2]"]
+
+    found = Times()
+    found.times, found.durations = [], []
+    read(found, {"times": ["now", {"secs": 3}], "durations": [{"secs": -1}, {"nsecs": 5}]})
+    assert found.times == [now(), genpy.Time(3, 0)]
+    assert found.durations == [genpy.Duration(-1, 0), genpy.Duration(0, 5)]
+
+
+def test_a_header_alone_is_stamped_as_one_inside_of_a_message():
+    assert read(Header(), {"frame_id": "base"}).stamp == now()
 
 
 @pytest.mark.parametrize(("message", "values", "text"), [

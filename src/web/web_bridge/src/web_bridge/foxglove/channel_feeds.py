@@ -19,12 +19,12 @@ class ChannelFeed:
     def arrived(self, arrival):
         """A message of ROS; on the thread that received it."""
         channel = self._channel
+        fits = arrival.md5 in (channel.md5, "*")
         # The topic has got another type: it will be another channel, soon.
-        if arrival.type not in (channel.type, "*"):
+        if arrival.type not in (channel.type, "*") and arrival.md5 != channel.md5:
             return
         with self._lock:
             clients = list(self._clients.items())
-            fits = arrival.md5 in (channel.md5, "*")
             if fits:
                 self._latched.keep(arrival, arrival)
         if not fits:
