@@ -2,7 +2,7 @@
 """Joints over time. ROS-free."""
 import numpy as np
 
-from baxter_model import SIDES
+from baxter_model import JOINTS, SIDES
 
 from .picture import Picture, new_figure
 
@@ -17,24 +17,28 @@ class NothingRecorded(ValueError):
 def figure_of(samples, unit="rad", title=""):
     """Return a matplotlib figure of {label: (2, n) array of times [s] and values}, time counted from the first sample.
 
-    Left and right arm have a panel each, other joints a third. Labels without a sample are left out; raises
+    Left and right arm have a panel each, other joints a third; ``unit``: of all, or {label: unit}, and each unit has
+    its own panel. A joint of an arm has the same colour in every figure. Labels without a sample are left out; raises
     NothingRecorded if none has any.
     """
+    units = unit if isinstance(unit, dict) else dict.fromkeys(samples, unit)
     filled = {label: np.asarray(part) for label, part in samples.items() if np.asarray(part).size}
     if not filled:
         raise NothingRecorded("nothing was recorded: did the topic publish while the recording ran?")
     begin = min(part[0, 0] for part in filled.values())
     panels = {}
-    for label in sorted(filled, key=lambda label: (_side(label), list(filled).index(label))):
-        panels.setdefault(_side(label), []).append(label)
+    for label in sorted(filled, key=lambda label: (_side(label), _place(label), list(filled).index(label))):
+        panels.setdefault((_side(label), units[label]), []).append(label)
     figure = new_figure(8.0, 1.2 + 2.2 * len(panels))
     all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, labels in zip(all_axes, panels.values(), strict=True):
-        for k, label in enumerate(labels):
+    for axes, ((_, panel_unit), labels) in zip(all_axes, panels.items(), strict=True):
+        free = (k for k in range(len(JOINTS) + len(labels)) if k not in map(_place, labels))
+        for label in labels:
             times, values = filled[label]
+            k = _place(label) if _place(label) < len(JOINTS) else next(free)
             axes.plot(times - begin, values, label=label, linewidth=1.3, color=_COLOURS[k % len(_COLOURS)],
                       linestyle="-" if k < len(_COLOURS) else "--")
-        axes.set_ylabel(unit)
+        axes.set_ylabel(panel_unit)
         axes.grid(True, color="#dddddd", linewidth=0.6)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     all_axes[-1].set_xlabel("simulated time [s]")
@@ -47,6 +51,12 @@ def _side(label):
     """left, right, or ~ for joints of no arm, which sorts last."""
     side = label.partition("_")[0]
     return side if side in SIDES else "~"
+
+
+def _place(label):
+    """The number of a joint in its arm, from the shoulder on; of other joints the number of joints."""
+    side, _, joint = label.partition("_")
+    return JOINTS.index(joint) if side in SIDES and joint in JOINTS else len(JOINTS)
 
 
 def draw(samples, unit="rad", title=""):

@@ -112,9 +112,17 @@ def recording(topic=JOINT_STATES, joints=None):
     return JointLog(topic, joints)
 
 
-def plot(log, title="", unit="rad"):
-    """Joints over time, as a Picture."""
-    return joint_plot.draw(log.samples, unit, title)
+def plot(log, title="", unit=None):
+    """Joints over time, as a Picture. Without a unit, joints that slide are in metres and the others in radians."""
+    samples = log.samples
+    if unit is None:
+        try:
+            joints = robot().joints
+        except ShowError:  # joint states without a description
+            joints = {}
+        sliding = {name for name, joint in joints.items() if joint.type == "prismatic"}
+        unit = {name: "m" if name in sliding else "rad" for name in samples}
+    return joint_plot.draw(samples, unit, title)
 
 
 def robot(parameter="robot_description"):

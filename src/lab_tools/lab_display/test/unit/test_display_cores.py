@@ -2,11 +2,13 @@
 """Trees, plots, matrices, and the camera outside of the robot: their content and places."""
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lab_display import joint_plot, outside
+from lab_display.command import picture_path
 from lab_display.matrices import FrameMatrix, angle_and_axis
 from lab_display.picture import Picture
 from lab_display.trees import Tree, TreeError
@@ -61,6 +63,31 @@ def test_arms_are_plotted_in_a_panel_each_from_time_zero():
     np.testing.assert_allclose(figure.axes[0].get_lines()[0].get_xdata(), [0.0, 1.0, 2.0])
     with pytest.raises(joint_plot.NothingRecorded, match="nothing was recorded"):
         joint_plot.draw({"left_s0": np.empty((2, 0))})
+
+
+def test_a_joint_has_one_colour_in_whatever_order_and_company_it_is_plotted():
+    line = np.array([[5.0, 6.0], [0.0, 1.0]])
+    colours = {}
+    for names in (("left_s0", "left_s1", "left_e0"), ("left_e0", "left_s0"), ("other", "left_s1", "left_w2", "another")):
+        for axes in joint_plot.figure_of(dict.fromkeys(names, line)).axes:
+            of_panel = {curve.get_label(): curve.get_color() for curve in axes.get_lines()}
+            assert len(set(of_panel.values())) == len(of_panel)
+            for name, colour in of_panel.items():
+                assert colours.setdefault(name, colour) == colour or "other" in name
+
+
+def test_fingers_have_their_own_panel_in_metres():
+    line = np.array([[5.0, 6.0], [0.0, 0.02]])
+    figure = joint_plot.figure_of({"left_s0": line, "left_finger": line}, {"left_s0": "rad", "left_finger": "m"})
+    assert [(axes.get_ylabel(), [curve.get_label() for curve in axes.get_lines()]) for axes in figure.axes] == [
+        ("rad", ["left_s0"]), ("m", ["left_finger"])]
+
+
+def test_a_picture_without_a_name_does_not_lie_among_the_workspaces_files(tmp_path):
+    assert picture_path("tf", tmp_path, str(tmp_path)) == tmp_path / ".baxter/pictures/tf.png"
+    assert picture_path("tf", tmp_path, "") == Path("tf.png")
+    (tmp_path / "mine").mkdir()
+    assert picture_path("tf", tmp_path / "mine", str(tmp_path)) == Path("tf.png")
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.0, 0.8)])
