@@ -94,9 +94,23 @@ def _run_the_next():
 
 
 def _report(kind, error, trace):
-    """An uncaught exception: as Python does, but `program | head` ends without one, as other programs of Unix do."""
-    if not issubclass(kind, BrokenPipeError) or not _has_lost_reader():
+    """An uncaught exception: as Python does, but `program | head` ends without one, as other programs of Unix do, and so
+    does a program that Ctrl-C ends before it has begun."""
+    is_early = issubclass(kind, KeyboardInterrupt) and not hasattr(sys, "ps1") and _is_starting(trace)
+    if not is_early and not (issubclass(kind, BrokenPipeError) and _has_lost_reader()):
         sys.__excepthook__(kind, error, trace)
+
+
+def _is_starting(trace):
+    """Whether a program was interrupted while it imported a module, or in rospy.init_node."""
+    while trace is not None:
+        code, name = trace.tb_frame.f_code, trace.tb_frame.f_globals.get("__name__", "")
+        # Python leaves its own frames of an import out of most traces; the module's remains.
+        if code.co_name == "init_node" or name.startswith("importlib.") or (
+                code.co_name == "<module>" and name != "__main__"):
+            return True
+        trace = trace.tb_next
+    return False
 
 
 def _has_lost_reader():

@@ -2,6 +2,7 @@
 """The start-up module of the lab's Python amends rospy, does not slow others down, and hides no other sitecustomize."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -111,6 +112,30 @@ def test_other_errors_are_reported_as_python_does():
         plain = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True)
         assert errors == plain.stderr != "" and plain.returncode == 1
     assert "ZeroDivisionError" in without_reader("print(1, flush=False); 1 / 0")[1]
+
+
+def interrupted(program, *folders):
+    """(how it ended, errors) of a program that gets Ctrl-C once it has printed a line."""
+    path = ":".join(str(folder) for folder in (OURS, *folders))
+    # A background job, as which tests may run, ignores Ctrl-C.
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
+    started = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                               text=True, env={"PYTHONPATH": path, "PATH": "/usr/bin:/bin"})
+    started.stdout.readline()
+    started.send_signal(signal.SIGINT)
+    errors = started.communicate()[1]
+    return started.returncode, errors
+
+
+def test_ctrl_c_before_a_program_has_begun_leaves_no_traceback(tmp_path):
+    wait = "print('here', flush=True)\nimport time; time.sleep(60)\n"
+    (tmp_path / "slow.py").write_text(wait)
+    (tmp_path / "nodes.py").write_text("def init_node():\n    " + wait.replace("\n", "\n    "))
+    for program in ("import slow", "import nodes; nodes.init_node()"):
+        assert interrupted(program, tmp_path) == (-signal.SIGINT, "")
+    # In the program itself the line where it was is of use.
+    code, errors = interrupted(wait)
+    assert code == -signal.SIGINT and "KeyboardInterrupt" in errors
 
 
 def test_a_closed_output_is_no_error():
