@@ -2,6 +2,7 @@
 """`./baxter.sh labs up N | list | start | pause | stop | renew | down | logs`: the command line."""
 import argparse
 import csv
+import functools
 import os
 import re
 import shutil
@@ -18,7 +19,7 @@ from lab_class import control, control_groups, memory, roster
 from lab_class.disk import ENTRIES, entries_left, remove, room
 from lab_class.labs import ClassError, State
 from lab_class.roster import INSTRUCTOR, RosterError
-from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError
+from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError, default_folder
 from lab_environment import isolation
 from lab_environment.family import is_running
 from lab_web.libraries import LibrariesError, fetched
@@ -46,19 +47,17 @@ def main(arguments=None):
         return _INTERRUPTED
 
 
-def default_folder():
-    """Where a class is kept: $XDG_STATE_HOME/baxter_labs, by default ~/.local/state/baxter_labs."""
-    base = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
-    return os.path.join(base, "baxter_labs")
-
-
 def _parser():
     defaults = Options()
     parser = argparse.ArgumentParser(prog="./baxter.sh labs", description="Labs for a class on this machine, each "
                                      "behind walls, with one address for each student; docs/class.md.")
-    parser.add_argument("--folder", default=default_folder(), help="of the class: roster, tokens, students' files "
-                        "(default: %(default)s)")
-    commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|renew|down|logs")
+    text = "of the class: roster, tokens, students' files (default: %s)" % default_folder()
+    parser.add_argument("--folder", default=default_folder(), help=text)
+    # Behind a command, too.
+    folder = argparse.ArgumentParser(add_help=False)
+    folder.add_argument("--folder", default=argparse.SUPPRESS, help=text)
+    commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|renew|down|logs",
+                                     parser_class=functools.partial(argparse.ArgumentParser, parents=[folder]))
     up = commands.add_parser("up", help="start a class, and print the addresses")
     up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
                     "of last time")
@@ -162,8 +161,8 @@ def _record(options, store):
     """The ClassRecord of this `up`. Raises RosterError, StoreError."""
     earlier = store.read()
     if options.who is None and earlier is None:
-        raise RosterError("there is no class of last time in %s; say how many students: ./baxter.sh labs up N, or a "
-                          "CSV file with their names" % store.folder)
+        raise RosterError("there is no class of last time in %s; say how many students: %s, or a CSV file "
+                          "with their names" % (store.folder, store.command("up N")))
     given = {"launch": _launch(options.launch) if options.launch else None, "port": options.port,
              "public": options.public, "trusted": options.trusted, "memory_bytes": options.memory,
              "disk_bytes": options.disk, "at_once": options.at_once, "keep_running": options.keep_running,
@@ -188,7 +187,7 @@ def _is_up(store):
 
 def _up(options, store):
     if _is_up(store):
-        raise ClassError("a class runs in %s already; ./baxter.sh labs down ends it" % store.folder)
+        raise ClassError("a class runs in %s already; %s ends it" % (store.folder, store.command("down")))
     store.make()
     _remove_left_over(store)
     record = _record(options, store)
@@ -268,7 +267,7 @@ def _print_addresses(record, store):
               % _port(record, store))
     if record.options.trusted:
         print("\nThere are no walls: every student can do what you can on this machine.")
-    print("\n./baxter.sh labs down ends the class.\n", flush=True)
+    print("\n%s ends the class.\n" % store.command("down"), flush=True)
 
 
 def _address(record, store, name):
@@ -301,7 +300,7 @@ def _await_labs(store):
                 return _FAILED if any(lab["state"] == State.FAILED.value for lab in labs) else _DONE
             time.sleep(_LOOK_S)
     except KeyboardInterrupt:
-        print("\nThe class goes on; ./baxter.sh labs list shows it.")
+        print("\nThe class goes on; %s shows it." % store.command("list"))
         return _DONE
 
 
@@ -337,7 +336,7 @@ def _change(options, store):
                  if wanted is None or lab["state"] in wanted]
     for name in names:
         if roster.slug(name) != name:
-            raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % name)
+            raise ClassError("%r is no name of a lab; %s shows them" % (name, store.command("list")))
         control.call(store, "POST", "/labs/%s/%s" % (name, options.verb))
     return _DONE
 
@@ -403,7 +402,7 @@ def _logs(options, store):
     elif roster.slug(options.name) == options.name:
         path = store.folder / "labs" / options.name / "output.txt"
     else:
-        raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % options.name)
+        raise ClassError("%r is no name of a lab; %s shows them" % (options.name, store.command("list")))
     if not path.exists():
         record = store.read()
         names = [student.name for student in record.students] if record else []

@@ -31,7 +31,7 @@ def call(store, method, path):
     """
     running = store.running()
     if "control" not in running:
-        raise NoClass("no class runs in %s; ./baxter.sh labs up N starts one" % store.folder)
+        raise NoClass("no class runs in %s; %s starts one" % (store.folder, store.command("up N")))
     connection = _Connection(running["control"])
     try:
         connection.request(method, path)
@@ -41,8 +41,8 @@ def call(store, method, path):
         raise ClassError("the class in %s did not answer within %g s; is the machine overloaded?"
                          % (store.folder, _TIMEOUT_S)) from None
     except OSError as error:
-        raise NoClass("no class runs in %s any more (%s); ./baxter.sh labs up starts it again"
-                      % (store.folder, error)) from error
+        raise NoClass("no class runs in %s any more (%s); %s starts it again"
+                      % (store.folder, error, store.command("up"))) from error
     finally:
         connection.close()
     if answer.status >= 400:

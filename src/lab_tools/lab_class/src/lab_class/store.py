@@ -8,6 +8,7 @@ import fcntl
 import json
 import os
 import secrets
+import shlex
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -92,11 +93,22 @@ def _token():
     return secrets.token_urlsafe(18)
 
 
+def default_folder():
+    """Where a class is kept: $XDG_STATE_HOME/baxter_labs, by default ~/.local/state/baxter_labs."""
+    base = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
+    return os.path.join(base, "baxter_labs")
+
+
 class Store:
     """The folder of a class; readable by its owner alone."""
 
     def __init__(self, folder):
         self.folder = Path(folder).absolute()
+
+    def command(self, words: str) -> str:
+        """The command line of these words for this class."""
+        is_usual = self.folder == Path(default_folder()).absolute()
+        return "./baxter.sh labs %s%s" % ("" if is_usual else "--folder %s " % shlex.quote(str(self.folder)), words)
 
     def make(self):
         """Make the folder. Raises StoreError."""
@@ -113,7 +125,8 @@ class Store:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                raise StoreError("a class runs in %s already; ./baxter.sh labs down ends it" % self.folder) from None
+                raise StoreError("a class runs in %s already; %s ends it"
+                                 % (self.folder, self.command("down"))) from None
             yield
 
     def read(self):

@@ -13,7 +13,7 @@ import pytest
 from lab_class import command, roster
 from lab_class.disk import remove
 from lab_class.roster import Student
-from lab_class.store import ClassRecord, Options, Store, StoreError
+from lab_class.store import ClassRecord, Options, Store, StoreError, default_folder
 from lab_class.supervisor import Supervisor
 
 
@@ -39,6 +39,14 @@ def test_ctrl_c_before_there_are_addresses_ends_the_class(tmp_path, monkeypatch)
     monkeypatch.setattr(command, "_await_door", ctrl_c)
     assert command.main(["--folder", str(tmp_path / "class"), "up", "1", "--trusted"]) == 130
     assert started[0].poll() == -signal.SIGTERM
+
+
+@pytest.mark.parametrize("words", [["--folder", "CLASS", "list"], ["list", "--folder", "CLASS"]])
+def test_commands_that_are_named_have_the_folder_of_the_class(tmp_path, capsys, words):
+    folder = tmp_path / "a class"
+    assert command.main([word.replace("CLASS", str(folder)) for word in words]) == 1
+    assert "./baxter.sh labs --folder '%s' up N" % folder in capsys.readouterr().err
+    assert Store(default_folder()).command("down") == "./baxter.sh labs down"
 
 
 def test_labs_that_have_started_and_what_wakes_them(monkeypatch, capsys):
