@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The status of /gazebo on /diagnostics: messages and requests that failed, plugins that failed."""
+"""The status of /gazebo on /diagnostics: messages and requests that failed, threads and plugins that failed."""
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from gazebo_ros.pacing import ticks_between
+from rospy_limits.threads import STATUS_NAME
 from sim_time.stamps import stamp_ns
 
 RATE_HZ = 1.0
@@ -16,10 +17,11 @@ _HARDWARE = "simulator"
 class Diagnostics:
     """Call :meth:`on_tick` after each tick."""
 
-    def __init__(self, simulation, faults, ros):
-        """``faults``: :class:`loop_ros.faults.Faults`."""
+    def __init__(self, simulation, faults, threads, ros):
+        """``faults``: :class:`loop_ros.faults.Faults`; ``threads``: :class:`rospy_limits.threads.ThreadFaults`."""
         self._simulation = simulation
         self._faults = faults
+        self._threads = threads
         self.step_changed()
         self._publisher = ros.publisher("/diagnostics", DiagnosticArray)
 
@@ -36,9 +38,10 @@ class Diagnostics:
             self._publisher.publish(message)
 
     def statuses(self):
-        """List of ``DiagnosticStatus``: one for all dropped messages and requests, one for each plugin that has ever
-        raised."""
-        return [self._dropped(), *(_status_of(hosted) for hosted in self._simulation.plugins if hosted.failures)]
+        """List of ``DiagnosticStatus``: one for all dropped messages and requests, one for the threads that serve
+        others if one of them met an error, one for each plugin that has ever raised."""
+        failed = [hosted for hosted in self._simulation.plugins if hosted.failures]
+        return [self._dropped(), *self._restarted(), *map(_status_of, failed)]
 
     def _dropped(self):
         places = dict(self._faults.places)
@@ -48,6 +51,13 @@ class Diagnostics:
         return DiagnosticStatus(
             DiagnosticStatus.WARN, MESSAGES, "%d could not be digested and were dropped" % total, _HARDWARE,
             [KeyValue(place, "%d, the newest: %s" % (fault.count, fault.text)) for place, fault in places.items()])
+
+    def _restarted(self):
+        found = self._threads.summary()
+        if found is None:
+            return []
+        return [DiagnosticStatus(DiagnosticStatus.WARN, PREFIX + STATUS_NAME, found[0], _HARDWARE,
+                                 [KeyValue(*row) for row in found[1].items()])]
 
 
 def _status_of(hosted):

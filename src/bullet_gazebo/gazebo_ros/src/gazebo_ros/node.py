@@ -71,7 +71,7 @@ def main(argv=None):
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
-    limit_ports()
+    threads = limit_ports(publishes=False)  # the loop publishes for them
     rospy.init_node(name, argv=argv, disable_rostime=True, disable_signals=True)
     rospy.rostime._set_rostime(rospy.Time(0, 0))
     if not rospy.has_param("/use_sim_time"):
@@ -82,7 +82,7 @@ def main(argv=None):
     code = 1
     try:
         with contextlib.ExitStack() as cleanup:
-            simulation = _build(log, cleanup, line)
+            simulation = _build(log, cleanup, line, threads)
             gc.freeze()
             wake_on_time()
             simulation.run(lambda: ending.is_set() or rospy.is_shutdown())
@@ -94,10 +94,10 @@ def main(argv=None):
     return code
 
 
-def _build(log, cleanup, line):
+def _build(log, cleanup, line, threads):
     """Build everything, from the parameters to a simulation that is ready to run; clean-up functions go on ``cleanup``.
 
-    ``line``: :class:`CommandLine`, which overrides the parameters.
+    ``line``: :class:`CommandLine`, which overrides the parameters; ``threads``: what rospy's threads meet.
     """
     if line.ignored:
         log.warn("these words of the command line have no effect here: %s" % " ".join(line.ignored))
@@ -155,7 +155,7 @@ def _build(log, cleanup, line):
         rospy.set_param("~snapshot", str(writer.folder))
     ros.flush()
 
-    diagnostics = Diagnostics(simulation, faults, ros)
+    diagnostics = Diagnostics(simulation, faults, threads, ros)
 
     def send():
         publisher_hub.service(is_paused=not simulation.is_stepping)

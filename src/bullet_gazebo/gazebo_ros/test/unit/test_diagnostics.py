@@ -6,6 +6,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from gazebo_ros.diagnostics import MESSAGES, Diagnostics
 from loop_ros.faults import Faults
+from rospy_limits.event_log import EventLog
+from rospy_limits.threads import ThreadFaults
 
 
 def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
@@ -13,7 +15,9 @@ def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
     simulation = SimpleNamespace(step_s=0.002, tick=0, time_ns=0, plugins=[hosted])
     sent, faults = [], Faults(SimpleNamespace(error=lambda text: None))
     publisher = SimpleNamespace(has_listeners=True, publish=sent.append)
-    diagnostics = Diagnostics(simulation, faults, SimpleNamespace(publisher=lambda topic, msg_class: publisher))
+    threads = ThreadFaults(EventLog(sent.append))
+    ros = SimpleNamespace(publisher=lambda topic, msg_class: publisher)
+    diagnostics = Diagnostics(simulation, faults, threads, ros)
     for simulation.tick in range(1, 1001):
         diagnostics.on_tick()
     assert len(sent) == 2
@@ -31,3 +35,8 @@ def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
     assert plugin.level == DiagnosticStatus.ERROR and "libpanel.so of baxter" in plugin.name
     assert {pair.key: pair.value for pair in plugin.values} == {"failures": "3",
                                                                 "newest": "update() raised ValueError: x"}
+
+    threads.note("that accepts connections", OSError("broken"))
+    thread = diagnostics.statuses()[1]
+    assert thread.level == DiagnosticStatus.WARN and thread.name.startswith("gazebo: ")
+    assert [pair.key for pair in thread.values] == ["that accepts connections"] and "OSError" in thread.values[0].value

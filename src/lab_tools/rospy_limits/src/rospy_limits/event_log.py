@@ -1,9 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Log lines for events that others can cause at any rate. ROS-free."""
+import contextlib
 import threading
 import time
 
 PERIOD_S = 60.0
+# A line quotes what others send. Its longest text [characters]; kinds that are remembered, the oldest are forgotten.
+LONGEST_LINE, MOST_KINDS = 1000, 1000
+
+
+def printable(text: str) -> str:
+    """``text`` in one line of at most LONGEST_LINE characters: a terminal must not obey what a stranger sends."""
+    if len(text) > LONGEST_LINE:
+        text = "%s ... (%d characters more)" % (text[:LONGEST_LINE], len(text) - LONGEST_LINE)
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
 
 
 class EventLog:
@@ -24,5 +34,10 @@ class EventLog:
             if last is not None and now - last < PERIOD_S:
                 self._kinds[kind] = last, untold + 1
                 return
+            self._kinds.pop(kind, None)
             self._kinds[kind] = now, 0
-        self._write("%s (and %d more since the last line about it)" % (text, untold) if untold else text)
+            if len(self._kinds) > MOST_KINDS:
+                del self._kinds[next(iter(self._kinds))]
+        text = printable(text)
+        with contextlib.suppress(Exception):  # what the log meets must not end the thread that serves others
+            self._write("%s (and %d more since the last line about it)" % (text, untold) if untold else text)

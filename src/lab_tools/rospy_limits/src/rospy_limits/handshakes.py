@@ -14,6 +14,7 @@ import time
 import weakref
 
 from rospy_limits import limits
+from rospy_limits.threads import SURVIVED, lasting
 
 _LENGTH = struct.Struct("<I")
 _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -21,6 +22,8 @@ _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 PAUSE_S = 0.2
 #: Number of connections accepted before open ones are read again.
 ACCEPTED_AT_ONCE = 32
+#: What the thread does, for its errors.
+PLACE = "that accepts connections"
 #: TCP keep-alive: idle time [s], interval [s], number of probes.
 KEEPALIVE = (60, 10, 9)
 
@@ -71,13 +74,15 @@ def _notice_lost_peers(connection):
 class HandshakeServer:
     """Serves one listening socket until :meth:`close`."""
 
-    def __init__(self, listener, serve, events, clock=time.monotonic):
+    def __init__(self, listener, serve, events, faults, clock=time.monotonic):
         """``listener``: a listening socket, which the caller still owns. ``serve(connection, address, header)`` takes
-        over a connection with its header [bytes, from the length on]; it must not wait for the client. ``events``:
-        :class:`EventLog`."""
+        over a connection with its header [bytes, from the length on]; it must not wait for the client, and where it
+        raises, the connection is closed. ``events``: :class:`EventLog`; ``faults``:
+        :class:`rospy_limits.threads.ThreadFaults`."""
         self._listener = listener
         self._serve = serve
         self._events = events
+        self._faults = faults
         self._clock = clock
         self._selector = selectors.DefaultSelector()
         self._pending = collections.OrderedDict()
@@ -102,10 +107,13 @@ class HandshakeServer:
             self._waker.send(b"x")
 
     def run(self):
-        """Serve until :meth:`close`."""
-        try:
-            while not self._closing:
+        """Serve until :meth:`close`, whatever comes."""
+        def serve(ends):
+            while not ends():
                 self.turn()
+
+        try:
+            lasting(self._faults, PLACE, serve)(lambda: self._closing)
         finally:
             for pending in list(self._pending.values()):
                 self._drop(pending)
@@ -164,6 +172,16 @@ class HandshakeServer:
         return len(held) >= limits.CONNECTIONS_PER_ADDRESS
 
     def _read(self, pending, is_new=False):
+        """Read what has come. An error that nobody foresaw costs this connection alone."""
+        try:
+            self._read_or_serve(pending, is_new)
+        except SURVIVED as error:
+            self._faults.note(PLACE, error, "the connection from %s:%d is closed" % pending.address[:2])
+            for end in (lambda: self._forget(pending), pending.socket.close):
+                with contextlib.suppress(Exception):
+                    end()
+
+    def _read_or_serve(self, pending, is_new):
         """Most headers arrive together with the connection: those are never registered."""
         try:
             complete = pending.read()

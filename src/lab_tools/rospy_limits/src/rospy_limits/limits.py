@@ -22,6 +22,9 @@ SERVICES_PER_ADDRESS = 1000
 #: TCPROS connections of one address of all kinds: 60 programs with 100 topics each. Beyond it new ones are refused.
 CONNECTIONS_PER_ADDRESS = 6000
 
+#: Publishers of one topic that a call may name; each gets a thread. Classes have some hundred of /rosout.
+PUBLISHERS = 4096
+
 #: The longest handshake header [bytes]; it contains the message's whole definition, 60 kB for the largest in use.
 HEADER_BYTES = 256 * 1024
 #: The longest message or service request [bytes], unless the node's parameter ~largest_message_bytes says otherwise:

@@ -2,12 +2,17 @@
 """Replaces rospy's code that serves one connection of a service."""
 import collections
 import select
+import struct
 import threading
 
 from rospy.exceptions import TransportException, TransportTerminated
 
 from rospy_limits import limits
 from rospy_limits.messages import MessageTooLarge
+from rospy_limits.threads import SURVIVED
+
+#: Before an error's text: that the request failed, and the text's length.
+_ERROR = struct.Struct("<BI")
 
 
 class _Counts:
@@ -31,7 +36,7 @@ class _Counts:
                 del self._counts[host]
 
 
-def connection_server(events):
+def connection_server(events, faults):
     """The replacement of ``rospy.impl.tcpros_service.ServiceImpl.handle``. Runs in the connection's thread."""
     counts = _Counts()
 
@@ -52,11 +57,20 @@ def connection_server(events):
             return
         try:
             _serve(service, transport, header.get("persistent", "").lower() in ("1", "true"), caller, events)
+        except SURVIVED as error:
+            faults.note("that serves a request", error, "%s: connection of %s closed" % (service.resolved_name, caller))
         finally:
             counts.leave(host)
             transport.close()
 
     return handle
+
+
+def write_error(service, transport, text):
+    """The replacement of ``ServiceImpl._write_service_error``. A text may quote half of a surrogate pair, which cannot
+    be sent; rospy then sends nothing."""
+    data = text.encode("utf-8", "backslashreplace")
+    transport.write_data(_ERROR.pack(0, len(data)) + data)
 
 
 def _serve(service, transport, is_persistent, caller, events):

@@ -10,16 +10,19 @@ from rospy_limits.handshakes import HandshakeServer
 
 #: Connections that the kernel holds until they are accepted. rospy uses 5; beyond, clients wait for a second.
 BACKLOG = 128
+#: The longest reason of a refusal [characters]. It quotes the client, and a client that reads nothing must not hold up
+#: the thread that accepts connections: so much a socket always takes.
+LONGEST_REASON = 2000
 
 
-def limited_server(events):
+def limited_server(events, faults):
     """The replacement of the class ``rospy.impl.tcpros_base.TCPServer``."""
 
     class LimitedTCPServer(tcpros_base.TCPServer):
         def __init__(self, inbound_handler, port=0):
             super().__init__(inbound_handler, port)
             self.server_sock.listen(BACKLOG)
-            self._handshakes = HandshakeServer(self.server_sock, inbound_handler, events)
+            self._handshakes = HandshakeServer(self.server_sock, inbound_handler, events, faults)
 
         def run(self):
             self._handshakes.run()
@@ -37,7 +40,7 @@ def connection_handler(events):
     def take(server, connection, address, data):
         try:
             header = rosgraph.network.decode_ros_handshake_header(data)
-        except rosgraph.network.ROSHandshakeException as error:
+        except Exception as error:  # noqa: BLE001  (rosgraph's reader raises other errors, too, on what is no header)
             connection.close()
             events.add(("header", address[0]), "connection from %s:%d closed: no handshake header of ROS (%s)"
                        % (*address[:2], error))
@@ -65,7 +68,7 @@ def _answer(handler, connection, address, header, events):
         else:
             events.add(("refused", header.get("callerid")), "connection of %s at %s:%d refused: %s"
                        % (header.get("callerid", "an unnamed node"), *address[:2], reason))
-        rosgraph.network.write_ros_handshake_header(connection, {"error": reason})
+        rosgraph.network.write_ros_handshake_header(connection, {"error": reason[:LONGEST_REASON]})
     except Exception as error:  # noqa: BLE001  (anything may be sent, and a connection may end at any point)
         if not is_shutdown_requested():
             events.add(("failed", address[0]), "connection of %s at %s:%d failed: %s"

@@ -10,6 +10,7 @@ import time
 import rosgraph.xmlrpc
 
 from rospy_limits import limits
+from rospy_limits.threads import lasting
 
 _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 #: Sleep of the server after it has run out of descriptors [s]; otherwise it would loop at full speed.
@@ -92,7 +93,7 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
         connections.allow(self.connection, limits.XMLRPC_IDLE_S, quiet=True)
 
 
-def limited_server(events):
+def limited_server(events, faults):
     """The replacement of the class ``rosgraph.xmlrpc.ThreadingXMLRPCServer``."""
 
     class LimitedXMLRPCServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
@@ -100,6 +101,11 @@ def limited_server(events):
             self.connections = Connections(events)
             super().__init__(addr, log_requests)
             self.RequestHandlerClass = _RequestHandler
+
+        def serve_forever(self, poll_interval=0.5):
+            # A socket that is closed serves nobody any more.
+            lasting(faults, "of the XML-RPC server", lambda _: super(LimitedXMLRPCServer, self).serve_forever(
+                poll_interval))(lambda: self.socket.fileno() < 0)
 
         def get_request(self):
             try:

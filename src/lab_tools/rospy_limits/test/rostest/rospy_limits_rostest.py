@@ -14,6 +14,7 @@ from xmlrpc.client import ServerProxy
 import rosgraph
 import rospy
 import rostest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph.network import write_ros_handshake_header
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
@@ -113,10 +114,19 @@ class RospyLimits(unittest.TestCase):
 
     def test_garbage(self):
         for data in (struct.pack("<I", 2**32 - 1), b"GET / HTTP/1.1\r\n\r\n", os.urandom(2000),
-                     struct.pack("<I", 8) + b"\xff" * 8, struct.pack("<II", 8, 4) + b"=x=y", struct.pack("<I", 0)):
+                     struct.pack("<I", 8) + b"\xff" * 8, struct.pack("<II", 8, 4) + b"=x=y", struct.pack("<I", 0),
+                     struct.pack("<II", 6, 2) + b"\xff=", struct.pack("<I", 3) + b"\x02\0\0"):
             self.connect(self.tcpros, data)
             self.connect(self.xmlrpc, data)
         self.connect(self.xmlrpc, b"POST / HTTP/1.1\r\nContent-Length: 4294967296\r\n\r\n")
+        self.check_alive()
+
+    def test_a_thread_that_an_error_ends_is_told_on_diagnostics(self):
+        with self.assertRaises(rospy.ServiceException):
+            rospy.ServiceProxy("fail", SetBool)(True)
+        status = rospy.wait_for_message("/diagnostics", DiagnosticArray, DEADLINE_S).status[0]
+        self.assertEqual((status.name, status.level), (NODE + ": threads", DiagnosticStatus.WARN))
+        self.assertIn("ZeroDivisionError", status.values[0].value)
         self.check_alive()
 
     def test_connections_that_are_opened_and_dropped_leave_nothing(self):

@@ -5,13 +5,16 @@ import os
 import resource
 import socket
 import struct
+import threading
 
 import pytest
 
 from lab_testing.waiting import wait_until
 from rospy_limits import handshakes, limits
-from rospy_limits.event_log import PERIOD_S, EventLog
+from rospy_limits.event_log import MOST_KINDS, PERIOD_S, EventLog
 from rospy_limits.handshakes import HandshakeServer
+from rospy_limits.tcpros_server import LONGEST_REASON, connection_handler
+from rospy_limits.threads import ThreadFaults
 
 
 class Clock:
@@ -32,8 +35,12 @@ class Scene:
         self.clock = Clock()
         self.listener = socket.create_server(("127.0.0.1", 0), backlog=512)
         self.served, self.lines, self.clients = [], [], []
-        self.server = HandshakeServer(self.listener, lambda *served: self.served.append(served),
-                                      EventLog(self.lines.append, self.clock), self.clock)
+        self.events = EventLog(self.lines.append, self.clock)
+        self.faults = ThreadFaults(self.events)
+        self.serve_by(lambda *served: self.served.append(served))
+
+    def serve_by(self, serve):
+        self.server = HandshakeServer(self.listener, serve, self.events, self.faults, self.clock)
 
     def connect(self, data=b""):
         client = socket.create_connection(self.listener.getsockname())
@@ -122,8 +129,7 @@ def test_the_number_of_silent_clients_is_counted_by_address(scene, monkeypatch):
     monkeypatch.setattr(limits, "HANDSHAKES_PER_ADDRESS", 2)
     scene.listener.close()
     scene.listener = socket.create_server(("0.0.0.0", 0))
-    scene.server = HandshakeServer(scene.listener, lambda *served: None, EventLog(scene.lines.append, scene.clock),
-                                   scene.clock)
+    scene.serve_by(lambda *served: None)
     port = scene.listener.getsockname()[1]
     other = socket.create_connection(("127.0.0.1", port), source_address=("127.0.0.2", 0))
     scene.clients.append(other)
@@ -191,6 +197,83 @@ def test_without_descriptors_the_silent_ones_go_and_serving_goes_on(scene):
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         for filler in fillers:
             os.close(filler)
+
+
+def test_what_cannot_be_served_costs_its_connection_and_no_other(scene):
+    def serve(connection, address, data):
+        if b"evil" in data:
+            raise ZeroDivisionError("an error that nobody foresaw")
+        scene.served.append((connection, address, data))
+
+    scene.serve_by(serve)
+    evil, slow = scene.connect(framed(b"evil")), scene.connect(framed(b"evil too")[:5])
+    scene.turn_until(lambda: is_closed(evil) and scene.server.pending == 1, "the first to be closed")
+    slow.setblocking(True)
+    slow.sendall(framed(b"evil too")[5:])
+    scene.turn_until(lambda: is_closed(slow), "the second to be closed")
+    scene.connect(framed(b"good"))
+    scene.turn_until(lambda: scene.headers() == [b"good"], "the good one")
+    assert scene.server.pending == 0
+    (_, values), line = scene.faults.summary(), scene.lines[0]
+    assert len(scene.lines) == 1 and "ZeroDivisionError" in line
+    assert next(iter(values.values())).startswith("2, ")
+
+
+def test_the_thread_goes_on_after_an_error_of_its_own(scene):
+    errors, turn = [OSError(errno.EIO, "broken"), SystemExit(3)], scene.server.turn
+
+    def turn_or_fail():
+        if errors:
+            raise errors.pop(0)
+        turn()
+
+    scene.server.turn = turn_or_fail
+    thread = threading.Thread(target=scene.server.run)
+    thread.start()
+    scene.connect(framed(b"good"))
+    wait_until(lambda: scene.headers() == [b"good"], "a client after the errors")
+    scene.server.close()
+    thread.join(60.0)
+    assert not thread.is_alive() and "2 times" in scene.faults.summary()[0]
+
+
+class Node:
+    """The handlers of rospy's server."""
+
+    def topic_connection_handler(self, connection, address, header):
+        return "no topic here"
+
+    def service_connection_handler(self, connection, address, header):
+        return "no service %s" % header["service"]
+
+
+@pytest.mark.parametrize("body", [
+    struct.pack("<I", 2) + b"\xff=", struct.pack("<I", 5) + b"a=\xc3(", b"\x01", struct.pack("<I", 0),
+    struct.pack("<I", 2**31) + b"a=b", struct.pack("<I", 3) + b"abc"])
+def test_bytes_that_are_no_header_cost_their_connection_and_a_line(scene, body):
+    take = connection_handler(scene.events)
+    scene.serve_by(lambda *of_one: take(Node(), *of_one))
+    client = scene.connect(framed(body))
+    scene.turn_until(lambda: is_closed(client), "the client to be closed")
+    assert len(scene.lines) == 1 and scene.faults.summary() is None and scene.lines[0].isprintable()
+
+
+def test_a_client_that_does_not_read_its_long_refusal_holds_up_nobody(scene):
+    take = connection_handler(scene.events)
+    scene.serve_by(lambda *of_one: take(Node(), *of_one))
+    text = b"service=\x1b[31m" + 200_000 * b"a"
+    client = scene.connect(framed(struct.pack("<I", len(text)) + text))
+    client.setblocking(True)
+    scene.turn_until(lambda: scene.lines, "the line")
+    assert len(client.recv(300_000, socket.MSG_WAITALL)) < LONGEST_REASON + 100
+    assert len(scene.lines[0]) < 2000 and scene.lines[0].isprintable()
+
+
+def test_kinds_of_events_that_others_can_invent_are_forgotten():
+    log = EventLog([].append)
+    for number in range(3 * MOST_KINDS):
+        log.add(("refused", number), "refused")
+    assert len(log._kinds) <= MOST_KINDS
 
 
 def test_one_kind_of_event_costs_one_line_a_minute_with_their_number():

@@ -29,7 +29,7 @@ from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
-from lab_web.loops import attended, lasting
+from lab_web.loops import attended
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
 from lab_web.overlay import Overlay
@@ -47,6 +47,7 @@ from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from rospy_limits.node import limit_ports
 from rospy_limits.rest import Demand
+from rospy_limits.threads import lasting
 from rospy_start import end_on_signals
 from web_bridge import ros_graph
 from web_bridge.access import Access
@@ -150,7 +151,8 @@ def serve(options, page, libraries):
     access = Access({tokens[0]: True, tokens[1]: False})
     pages = Pages(access, loop_thread)
     robot = Baxter(lambda text: pages.tell(None, "refused", text))
-    pages.lab = Lab(robot, pages.control_changed, pages.tell)
+    pages.lab = Lab(robot, pages.control_changed, pages.tell,
+                    rested=lambda client: pages.answer(client, {"op": "rested"}))
     faults = Faults(SimpleNamespace(error=rospy.logerr))
     equipment = _equip(pages, robot, faults)
 

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How a node learns of publishers and connects to them: rospy's thread for it lasts, and headers have a limit."""
+import functools
+import struct
+from collections.abc import Callable
+
+import rosgraph.network
+from rospy.core import is_shutdown
+
+from rospy_limits import limits
+from rospy_limits.threads import lasting
+
+_LENGTH = struct.Struct("<I")
+_PORTION = 65536
+
+
+def lasting_run(run: Callable, faults) -> Callable:
+    """``rospy.impl.registration.RegManager.run``, again after each error, until the node ends."""
+    @functools.wraps(run)
+    def run_on(manager):
+        lasting(faults, "that connects to publishers", lambda _: run(manager))(
+            lambda: manager.handler.done or is_shutdown())
+    return run_on
+
+
+def limited_update(update: Callable) -> Callable:
+    """``ROSHandler.publisherUpdate``, which refuses more publishers than a topic can have: each gets a thread."""
+    @functools.wraps(update)
+    def limited(self, *arguments):
+        if len(arguments) == 3 and isinstance(arguments[2], list) and len(arguments[2]) > limits.PUBLISHERS:
+            return -1, "%d publishers of a topic, at most %d are taken" % (len(arguments[2]), limits.PUBLISHERS), 0
+        return update(self, *arguments)
+    return limited
+
+
+def read_header(connection, buffer, _portion=None) -> dict[str, str]:
+    """The replacement of ``read_ros_handshake_header`` where a subscriber or a client reads the other side's header.
+
+    ``buffer`` (BytesIO) afterwards holds what came behind it; what is left in it from an earlier connection is dropped.
+    Raises ``rosgraph.network.ROSHandshakeException``, also for a header that is too long, and what
+    ``decode_ros_handshake_header`` raises.
+    """
+    data, wanted = bytearray(), _LENGTH.size
+    while len(data) < wanted:
+        portion = connection.recv(_PORTION)
+        if not portion:
+            raise rosgraph.network.ROSHandshakeException("closed by the other side after %d bytes of its header"
+                                                         % len(data))
+        data += portion
+        if len(data) >= _LENGTH.size:
+            length, = _LENGTH.unpack_from(data)
+            if length > limits.HEADER_BYTES:
+                raise rosgraph.network.ROSHandshakeException(
+                    "the other side announces a header of %d bytes, at most %d are taken"
+                    % (length, limits.HEADER_BYTES))
+            wanted = _LENGTH.size + length
+    buffer.seek(0)
+    buffer.truncate()
+    buffer.write(data[wanted:])
+    return rosgraph.network.decode_ros_handshake_header(bytes(data[:wanted]))
