@@ -6,6 +6,7 @@ import sys
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_interface import JOINT_ANGLE_TOLERANCE, Limb, Navigator
 from baxter_interface.programs import EnabledRobot, run
+from lab_environment.options import number
 
 RATE_HZ = 20.0
 PROMPT = "press the wheel to record a waypoint (%d so far), the button below it to play them; Ctrl-C: quit"
@@ -62,8 +63,9 @@ def teach(arguments):
 def main():
     parser = new_parser(__doc__)
     add_limb(parser)
-    parser.add_argument("-s", "--speed", type=float, default=0.3, help="speed ratio, 0 to 1 (default: %(default)s)")
-    parser.add_argument("-a", "--accuracy", type=float, default=JOINT_ANGLE_TOLERANCE,
+    parser.add_argument("-s", "--speed", type=number(float, 0, 100), default=0.3,
+                        help="speed ratio, 0 to 1 (default: %(default)s)")
+    parser.add_argument("-a", "--accuracy", type=number(float, 0, 100, above=True), default=JOINT_ANGLE_TOLERANCE,
                         help="error of each joint below which a waypoint is reached [rad] (default: %(default)s)")
     arguments = parse(parser)
     return run("rsdk_joint_position_waypoints_%s" % arguments.limb, lambda: teach(arguments))

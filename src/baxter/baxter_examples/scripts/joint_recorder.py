@@ -8,6 +8,7 @@ from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_examples.cuff_control import CuffControl
 from baxter_interface.programs import EnabledRobot, run
 from baxter_model import SIDES
+from lab_environment.options import number
 
 
 def record(path, rate_hz):
@@ -28,7 +29,7 @@ def record(path, rate_hz):
 def main():
     parser = new_parser(__doc__)
     add_file(parser, "the recording to write")
-    parser.add_argument("-r", "--rate", type=float, default=100.0, metavar="HZ",
+    parser.add_argument("-r", "--rate", type=number(float, 0, 1000, above=True), default=100.0, metavar="HZ",
                         help="rows per second (default: %(default)g)")
     arguments = parse(parser)
     return run("rsdk_joint_recorder", lambda: record(arguments.file, arguments.rate))

@@ -13,6 +13,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed, run
+from lab_environment.options import MOST_SECONDS, number
 
 # A latched picture disappears with its publisher: time for new subscribers to receive it [s].
 HAND_OVER_S = 1.0
@@ -33,7 +34,8 @@ def show(path, delay_s):
 def main():
     parser = new_parser(__doc__)
     add_file(parser, "the picture's file")
-    parser.add_argument("-d", "--delay", type=float, default=0.0, metavar="SECONDS", help="wait before (default: 0)")
+    parser.add_argument("-d", "--delay", type=number(float, 0, MOST_SECONDS), default=0.0, metavar="SECONDS",
+                        help="wait before (default: 0)")
     arguments = parse(parser)
     return run("rsdk_xdisplay_image", lambda: show(pathlib.Path(arguments.file), arguments.delay), anonymous=True)
 

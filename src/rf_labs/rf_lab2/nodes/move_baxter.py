@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Move both arms of Baxter to neutral, then one gripper to a pose that the IK service solves."""
 import argparse
-import math
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -13,6 +12,7 @@ from std_msgs.msg import Header
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import BASE_FRAME, SIDES
+from lab_environment.options import number
 from rf_lab2.poses import pose_difference, unit_quaternion
 from rf_lab2.programs import ProgramFailed, run
 
@@ -20,22 +20,19 @@ from rf_lab2.programs import ProgramFailed, run
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
 SERVICE_TIMEOUT_S = 30.0
-
-
-def finite_number(word):
-    value = float(word)
-    if not math.isfinite(value):
-        raise ValueError(word)
-    return value
+# Poses farther away are a slip; the service says what is out of reach.
+FARTHEST_M = 1e6
 
 
 def parse_arguments(argv):
     parser = argparse.ArgumentParser(prog="move_baxter.py", description=__doc__,
                                      epilog="Exit status: 0 the arm is there, 1 it is not, 2 wrong options.")
     parser.add_argument("--arm", choices=SIDES, default="left", help="the arm to move (default: %(default)s)")
-    parser.add_argument("--point", type=finite_number, nargs=3, default=LAB_POINT, metavar=("X", "Y", "Z"),
+    parser.add_argument("--point", type=number(float, -FARTHEST_M, FARTHEST_M), nargs=3, default=LAB_POINT,
+                        metavar=("X", "Y", "Z"),
                         help="position of the gripper in base [m] (default: %s %s %s)" % LAB_POINT)
-    parser.add_argument("--quaternion", type=float, nargs=4, default=LAB_QUATERNION, metavar=("X", "Y", "Z", "W"),
+    parser.add_argument("--quaternion", type=number(float, -FARTHEST_M, FARTHEST_M), nargs=4, default=LAB_QUATERNION,
+                        metavar=("X", "Y", "Z", "W"),
                         help="its orientation (default: %s %s %s %s)" % LAB_QUATERNION)
     arguments = parser.parse_args(argv)
     try:

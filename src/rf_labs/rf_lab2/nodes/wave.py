@@ -9,6 +9,7 @@ import rospy
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import SIDES
+from lab_environment.options import number
 from rf_lab2.programs import ProgramFailed, run
 from rf_lab2.waving import Swing, hands_up, shifts
 
@@ -19,14 +20,13 @@ RATE_HZ = 50
 def parse_arguments(argv):
     parser = argparse.ArgumentParser(prog="wave.py", description=__doc__,
                                      epilog="Exit status: 0 waved, 1 could not, 2 wrong options.")
-    parser.add_argument("--seconds", type=float, default=8.0, help="how long (default: %(default)s)")
-    parser.add_argument("--period", type=float, default=2.0, help="for once to and fro [s] (default: %(default)s)")
-    parser.add_argument("--amplitude", type=float, default=0.12, help="how far to each side [m] (default: %(default)s)")
-    arguments = parser.parse_args(argv)
-    if not (0.0 < arguments.seconds <= 3600.0 and arguments.period >= 1.0):
-        parser.error("seconds are more than 0, at most 3600, and a period is at least 1 s; got %g and %g"
-                     % (arguments.seconds, arguments.period))
-    return arguments
+    parser.add_argument("--seconds", type=number(float, 0, 3600, above=True), default=8.0,
+                        help="how long (default: %(default)s)")
+    parser.add_argument("--period", type=number(float, 1, 3600), default=2.0,
+                        help="for once to and fro [s] (default: %(default)s)")
+    parser.add_argument("--amplitude", type=number(float, -2, 2), default=0.12,
+                        help="how far to each side [m] (default: %(default)s)")
+    return parser.parse_args(argv)
 
 
 def plan(limb, arguments):

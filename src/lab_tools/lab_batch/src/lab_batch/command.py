@@ -9,6 +9,8 @@ import threading
 import time
 from pathlib import Path
 
+from lab_environment.options import MOST_WORKERS, number, seconds
+
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, class_of, parameters_of
 from .records import Records, RecordsError, summary, versions
@@ -20,24 +22,33 @@ PROGRESS_S, LINE_S = 0.5, 30.0
 # No end of an episode for so long is told [s], where it is also so many times the longest until then.
 SILENT_S, SILENT_FACTOR = 60.0, 5.0
 BAR_WIDTH = 30
-LEAST_GB = 0.1
+# Python itself needs the least [GB].
+LEAST_GB, MOST_GB = 0.1, 1e6
+MOST_RECYCLE = 10**9
+# The largest seed, as results in Parquet have room for; most seeds of one batch, whose results are held in memory.
+MOST_SEED, MOST_SEEDS = 2**63 - 1, 10_000_000
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 
 def seeds_of(text):
     """0:1000 is 0 to 999; 5 is 5 alone; 1:3,7 is 1, 2, 7. Raises argparse.ArgumentTypeError."""
-    seeds = []
+    parts, count = [], 0
     try:
         for part in text.split(","):
             first, colon, last = part.partition(":")
-            chosen = range(int(first or 0), int(last)) if colon else [int(first)]
-            if not chosen or chosen[0] < 0:
+            first = int(first or 0) if colon else int(first)
+            last = int(last) if colon else first + 1
+            if not 0 <= first < last <= MOST_SEED + 1:
                 raise ValueError
-            seeds.extend(chosen)
+            count += last - first
+            parts.append(range(first, last))
     except ValueError:
-        raise argparse.ArgumentTypeError("seeds are numbers from 0 on, such as 0:1000, 7 or 0:10,20:30, not %r"
-                                         % text) from None
-    return list(dict.fromkeys(seeds))
+        raise argparse.ArgumentTypeError("seeds are numbers from 0 to %d, such as 0:1000, 7 or 0:10,20:30, not %.60r"
+                                         % (MOST_SEED, text)) from None
+    if count > MOST_SEEDS:
+        raise argparse.ArgumentTypeError("%d seeds are too many for one batch; at most %d are run, so make it several"
+                                         % (count, MOST_SEEDS))
+    return list(dict.fromkeys(seed for part in parts for seed in part))
 
 
 def setting_of(text):
@@ -49,27 +60,6 @@ def setting_of(text):
         return name, ast.literal_eval(value)
     except (ValueError, SyntaxError):
         return name, value
-
-
-def positive(kind):
-    def convert(text):
-        try:
-            value = kind(text)
-        except ValueError:
-            value = 0
-        if not 0 < value < float("inf"):
-            raise argparse.ArgumentTypeError("must be %s greater than 0, not %s" % (
-                "an integer" if kind is int else "a number", text or "nothing"))
-        return value
-    return convert
-
-
-def memory(text):
-    """Gigabytes. Raises argparse.ArgumentTypeError."""
-    value = positive(float)(text)
-    if value < LEAST_GB:
-        raise argparse.ArgumentTypeError("Python itself needs %g GB of memory, not %s" % (LEAST_GB, text))
-    return value
 
 
 def parse(argv):
@@ -85,13 +75,13 @@ def parse(argv):
                         help="a parameter of the job; may be repeated")
     parser.add_argument("--engine", choices=ENGINES, default="processes", help="default: processes of this machine")
     parser.add_argument("--address", metavar="HOST:PORT", help="the head of a Ray cluster; without it Ray runs here")
-    parser.add_argument("--workers", type=positive(int), default=os.cpu_count(), metavar="N",
+    parser.add_argument("--workers", type=number(int, 1, MOST_WORKERS), default=os.cpu_count(), metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
-    parser.add_argument("--time-limit", type=positive(float), metavar="S", help="longest wall time of an episode")
-    parser.add_argument("--memory", type=memory, metavar="GB",
+    parser.add_argument("--time-limit", type=seconds(), metavar="S", help="longest wall time of an episode")
+    parser.add_argument("--memory", type=number(float, LEAST_GB, MOST_GB), metavar="GB",
                         help="most memory of a worker with all its processes (default: its share of %d %% of this "
                              "machine's; on a cluster: no limit but Ray's own)" % (100 * keeping.SHARE))
-    parser.add_argument("--recycle", type=positive(int), default=200, metavar="N",
+    parser.add_argument("--recycle", type=number(int, 1, MOST_RECYCLE), default=200, metavar="N",
                         help="a worker is replaced after N episodes (default %(default)s)")
     parser.add_argument("--retry-failed", action="store_true", help="also run seeds again that failed before")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: .baxter/batch/JOB.jsonl")

@@ -13,6 +13,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from lab_environment.options import MOST_WORKERS, number
+
 from . import ray_engine
 from .job import JobError
 
@@ -32,8 +34,8 @@ def parse(argv):
     role.add_argument("--address", metavar="HOST:PORT", help="of the head")
     parser.add_argument("--listen", required=True, metavar="ADDRESS",
                         help="this machine's address in the cluster's network")
-    parser.add_argument("--port", type=int, default=PORT, help="of the head (default: %(default)s)")
-    parser.add_argument("--cpus", type=int, default=os.cpu_count(), metavar="N",
+    parser.add_argument("--port", type=number(int, 1, 65535), default=PORT, help="of the head (default: %(default)s)")
+    parser.add_argument("--cpus", type=number(int, 1, MOST_WORKERS), default=os.cpu_count(), metavar="N",
                         help="episodes at a time on this machine (default: one for each processor, %(default)s)")
     return parser.parse_args(argv)
 

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`rosrun lab_display show`: the functions of `show` on the command line."""
 import argparse
+import os
 import sys
+from pathlib import Path
 
 import rospy
 
 from baxter_interface import startup
+from lab_environment.options import number, seconds
 
 from . import show
 
+# How far the camera of a picture may be, and what it looks at [m].
+FARTHEST_M = 1e6
 EPILOG = "Exit status: 0 shown, 1 there was nothing to show (standard error says why), 2 wrong options."
 
 
@@ -20,19 +25,21 @@ def parser():
     def add(name, text, picture=True):
         command = commands.add_parser(name, help=text, description=text)
         if picture:
-            command.add_argument("--out", metavar="FILE.png", default="%s.png" % name,
-                                 help="where the picture goes (default: %(default)s)")
+            command.add_argument("--out", metavar="FILE.png", type=Path,
+                                 help="where the picture goes (default: %s.png; in the workspace: .baxter/pictures)" % name)
         return command
 
     robot = add("robot", "the simulated world from outside")
     robot.add_argument("frames", nargs="*", metavar="FRAME", help="tf frames to draw into it: x red, y green, z blue")
-    robot.add_argument("--eye", nargs=3, type=float, metavar=("X", "Y", "Z"), help="where the camera stands [m]")
-    robot.add_argument("--target", nargs=3, type=float, metavar=("X", "Y", "Z"), help="where it looks [m]")
+    robot.add_argument("--eye", nargs=3, type=number(float, -FARTHEST_M, FARTHEST_M), metavar=("X", "Y", "Z"),
+                       help="where the camera stands [m]")
+    robot.add_argument("--target", nargs=3, type=number(float, -FARTHEST_M, FARTHEST_M), metavar=("X", "Y", "Z"),
+                       help="where it looks [m]")
     add("camera", "what a camera of the robot sees").add_argument("name", help="head_camera, or the image's topic")
     joints = add("joints", "positions of joints over time")
     joints.add_argument("names", nargs="*", metavar="JOINT", help="which joints (default: all)")
     joints.add_argument("--topic", default=show.JOINT_STATES, help="joint states (default: %(default)s)")
-    joints.add_argument("--seconds", type=float, default=5.0, help="how long [s, simulated] (default: %(default)s)")
+    joints.add_argument("--seconds", type=seconds(), default=5.0, help="how long [s, simulated] (default: %(default)s)")
     for name, text in (("tf", "the frames that tf knows"), ("urdf", "links and joints of the robot's description")):
         tree = add(name, text)
         tree.add_argument("--below", metavar="FRAME", help="from this frame down")
@@ -64,6 +71,14 @@ ACTIONS = {
 }
 
 
+def picture_path(name: str, here: Path, workspace: str) -> Path:
+    """Where a picture goes: into the current folder, but into the folder of the workspace's own files in its topmost one.
+
+    ``workspace``: "" where none is known.
+    """
+    return here / ".baxter" / "pictures" / (name + ".png") if workspace and here.samefile(workspace) else Path(name + ".png")
+
+
 def main():
     """Show it; returns the exit code."""
     arguments = parser().parse_args(rospy.myargv()[1:])
@@ -72,8 +87,10 @@ def main():
         startup.wait_for_start([])
         shown = ACTIONS[arguments.what](arguments)
         if hasattr(shown, "save"):
-            shown.save(arguments.out)
-            print(arguments.out)
+            path = arguments.out or picture_path(arguments.what, Path.cwd(), os.environ.get("LAB_ROOT", ""))
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shown.save(path)
+            print(path)
         else:
             print(shown)
     except BrokenPipeError:

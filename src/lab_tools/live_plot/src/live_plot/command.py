@@ -9,6 +9,7 @@ import time
 import rosgraph
 import rospy
 
+from lab_environment.options import seconds
 from live_plot import fields
 from live_plot.recording import Recording
 from live_plot.subscriptions import Subscriptions, topic_types
@@ -26,10 +27,10 @@ def parse(name, arguments):
     parser.add_argument("topics", nargs="*", metavar="/TOPIC/FIELD", help="what to plot")
     parser.add_argument("-P", "--pause", action="store_true", help="do not draw until pause is switched off")
     parser.add_argument("-e", "--empty", action="store_true", help="start without any curve")
-    parser.add_argument("--span", type=positive, default=10.0, metavar="S", help="autoscroll: time shown [s] (10)")
+    parser.add_argument("--span", type=seconds(), default=10.0, metavar="S", help="autoscroll: time shown [s] (10)")
     parser.add_argument("--png", metavar="FILE", help="no window: write a picture")
-    parser.add_argument("--seconds", type=positive, default=10.0, metavar="N", help="--png: time recorded [s] (10)")
-    parser.add_argument("--timeout", type=positive, default=10.0, metavar="S",
+    parser.add_argument("--seconds", type=seconds(), default=10.0, metavar="N", help="--png: time recorded [s] (10)")
+    parser.add_argument("--timeout", type=seconds(), default=10.0, metavar="S",
                         help="--png: how long to wait for a topic and its first message [s] (10)")
     options = parser.parse_args(arguments)
     if options.empty:
@@ -39,13 +40,6 @@ def parse(name, arguments):
     if options.png and not os.path.isdir(os.path.dirname(os.path.abspath(options.png))):
         parser.error("--png: there is no folder %s" % os.path.dirname(os.path.abspath(options.png)))
     return options
-
-
-def positive(text):
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("%s is not a positive number of seconds" % text)
-    return value
 
 
 def wait_for(done, deadline):

@@ -6,6 +6,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from lab_environment.options import number
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
 from motion_planning.exact import ExactChecker
@@ -13,6 +14,9 @@ from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import prepare, sphere_model_of
 from motion_planning.srdf import element_of, with_disabled_pairs
 from urdf_model import description_text
+
+# Most random states of an SRDF, which take a day.
+MOST_TRIALS = 10**8
 
 
 def collisions_updater(arguments=None):
@@ -24,13 +28,14 @@ def collisions_updater(arguments=None):
     parser.add_argument("--srdf", type=Path, required=True, help="SRDF file to be changed; or xacro, with --output")
     parser.add_argument("--output", type=Path, help="file to write in place of --srdf")
     parser.add_argument("--lines", action="store_true", help="print the elements and write nothing")
-    parser.add_argument("--trials", type=int, default=TRIALS, help="random states (default: %(default)s)")
-    parser.add_argument("--min-collision-fraction", type=float, default=ALWAYS_SHARE, dest="share",
+    parser.add_argument("--trials", type=number(int, 1, MOST_TRIALS), default=TRIALS,
+                        help="random states (default: %(default)s)")
+    parser.add_argument("--min-collision-fraction", type=number(float, 0, 1, above=True), default=ALWAYS_SHARE,
+                        dest="share",
                         help="share of random states in which what touches always does (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the random states (default: %(default)s)")
+    parser.add_argument("--seed", type=number(int, 0, 2**63 - 1), default=0,
+                        help="of the random states (default: %(default)s)")
     options = parser.parse_args(arguments)
-    if options.trials < 1 or not 0.0 < options.share <= 1.0:
-        parser.error("--trials must be 1 or more, and --min-collision-fraction more than 0 and at most 1")
     if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:
         parser.error("%s is xacro; name the SRDF file to write with --output" % options.srdf)
     try:

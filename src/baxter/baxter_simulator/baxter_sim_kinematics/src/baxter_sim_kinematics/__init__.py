@@ -6,7 +6,7 @@ from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.chain import Chain, wrench_from_torques
 from baxter_sim_kinematics.collision import CollisionChecker, Touch
 from baxter_sim_kinematics.errors import ChainError, InvalidPosture, InvalidTarget, KinematicsError, NoSolution, Reason
-from baxter_sim_kinematics.ik import Several, solve, solve_all, warm_up
+from baxter_sim_kinematics.ik import Several, solve, solve_all, solve_as_vendor, warm_up
 from baxter_sim_kinematics.posture_map import PostureMap
 from baxter_sim_kinematics.search import IkResult
 from baxter_sim_kinematics.target import Target, Targets, pose_from_quaternion
@@ -31,6 +31,7 @@ __all__ = [
     "pose_from_quaternion",
     "solve",
     "solve_all",
+    "solve_as_vendor",
     "solve_batch",
     "warm_up",
     "wrench_from_torques",

@@ -13,6 +13,7 @@ from baxter_sim_kinematics.errors import KinematicsError, NoSolution
 from baxter_sim_kinematics.ik import solve_all
 from baxter_sim_kinematics.reach import yoshikawa
 from baxter_sim_kinematics.target import Target, pose_from_quaternion
+from lab_environment.options import number
 from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
@@ -122,7 +123,8 @@ def ik():
     parser.add_argument("--free-axis", type=float, nargs=3, metavar=("X", "Y", "Z"),
                         help="any turn about this axis of the tip will do")
     parser.add_argument("--seed", type=float, nargs="+", metavar="Q", help="start here (default: mid-range)")
-    parser.add_argument("--solutions", type=int, default=1, metavar="N", help="up to N distinct ones (default: 1)")
+    parser.add_argument("--solutions", type=number(int, 1, 1000), default=1, metavar="N",
+                        help="up to N distinct ones (default: 1)")
     parser.add_argument("--clear", action="store_true", help="only postures where the robot does not touch itself")
     parser.add_argument("--json", action="store_true", help="print JSON")
     return run_command(lambda: _ik(parser, parser.parse_args()))

@@ -24,6 +24,7 @@ from baxter_sim_kinematics.reach_bounds import balls
 from baxter_sim_kinematics.reach_map import ReachMap, overlap
 from baxter_sim_kinematics.reach_places import Region, best_places, nearest_rotations, table_poses
 from baxter_sim_kinematics.target import pose_from_quaternion
+from lab_environment.options import MOST_WORKERS, number
 
 
 def _reach_parser():
@@ -35,16 +36,19 @@ def _reach_parser():
     parser.add_argument("--volume", type=float, nargs=6, metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
                         help="[m] (default: all that the arm reaches)")
     parser.add_argument("--cell", type=float, default=0.1, help="edge of a cell [m] (default: 0.1)")
-    parser.add_argument("--orientations", type=int, default=24, help="tried in each cell (default: 24)")
+    parser.add_argument("--orientations", type=number(int, 1, 10**5), default=24,
+                        help="tried in each cell (default: 24)")
     parser.add_argument("--tool", type=float, nargs=3, metavar=("X", "Y", "Z"),
                         help="the tip's z axis points there, and only turns about it are tried; 0 0 -1 is down")
-    parser.add_argument("--starts", type=int, default=40, help="random starts before a pose counts as out of reach")
+    parser.add_argument("--starts", type=number(int, 1, 10**6), default=40,
+                        help="random starts before a pose counts as out of reach")
     parser.add_argument("--self-collision", action="store_true",
                         help="only postures count in which the robot does not touch itself")
     parser.add_argument("--hdf5", action="store_true",
                         help="write reach.h5 and capability.h5 as well, in the layouts of Reuleaux")
     parser.add_argument("--out", type=Path, default=Path("reach"), help="folder (default: reach)")
-    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
+    parser.add_argument("--jobs", type=number(int, 1, MOST_WORKERS), default=len(os.sched_getaffinity(0)),
+                        help="processes (default: all cores)")
     return parser
 
 
@@ -78,8 +82,6 @@ def _settings(options):
 def _reach(options):
     from baxter_sim_kinematics.reach_picture import draw
 
-    if options.jobs < 1:
-        raise ValueError("--jobs must be at least 1, got %d" % options.jobs)
     robot, chain, settings = _settings(options)
     if settings.self_collision:
         # The worker processes make their own; this one tells once what they will lack.
@@ -185,7 +187,7 @@ def reach_place():
     parser.add_argument("--step", type=float, default=0.05, help="between places, and between points of a table [m]")
     parser.add_argument("--yaws", type=float, nargs="+", default=[0.0], metavar="DEGREES",
                         help="turns of the task about z that are tried (default: 0)")
-    parser.add_argument("--most", type=int, default=5, help="places that are printed (default: 5)")
+    parser.add_argument("--most", type=number(int, 1, 10**6), default=5, help="places that are printed (default: 5)")
     return run_command(lambda: _place(parser.parse_args()))
 
 
@@ -224,7 +226,7 @@ def _is_solved(chain, pose, checker):
 
 def _task_poses(path):
     poses = []
-    for number, line in enumerate(path.read_text().splitlines(), 1):
+    for row, line in enumerate(path.read_text().splitlines(), 1):
         words = line.replace(",", " ").replace(";", " ").split()
         if not words or words[0].startswith("#"):
             continue
@@ -234,7 +236,7 @@ def _task_poses(path):
                 raise ValueError("expected 7 numbers, got %d" % len(values))
             poses.append(pose_from_quaternion(values[:3], values[3:]))
         except ValueError as error:
-            raise ReachError("%s, line %d: %s" % (path, number, error)) from None
+            raise ReachError("%s, line %d: %s" % (path, row, error)) from None
     if not poses:
         raise ReachError("%s has no poses" % path)
     return np.array(poses)

@@ -78,6 +78,14 @@ class Search:
                                  (budget or self.budget).effort, postures or (self.seed, self.preferred), q)
         return Found(*outcome, q)
 
+    def newton(self):
+        """Return the Found of plain Newton steps from the seed, as the vendor's simulator makes them; ``arrived`` is 1
+        or 0."""
+        q = np.empty(len(self.chain))
+        steps, arrived = kernels.newton(self.chain.arrays, self.chain.limit_arrays, self.target.arrays,
+                                        self.budget.effort, self.seed, q)
+        return Found(int(arrived), 1, steps, *self.residual(q), q)
+
     def gather(self, solutions, collection, *, budget=None, limits=None):
         """Fill rows of ``solutions`` (m, n) with different solutions, as a :class:`Collection` describes.
 

@@ -20,12 +20,12 @@ a named one. Their parts, in order:
 Positions are in metres and angles in radians, everything in the base frame. The functions keep no state and release the
 GIL, so any number of threads may call them.
 """
-from baxter_sim_kinematics.kernels.descent import nearest
+from baxter_sim_kinematics.kernels.descent import nearest, newton
 from baxter_sim_kinematics.kernels.linear import wrench
 from baxter_sim_kinematics.kernels.motion import joint_frames, tip_and_jacobian
 from baxter_sim_kinematics.kernels.rows import Rows
 from baxter_sim_kinematics.kernels.searching import gather, search, search_many
 from baxter_sim_kinematics.kernels.task import beyond_reach, fill_basis, pose_error, split_pose
 
-__all__ = ["Rows", "beyond_reach", "fill_basis", "gather", "joint_frames", "nearest", "pose_error", "search",
+__all__ = ["Rows", "beyond_reach", "fill_basis", "gather", "joint_frames", "nearest", "newton", "pose_error", "search",
            "search_many", "split_pose", "tip_and_jacobian", "wrench"]

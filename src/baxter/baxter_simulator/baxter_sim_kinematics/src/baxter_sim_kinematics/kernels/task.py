@@ -134,6 +134,15 @@ def on_target(error, rows, tolerance_m, tolerance_rad):
 
 
 @compiled
+def within(error, rows, bound):
+    """Return whether every component of a pose error is less than ``bound`` [m] and [rad]."""
+    for row in range(rows):
+        if not abs(error[row]) < bound:
+            return False
+    return True
+
+
+@compiled
 def workspace(n):
     """Return arrays for a posture's joint lines (n, 6), tip rotation (3, 3), position (3,), jacobian (6, n) and error
     (6,).

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Numbers on command lines: types for argparse that refuse what a program cannot compute with. Free of ROS."""
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+
+#: Longest time that a program is told to wait or to run [s], thirty years; Python's own limit ends in a traceback.
+MOST_SECONDS = 1e9
+#: Most processes at a time.
+MOST_WORKERS = 1000
+
+
+def number(kind: type, least: float, most: float, *, above: bool = False) -> Callable[[str], float]:
+    """Return an argparse type: numbers of ``kind``, int or float, from ``least`` to ``most``; ``above``: without
+    ``least`` itself. NaN is refused, and so are infinite ones unless a bound is. What it returns raises
+    ArgumentTypeError, which says what was expected and found."""
+    whole = "a whole number" if kind is int else "a number"
+    expected = "%s %s %.12g, at most %.12g" % (whole, "above" if above else "from", least, most)
+
+    def convert(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not least <= value <= most or (above and value == least):
+            raise argparse.ArgumentTypeError("expected %s, not %.60s" % (expected, text or "nothing"))
+        return value
+    return convert
+
+
+def seconds(least: float = 0.0) -> Callable[[str], float]:
+    """As :func:`number`: a time [s] above ``least``."""
+    return number(float, least, MOST_SECONDS, above=True)
