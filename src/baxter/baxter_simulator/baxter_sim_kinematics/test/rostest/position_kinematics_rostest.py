@@ -130,7 +130,7 @@ class PositionKinematics(unittest.TestCase):
                    for mode in (SolvePositionIKRequest.SEED_USER, SolvePositionIKRequest.SEED_AUTO) for _ in range(2)]
         for answer in answers:
             self.assert_solved("left", answer, 0, *LAB_POSE, 1)
-            np.testing.assert_allclose(answer.joints[0].position, LAB_ANGLES, atol=0.3)
+            np.testing.assert_allclose(answer.joints[0].position, LAB_ANGLES, atol=2e-3)
             self.assertEqual(answer.joints[0].position, answers[0].joints[0].position)
             # How the vendor's clients read it.
             self.assertEqual(struct.unpack("<%dB" % len(answer.result_type), answer.result_type), (1,))

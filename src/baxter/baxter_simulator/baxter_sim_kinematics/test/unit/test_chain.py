@@ -83,18 +83,8 @@ def test_every_link_is_where_plain_multiplication_puts_it(robot, chain, side):
             np.testing.assert_allclose(frame, expected[link], atol=1e-12)
 
 
-def test_tip_is_where_kdl_puts_it(robot, chain, side):
-    kdl = pytest.importorskip("PyKDL", reason="python3-pykdl is not installed")
-    arm = kdl.Chain()
-    for joint in robot.chain("base", side + "_gripper"):
-        rotation, p = joint.origin[:3, :3], joint.origin[:3, 3]
-        offset = kdl.Frame(kdl.Rotation(*rotation.ravel().tolist()), kdl.Vector(*p.tolist()))
-        if joint.type == "fixed":
-            arm.addSegment(kdl.Segment(kdl.Joint(), offset))
-        else:
-            # KDL turns about an axis given in the parent, before the offset's rotation.
-            axis = kdl.Vector(*(rotation @ joint.axis).tolist())
-            arm.addSegment(kdl.Segment(kdl.Joint(joint.name, kdl.Vector(*p.tolist()), axis, kdl.Joint.RotAxis), offset))
+def test_tip_is_where_kdl_puts_it(chain, side, kdl_arm):
+    kdl, arm = kdl_arm(side)
     solver, values, frame = kdl.ChainFkSolverPos_recursive(arm), kdl.JntArray(7), kdl.Frame()
     jacobian_solver, jacobian = kdl.ChainJntToJacSolver(arm), kdl.Jacobian(7)
     for q in np.random.default_rng(2).uniform(chain.lower, chain.upper, (200, 7)):

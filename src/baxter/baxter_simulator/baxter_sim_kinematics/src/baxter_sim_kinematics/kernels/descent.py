@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Descent from one start: to the target, by Newton's steps to it, along the self-motion towards a posture, or as near to
-the target as possible."""
+"""Descent from one start: to the target, damped or by Newton's steps, along the self-motion towards a posture, or as
+near to the target as possible."""
 import math
 
 import numpy as np
@@ -19,7 +19,8 @@ _NEWTON_STEPS = 1000
 _NEWTON_ARRIVED = 1e-2
 # An arrived posture becomes exact within so many steps more, or hangs at a limit. In these steps the wrist, the last
 # three joints, counts half: the arm corrects the error. The exact answer then is 1.66 mrad from the angles on Glasgow's
-# sheet, which miss the pose by 0.9 mm (with 1 instead of 0.5, 2.28 mrad); no exact posture is nearer than 1.62.
+# sheet, which miss the pose by 0.9 mm (with 1 instead of 0.5, 2.28 mrad); no exact posture is nearer than 1.62. A seed
+# that has arrived has no such steps behind it, and the nearest posture to it is wanted: all joints count.
 _FINISHING_STEPS = 20
 _WRIST_JOINTS, _WRIST_SHARE = 3, 0.5
 # A joint this close to its limit [rad or m] is at its limit.
@@ -92,23 +93,22 @@ def newton(arm, limits, target, effort, seed, q):
     lines, rotation, position, jacobian, error = workspace(n)
     gram, inside = np.empty((6, 6)), clamped(seed, limits)
     tolerance_m, tolerance_rad, _, _, _ = effort
-    arrived, last = -1, _NEWTON_STEPS - 1
+    arrived, last, share = -1, _NEWTON_STEPS - 1, 1.0
     q[:] = inside
     for step in range(_NEWTON_STEPS + _FINISHING_STEPS):
         place_joints(rotations, offsets, prismatic, q, lines, rotation, position)
         fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
         if arrived < 0 and within(error, rows, _NEWTON_ARRIVED):
-            arrived, last = step, step + _FINISHING_STEPS
+            arrived, last, share = step, step + _FINISHING_STEPS, _WRIST_SHARE if step > 0 else 1.0
         if arrived >= 0 and on_target(error, rows, tolerance_m, tolerance_rad):
             turn_towards(arm, limits, inside, q)
             return arrived, True
         if step >= last:
             break
         fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian)
-        if arrived >= 0:
-            for i in range(max(n - _WRIST_JOINTS, 0), n):
-                for row in range(rows):
-                    jacobian[row, i] *= _WRIST_SHARE
+        for i in range(max(n - _WRIST_JOINTS, 0), n):
+            for row in range(rows):
+                jacobian[row, i] *= share
         fill_gram(jacobian, rows, 0.0, gram)
         factorise(gram, rows)
         back_substitute(gram, rows, error)
@@ -116,8 +116,8 @@ def newton(arm, limits, target, effort, seed, q):
             move = 0.0
             for row in range(rows):
                 move += jacobian[row, i] * error[row]
-            if arrived >= 0 and i >= n - _WRIST_JOINTS:
-                move *= _WRIST_SHARE
+            if i >= n - _WRIST_JOINTS:
+                move *= share
             q[i] = min(max(q[i] + move, lower[i]), upper[i])
     solved = False
     if arrived >= 0:  # it hangs at a limit

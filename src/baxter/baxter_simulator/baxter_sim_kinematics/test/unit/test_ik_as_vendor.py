@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The IK service's answer to a seed: where the vendor's steps lead, made exact; else the nearest solution."""
+import numpy as np
+import pytest
+
+from baxter_model import JOINTS, MIRROR_SIGNS
+from baxter_sim_kinematics import (
+    Budget,
+    Chain,
+    NoSolution,
+    Reason,
+    Target,
+    Touch,
+    pose_from_quaternion,
+    solve,
+    solve_as_vendor,
+)
+from baxter_sim_kinematics.search import Search
+from urdf_model.transforms import rigid, rotation_angle
+
+NEUTRAL = np.array([0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0])
+# The labs' request, and the angles that their sheet prints for it.
+LAB_POSE = pose_from_quaternion((0.644, 0.0, 0.066), (-0.381, 0.923, -0.015, 0.052))
+LAB_ANGLES = np.array([-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.7033657530084771,
+                       0.3050684684989051, 0.8610601980794869, -1.4742358938106646])
+# Ends the search where the vendor's steps end: any posture is exact enough.
+AS_IT_ARRIVES = Budget(tolerance_m=1.0, tolerance_rad=1.0)
+MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
+SIGNS = np.array([MIRROR_SIGNS[joint] for joint in JOINTS])
+
+
+class Contact:
+    """Touches where ``touches(q)`` says so."""
+
+    def __init__(self, touches):
+        self.touches = touches
+
+    def contact(self, joint_names, q):
+        return Touch("hand", "body", False, 0.01) if self.touches(q) else None
+
+
+def assert_exact(chain, q, pose):
+    tip = chain.fk(q)
+    assert np.linalg.norm(tip[:3, 3] - pose[:3, 3]) <= 1.1e-6
+    assert rotation_angle(tip[:3, :3].T @ pose[:3, :3]) <= 1.1e-6
+    assert (q >= chain.lower).all() and (q <= chain.upper).all()
+
+
+@pytest.fixture
+def kdl_solve(chain, side, kdl_arm):
+    """KDL's solver as the vendor's simulator sets it up: (pose (4, 4), seed (n,)) to (n,), or None."""
+    kdl, arm = kdl_arm(side)
+
+    def values(q):
+        array = kdl.JntArray(len(q))
+        for i, value in enumerate(q.tolist()):
+            array[i] = value
+        return array
+
+    forward, velocity = kdl.ChainFkSolverPos_recursive(arm), kdl.ChainIkSolverVel_pinv(arm)
+    solver = kdl.ChainIkSolverPos_NR_JL(arm, values(chain.lower), values(chain.upper), forward, velocity, 1000, 1e-2)
+
+    def answer(pose, seed):
+        frame = kdl.Frame(kdl.Rotation(*pose[:3, :3].ravel().tolist()), kdl.Vector(*pose[:3, 3].tolist()))
+        q = kdl.JntArray(len(seed))
+        return np.array([q[i] for i in range(len(seed))]) if solver.CartToJnt(values(seed), frame, q) >= 0 else None
+
+    answer.of = (forward, velocity, arm)  # the solver only borrows them
+    return answer
+
+
+def test_neutral_leads_to_the_angles_of_the_sheet(chain, side):
+    pose = LAB_POSE if side == "left" else MIRROR @ LAB_POSE @ MIRROR
+    angles = LAB_ANGLES if side == "left" else SIGNS * LAB_ANGLES
+    q = solve_as_vendor(chain, pose, NEUTRAL).q
+    np.testing.assert_allclose(q, angles, atol=2e-3)
+    assert_exact(chain, q, Target(pose).pose)
+    # The sheet's own angles miss the pose, so no exact answer has its last digits.
+    assert 0.5e-3 < np.linalg.norm(chain.fk(angles)[:3, 3] - pose[:3, 3]) < 1.5e-3
+
+
+def test_steps_lead_where_kdls_do(chain, kdl_solve):
+    agreed, close = 0, 0
+    around = np.clip(NEUTRAL + np.random.default_rng(6).uniform(-1.5, 1.5, (200, 7)), chain.lower, chain.upper)
+    poses = [LAB_POSE, *map(chain.fk, around)]
+    for pose in poses:
+        expected = kdl_solve(pose, NEUTRAL)
+        found = Search(chain, Target.of(pose), NEUTRAL, None, AS_IT_ARRIVES).newton()
+        if found.arrived and found.iterations <= 20:
+            np.testing.assert_allclose(found.q, expected, atol=1e-4)
+            close += 1
+        agreed += bool(found.arrived) == (expected is not None)
+    # After hundreds of steps, the last bit of a number can decide.
+    assert agreed >= 0.97 * len(poses) and close >= 100
+
+
+def test_answers_are_exact_whether_the_steps_arrive_or_not(chain):
+    arrived = 0
+    for q in np.random.default_rng(8).uniform(chain.lower, chain.upper, (200, 7)):
+        target = Target.of(chain.fk(q))
+        result = solve_as_vendor(chain, target, NEUTRAL)
+        assert_exact(chain, result.q, target.pose)
+        found = Search(chain, target, NEUTRAL, None, Budget()).newton()
+        arrived += found.arrived
+        np.testing.assert_array_equal(result.q, found.q if found.arrived else solve(chain, target, NEUTRAL).q)
+    assert 80 < arrived < 150
+
+
+def test_near_the_seed_the_answer_is_nearly_the_nearest(chain):
+    dice, ratios = np.random.default_rng(9), []
+    for q in dice.uniform(0.8 * chain.lower, 0.8 * chain.upper, (100, 7)):
+        seed = q + dice.uniform(-0.02, 0.02, 7)
+        answer, nearest = (function(chain, chain.fk(q), seed).q for function in (solve_as_vendor, solve))
+        ratios.append(np.linalg.norm(answer - seed) / np.linalg.norm(nearest - seed))
+    assert np.median(ratios) < 1.01 and max(ratios) < 3.0, sorted(ratios)[-10:]
+
+
+def test_posture_that_touches_is_not_the_answer(left):
+    free = solve_as_vendor(left, LAB_POSE, NEUTRAL, checker=Contact(lambda q: False))
+    np.testing.assert_array_equal(free.q, solve_as_vendor(left, LAB_POSE, NEUTRAL).q)
+    checker = Contact(lambda q: np.abs(q - free.q).max() < 0.1)
+    other = solve_as_vendor(left, LAB_POSE, NEUTRAL, checker=checker)
+    np.testing.assert_array_equal(other.q, solve(left, LAB_POSE, NEUTRAL, checker=checker).q)
+
+
+def test_pose_without_a_solution_has_the_reason_of_solve(left):
+    with pytest.raises(NoSolution) as failure:
+        solve_as_vendor(left, rigid(np.eye(3), (5.0, 0.0, 0.0)), NEUTRAL)
+    assert failure.value.reason is Reason.OUT_OF_REACH
+
+
+def test_joint_without_limits_stays_within_half_a_turn_of_the_seed():
+    steps = [("j%d" % i, "continuous", "l%d" % i, rigid(np.eye(3), (1.0 if i else 0.0, 0, 0)), (0, 0, 1), None, None)
+             for i in range(3)]
+    arm = Chain("base", "tip", [*steps, ("tool", "fixed", "tip", rigid(np.eye(3), (0.5, 0, 0)), (0, 0, 1), None, None)])
+    seed, goal = np.array([7.0, 0.5, 0.2]), arm.fk([-0.9, 1.4, 0.8])
+    result = solve_as_vendor(arm, goal, seed)
+    np.testing.assert_allclose(arm.fk(result.q), goal, atol=2e-6)
+    assert np.abs(result.q - seed).max() <= np.pi
