@@ -12,8 +12,6 @@ from baxter_sim_kinematics import NoSolution, Reason
 from baxter_sim_kinematics.errors import Attempt
 from baxter_sim_kinematics.target import METRES_PER_RADIAN
 
-pytestmark = pytest.mark.tree
-
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 RIGHT = 0.95
 # Takes 20 s to build on an arm of seven joints: few poses need two of them.

@@ -12,8 +12,6 @@ import pytest
 
 from lab_tests import comma_locale
 
-pytestmark = pytest.mark.once
-
 ROOT = Path(__file__).resolve().parents[2]
 ROS_VARIABLES = ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")
 # Stand-ins for the resolver and the routing table, so that the tests need no network.

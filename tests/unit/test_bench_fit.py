@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.tree
-
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 TRUE = np.array([[0.2, 0.1], [7.0, 30.0]])  # (delay, natural frequency) of two joints
 

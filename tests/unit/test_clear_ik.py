@@ -13,8 +13,6 @@ from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 from urdf_model.transforms import rigid
 
-pytestmark = pytest.mark.once
-
 
 @pytest.fixture(scope="module")
 def robot():

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = [pytest.mark.build, pytest.mark.long]
+pytestmark = pytest.mark.long
 SKIPPED = 77
 LIMIT_S = 5400
 

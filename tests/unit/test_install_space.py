@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = [pytest.mark.build, pytest.mark.long]
+pytestmark = pytest.mark.long
 # Root can hide the workspace from a command: an empty file system in its place, in a private mount namespace.
 WITHOUT_SOURCES = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs tmpfs "$0" && exec "$@"', str(ROOT)]
 

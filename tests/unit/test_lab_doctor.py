@@ -34,8 +34,6 @@ from lab_doctor.probe import (
     users_python,
 )
 
-pytestmark = pytest.mark.once
-
 ENABLED = {"enabled": True, "stopped": False, "error": False}
 HEALTHY_LAB = Facts(
     root="/ws",

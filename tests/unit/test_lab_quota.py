@@ -14,8 +14,6 @@ from lab_tests import quota
 from lab_tests.discovery import select, take_inventory
 from lab_tests.quota import Quota, QuotaError
 
-pytestmark = pytest.mark.once
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -97,7 +95,8 @@ except QuotaError as error:
 
 
 def test_its_names_are_tests_that_exist():
-    assert len(select(take_inventory(ROOT), list(run_tests.MAIN_FLOWS), False).rostests) == len(run_tests.MAIN_FLOWS)
+    targets = select(take_inventory(ROOT), list(run_tests.MAIN_FLOWS), ROOT).targets
+    assert len(targets) == len(run_tests.MAIN_FLOWS)
 
 
 @pytest.mark.parametrize(("words", "expected"), [
@@ -106,16 +105,15 @@ def test_its_names_are_tests_that_exist():
     (["--busy", "a.test"], ["--busy=40", "a.test"]),
 ])
 def test_a_name_after_it_is_no_share(words, expected):
-    assert run_tests.separate_busy(words) == expected
+    assert run_tests.separate_values(words) == expected
 
 
 def test_the_runner_skips_with_an_exit_code_of_its_own(monkeypatch, capsys):
     def refuse(*_):
         raise QuotaError("read-only")
 
-    monkeypatch.setattr(run_tests, "run_with_share", refuse)
-    monkeypatch.setattr(sys, "argv", ["run_tests.py", "--busy", "test_lab_quota.py"])
-    assert run_tests.main() == run_tests.EXIT_SKIPPED
+    monkeypatch.setattr(run_tests, "run", refuse)
+    assert run_tests.main(["--busy", "test_lab_quota.py"]) == run_tests.EXIT_SKIPPED
     assert "skipped" in capsys.readouterr().out
 
 

@@ -3,23 +3,22 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
-import threading
 import uuid
 from pathlib import Path
 
 import pytest
 
 import run_tests
+from lab_testing.waiting import wait_until
 from lab_tests import comma_locale, processes, rostests
-from lab_tests.discovery import Rostest, SelectionError, select, take_inventory
-from lab_tests.results import read_junit, read_rostest_results
-
-pytestmark = pytest.mark.once
+from lab_tests.discovery import SelectionError, changed_files, is_long, mostly_waits, select, take_inventory
+from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 
 ROOT = Path(__file__).resolve().parents[2]
-MANIFEST = "<package format='3'><name>%s</name></package>"
+MANIFEST = "<package format='3'><name>%s</name>%s</package>"
 PASSING = "<testsuite tests='2'><testcase name='a' classname='T'/><testcase name='b' classname='T'/></testsuite>"
 FAILING = "<testsuite tests='1'><testcase name='a' classname='T'><failure message='1 is not 2'/></testcase></testsuite>"
 CRASHED = "<testsuite tests='1'><testcase name='testx' classname='R'><error message='none'/></testcase></testsuite>"
@@ -28,21 +27,24 @@ RAN = "<testsuite tests='1'><testcase name='testx' classname='R'/></testsuite>"
 
 @pytest.fixture
 def workspace(tmp_path):
-    """Two packages, an ignored one, and cross-package tests."""
+    """Three packages, of which gamma needs beta; an ignored one, and tests of the whole tree."""
     files = {
-        "src/group/alpha/package.xml": MANIFEST % "alpha",
+        "src/group/alpha/package.xml": MANIFEST % ("alpha", ""),
         "src/group/alpha/test/unit/test_alpha.py": "",
         "src/group/alpha/test/unit/helper.py": "",
         "src/group/alpha/test/rostest/alpha.test": "<launch/>",
         "src/group/alpha/test/rostest/alpha_soak.test": "<launch><!-- long --></launch>",
-        "src/beta/package.xml": MANIFEST % "beta",
+        "src/beta/package.xml": MANIFEST % ("beta", ""),
         "src/beta/test/unit/test_beta.py": "",
+        "src/gamma/package.xml": MANIFEST % ("gamma", "<exec_depend>beta</exec_depend>"),
+        "src/gamma/test/unit/test_gamma.py": "",
         "src/copy/CATKIN_IGNORE": "",
-        "src/copy/alpha/package.xml": MANIFEST % "alpha",
+        "src/copy/alpha/package.xml": MANIFEST % ("alpha", ""),
         "src/copy/alpha/test/unit/test_copy.py": "",
-        "tests/package.xml": MANIFEST % "workspace_tests",
+        "tests/package.xml": MANIFEST % ("workspace_tests", "<exec_depend>gamma</exec_depend>"),
+        "tests/unit/test_lint.py": "pytestmark = pytest.mark.tree",
         "tests/unit/test_whole.py": "",
-        "tests/rostest/whole.test": "<launch/>",
+        "tests/rostest/whole.test": "<!-- beside others --><launch/>",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -50,64 +52,72 @@ def workspace(tmp_path):
     return tmp_path
 
 
-def chosen(workspace, *arguments, long=False):
-    selection = select(take_inventory(workspace), list(arguments), long)
-    units = [Path(target).name for target in selection.unit_targets]
-    return selection, units, [test.path.name for test in selection.rostests]
+def chosen(workspace, *arguments, changed=None):
+    selection = select(take_inventory(workspace), list(arguments), workspace, changed)
+    return [Path(target).name for target in selection.targets]
 
 
 def test_everything_runs_without_names(workspace):
-    selection, units, rostest_names = chosen(workspace)
-    assert selection.linters == ["ruff", "catkin_lint"]
-    assert units == ["test_alpha.py", "test_beta.py", "test_whole.py"]
-    assert rostest_names == ["alpha.test", "whole.test"]
+    assert chosen(workspace) == chosen(workspace, "-k", "alpha", "-x") == [
+        "alpha.test", "alpha_soak.test", "test_alpha.py", "test_beta.py", "test_gamma.py", "whole.test", "test_lint.py",
+        "test_whole.py"]
 
 
 def test_marks_of_a_rostest(workspace):
-    marked = "<!-- long -->\n<!-- beside others -->\n<launch/>"
-    (workspace / "tests/rostest/whole.test").write_text(marked)
-    (plain, *_), last = take_inventory(workspace).rostests[:1], take_inventory(workspace).rostests[-1]
-    assert (plain.is_long, plain.is_beside_others, last.is_long, last.is_beside_others) == (False, False, True, True)
+    soak, whole = (workspace / name for name in ("src/group/alpha/test/rostest/alpha_soak.test",
+                                                 "tests/rostest/whole.test"))
+    assert (is_long(soak), mostly_waits(soak), is_long(whole), mostly_waits(whole)) == (True, False, False, True)
 
 
-def test_long_brings_in_long_rostests(workspace):
-    assert "alpha_soak.test" in chosen(workspace, long=True)[2]
+@pytest.mark.parametrize(("name", "files"), [
+    ("alpha", ["alpha.test", "alpha_soak.test", "test_alpha.py"]),  # a package that has the name of a test file
+    ("beta", ["test_beta.py"]),
+    ("workspace_tests", ["whole.test", "test_lint.py", "test_whole.py"]),
+    ("test_alpha", ["test_alpha.py"]),
+    ("test_alpha.py::test_one", ["test_alpha.py::test_one"]),
+    ("whole.test", ["whole.test::rostest"]),
+    ("alpha_soak", ["alpha_soak.test::rostest"]),
+    ("ruff", ["test_lint.py::test_ruff"]),
+])
+def test_names_select(workspace, name, files):
+    assert chosen(workspace, name) == files
 
 
-@pytest.mark.parametrize(
-    ("name", "units", "rostest_names"),
-    [
-        ("alpha", ["test_alpha.py"], ["alpha.test"]),  # a package that has the same name as a test file
-        ("beta", ["test_beta.py"], []),
-        ("workspace_tests", ["test_whole.py"], ["whole.test"]),
-        ("test_alpha", ["test_alpha.py"], []),
-        ("test_alpha.py::test_one", ["test_alpha.py::test_one"], []),
-        ("whole.test", [], ["whole.test"]),
-        ("alpha_soak", [], ["alpha_soak.test"]),
-    ],
-)
-def test_names_select(workspace, name, units, rostest_names):
-    selection, found_units, found_rostests = chosen(workspace, name)
-    assert (found_units, found_rostests, selection.linters) == (units, rostest_names, [])
-
-
-def test_what_is_named_twice_runs_once(workspace):
-    assert chosen(workspace, "alpha", "test_alpha", "alpha.test")[1:] == (["test_alpha.py"], ["alpha.test"])
+def test_files_that_are_named_twice_run_once(workspace):
+    assert chosen(workspace, "beta", "test_beta", "test_beta.py") == ["test_beta.py"]
 
 
 def test_path_selects(workspace):
-    path = workspace / "src/beta/test/unit/test_beta.py"
-    assert chosen(workspace, str(path))[1:] == (["test_beta.py"], [])
-
-
-def test_pytest_arguments_run_the_unit_layer_alone(workspace):
-    selection, units, rostest_names = chosen(workspace, "-k", "alpha", "-x")
-    assert (selection.pytest_arguments, len(units), rostest_names) == (["-k", "alpha", "-x"], 3, [])
+    assert chosen(workspace, str(workspace / "src/beta/test/unit/test_beta.py")) == ["test_beta.py"]
 
 
 def test_unknown_name_lists_the_packages(workspace):
-    with pytest.raises(SelectionError, match="gamma.*alpha, beta, workspace_tests"):
-        chosen(workspace, "gamma")
+    with pytest.raises(SelectionError, match="delta.*alpha, beta, gamma, workspace_tests"):
+        chosen(workspace, "delta")
+
+
+def test_changed_packages_bring_those_that_depend_on_them(workspace):
+    lint = ["test_lint.py::test_ruff", "test_lint.py::test_catkin_lint", "test_lint.py"]
+    assert chosen(workspace, changed=[workspace / "src/gamma/x.py"]) == ["test_gamma.py", *lint]
+    assert chosen(workspace, changed=[workspace / "src/beta/setup.py"]) == ["test_beta.py", "test_gamma.py", *lint]
+    assert chosen(workspace, changed=[workspace / "tools/x.py"])[:3] == ["whole.test", "test_lint.py", "test_whole.py"]
+    assert chosen(workspace, changed=[]) == []
+
+
+def test_changed_files_are_those_that_differ_from_a_commit_and_new_ones(tmp_path):
+    def git(*words):
+        subprocess.run(["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=b", *words], check=True,
+                       capture_output=True)
+    for name in ("same", "edited"):
+        (tmp_path / name).write_text("1")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "one")
+    (tmp_path / "edited").write_text("2")
+    (tmp_path / "new").write_text("1")
+    assert changed_files(tmp_path, "HEAD") == [tmp_path / "edited", tmp_path / "new"]
+    with pytest.raises(SelectionError, match="nowhere"):
+        changed_files(tmp_path, "nowhere")
 
 
 @pytest.mark.parametrize(
@@ -134,6 +144,45 @@ def test_failure_text_is_kept(tmp_path):
     assert "1 is not 2" in read_junit(tmp_path / "a.xml").details[0]
 
 
+ROSTEST_NODE = """
+import unittest
+from rosunit.xmlrunner import XMLTestRunner
+from lab_testing.skipping import skip
+
+class Case(unittest.TestCase):
+    def test_runs(self):
+        pass
+    def test_cannot(self):
+        skip(self, "no screen")
+
+with open("T.xml", "w") as stream:
+    XMLTestRunner(stream).run(unittest.defaultTestLoader.loadTestsFromTestCase(Case))
+"""
+
+
+def test_a_test_of_rostest_that_is_skipped_has_not_passed(tmp_path):
+    environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", ROSTEST_NODE], cwd=tmp_path, env=environment, check=True)
+    tally = read_rostest_results(tmp_path)
+    assert (tally.passed, tally.failed, tally.skips) == (1, 0, [("Case.test_cannot", "no screen")])
+
+
+def test_the_last_line_begins_as_ever_and_counts_what_did_not_run():
+    tally = Tally(passed=2, skips=[("a.b", "no zsh here"), ("a.c", "no zsh here"), ("a.b", "no zsh here")],
+                  long=["tests/unit/test_x.py::test_one", "tests/unit/test_x.py::test_two", "a/long.test::soak"])
+    assert summary(tally).splitlines() == [
+        "skipped: no zsh here", "    a.b", "    a.c", "long, not run (--long, or by name):", "    a/long.test",
+        "    tests/unit/test_x.py, 2 tests", "2 passed, 0 failed, 3 skipped, 3 long not run"]
+    assert summary(Tally(passed=1, failed=1)) == "1 passed, 1 failed, 0 skipped, 0 long not run"
+
+
+def test_failures_are_told_once_more_before_the_last_line():
+    lines = summary(Tally(failed=1, details=["a.b\nassert 1 == 2"])).splitlines()
+    assert lines == ["failed:", "    a.b", "    assert 1 == 2", "0 passed, 1 failed, 0 skipped, 0 long not run"]
+    lines = summary(Tally(failed=25, details=["x" * 5000] * 25)).splitlines()
+    assert len(lines) == 23 and lines[-2] == "    and 5 more" and len("".join(lines)) < 30_000
+
+
 def test_processes_left_behind_are_found_and_ended():
     run_id = uuid.uuid4().hex
     child = subprocess.Popen(["sleep", "60"], env={**os.environ, processes.MARKER: run_id}, start_new_session=True)
@@ -158,6 +207,15 @@ echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESU
 """
 
 
+@pytest.fixture
+def fake_rostest(tmp_path, monkeypatch):
+    fake = tmp_path / "bin" / "rostest"
+    fake.parent.mkdir()
+    fake.write_text(FAKE_ROSTEST)
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
+
+
 @pytest.mark.parametrize(
     ("name", "limit_s", "passed", "failed", "detail"),
     [
@@ -167,48 +225,17 @@ echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESU
         ("dies", 60.0, 0, 1, "no test"),
     ],
 )
-def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, limit_s, passed, failed, detail):
-    fake = tmp_path / "bin" / "rostest"
-    fake.parent.mkdir()
-    fake.write_text(FAKE_ROSTEST)
-    fake.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
+def test_every_fate_of_a_rostest_is_counted(tmp_path, fake_rostest, monkeypatch, name, limit_s, passed, failed, detail):
     monkeypatch.setattr(rostests, "LEFTOVER_GRACE_S", 0.2)
-    test = Rostest(tmp_path / f"{name}.test", "alpha", False)
-    tally = rostests.run(test, tmp_path / "work", time_limit_s=limit_s)
+    path = tmp_path / f"{name}.test"
+    path.write_text("<launch/>")
+    tally = rostests.run(path, tmp_path / "work", time_limit_s=limit_s)
     assert (tally.passed, tally.failed) == (passed, failed)
     assert detail is None or detail in tally.details[0]
 
 
-def test_a_rostest_beside_others_ends_with_them(tmp_path, monkeypatch):
-    fake = tmp_path / "rostest"
-    fake.write_text(FAKE_ROSTEST)
-    fake.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    ending = threading.Event()
-    ending.set()
-    with pytest.raises(rostests.Ended):
-        rostests.run(Rostest(tmp_path / "hangs.test", "alpha", False, True), tmp_path / "work", 60.0, ending)
-
-
-def test_rostests_with_the_longest_limits_begin_first(tmp_path, monkeypatch):
-    begun = []
-    monkeypatch.setattr(run_tests, "BESIDE", 1)
-    monkeypatch.setattr(rostests, "run", lambda test, *_, **__: begun.append(test.path.name))
-    tests = []
-    for name, limit_s in (("short", 60), ("long", 900), ("middle", 300)):
-        path = tmp_path / name
-        path.write_text(f"<launch><test time-limit='{limit_s}'/></launch>")
-        tests.append(Rostest(path, "alpha", False, True))
-    beside = run_tests.Beside(tests)
-    for test in beside.tests:
-        beside.tally(test)
-    beside.end()
-    assert begun == [test.path.name for test in beside.tests] == ["long", "middle", "short"]
-
-
 def test_comma_locale_is_in_force(tmp_path):
-    environment = comma_locale.environment(tmp_path)
+    environment = {**os.environ, **comma_locale.variables(tmp_path)}
     program = "import locale; locale.setlocale(locale.LC_ALL, ''); print(locale.format_string('%.1f', 0.5))"
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout == "0,5\n"
@@ -220,42 +247,109 @@ def test_a_test_may_take_what_its_file_says(tmp_path):
     assert rostests.declared_s(tmp_path / "a.test") == 2560.0
 
 
-def test_what_is_in_the_other_run_is_left_out_but_for_long_tests(tmp_path):
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long:\n    once:\n    build:\n    tree:\n")
-    (tmp_path / "test_one.py").write_text("import pytest\ndef test_plain(): pass\n" + "".join(
-        "%sdef test_%s(): pass\n" % ("".join("@pytest.mark.%s\n" % mark for mark in marks), "_".join(marks))
-        for marks in (("once",), ("build",), ("tree",), ("long",), ("long", "tree"))))
+UNIT = """import ctypes, threading, time
+import pytest
 
-    def run(*options):
-        done = subprocess.run([sys.executable, "-m", "pytest", "-v", "-p", "lab_tests.long_tests", *options, tmp_path],
-                              text=True, capture_output=True, check=True,
-                              env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
-        return set(re.findall(r"::test_(\w+) PASSED", done.stdout))
+def test_comma_locale():
+    number = ctypes.c_double(1.5)
+    text = ctypes.create_string_buffer(8)
+    ctypes.CDLL(None).snprintf(text, 8, b"%%.1f", number)
+    assert text.value == b"1,5"
 
-    assert run("--in-this-run=once,build") == {"once", "build", "long", "long_tree"}
-    assert run("--in-this-run=once,build", "--leave-out-long=%s" % (tmp_path / "left")) == {"once", "build"}
-    assert (tmp_path / "left").read_text().split() == ["test_one.py::test_long", "test_one.py::test_long_tree"]
-    assert run("--in-the-other-run=tree") == {"plain", "once", "build", "long", "long_tree"}
+@pytest.mark.long
+def test_slow():
+    pass
 
+def test_fails():
+    assert 1 == 2
 
-def test_every_test_is_in_one_of_the_two_runs():
-    """With --long the first run leaves out tests marked `tree`; the one under the second locale always leaves out
-    `build` and `once`."""
-    marks = {path: set(re.findall(r"pytest\.mark\.(tree|once|build)\b", path.read_text(encoding="utf-8")))
-             for folder in ("src", "tests") for path in (ROOT / folder).rglob("test_*.py") if path != Path(__file__)}
-    assert {mark for found in marks.values() for mark in found} == {"tree", "once", "build"}
-    assert not [str(path) for path, found in marks.items() if "tree" in found and len(found) > 1]
+def test_skipped():
+    pytest.skip("no zsh here")
 
+def test_skipped_without_a_reason():
+    pytest.skip()
 
-@pytest.mark.parametrize(("body", "code"), [("time.sleep(1000)", 0), ("while True: pass", 1)])
-def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path, body, code):
-    (tmp_path / "test_one.py").write_text("""import threading, time
 def left():
-    %s
-def test_one():
+    time.sleep(1000) if %r else all(True for _ in iter(int, 1))
+
+def test_leaves_a_thread():
     threading.Thread(target=left, daemon=True, name="left").start()
-""" % body)
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.left_threads", tmp_path], text=True,
-                          capture_output=True, check=False, env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
-    assert done.returncode == code, done.stdout
-    assert ("threads of this process still compute; there are: MainThread, left" in done.stdout) == bool(code)
+"""
+
+
+ENVIRONMENT = {"PYTHONPATH": f"{ROOT / 'tools'}:{os.environ.get('PYTHONPATH', '')}"}
+
+
+def run_pytest(folder, *words):
+    """The output of a run of the files in a folder."""
+    files = sorted(str(path) for path in folder.rglob("*") if path.name.startswith("test_") or path.suffix == ".test")
+    return subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.plugin", "-c", ROOT / "pytest.ini",
+                           "--rootdir", folder, *words, *files], capture_output=True, text=True, cwd=folder,
+                          env={**os.environ, **ENVIRONMENT})
+
+
+@pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_a_run_counts_everything(tmp_path, fake_rostest, words):
+    for name in ("one", "two"):
+        (tmp_path / f"test_{name}.py").write_text(UNIT % True)
+    (tmp_path / "rostest").mkdir()
+    for name in ("works", "dies", "soak"):
+        (tmp_path / f"rostest/{name}.test").write_text("<launch>%s</launch>" % ("<!-- long -->" * (name == "soak")))
+    done = run_pytest(tmp_path, *words)
+    last = done.stdout.splitlines()[-1]
+    assert last == "5 passed, 5 failed, 2 skipped, 3 long not run", done.stdout
+    assert done.returncode == 1 and "test_one.py::test_skipped_without_a_reason: skipped without" in done.stdout
+
+
+def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path):
+    (tmp_path / "test_one.py").write_text(UNIT % False)
+    done = run_pytest(tmp_path, "-k", "leaves or comma")
+    assert "there are: MainThread, left" in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("2 passed, 1 failed")
+
+
+def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):
+    def order(*words):
+        return re.findall(r"^(test_\w+\.py::\w+)", run_pytest(tmp_path, "--collect-only", *words).stdout, re.MULTILINE)
+    for name in "abcd":
+        (tmp_path / f"test_{name}.py").write_text("def test_1(): pass\ndef test_2(): pass\ndef test_3(): pass\n")
+    assert order() == sorted(order())
+    assert order("--shuffle=1") == order("--shuffle=1") != order("--shuffle=2")
+    assert sorted(order("--shuffle=1")) == order()
+
+
+def test_a_run_that_is_ended_leaves_no_process(tmp_path, fake_rostest):
+    (tmp_path / "rostest").mkdir()
+    for name in ("a_hangs", "b_hangs", "c_hangs"):
+        (tmp_path / f"rostest/{name}.test").write_text("<launch/>")
+    mark = uuid.uuid4().hex
+    environment = {**os.environ, **ENVIRONMENT, processes.RUN_MARKER: mark}
+    words = ["-q", "-p", "lab_tests.plugin", "-c", str(ROOT / "pytest.ini"), "-n3", "--dist=loadscope",
+             f"--rootdir={tmp_path}"]
+    files = [str(path) for path in (tmp_path / "rostest").iterdir()]
+    child = subprocess.Popen([sys.executable, "-m", "pytest", *words, *files], cwd=tmp_path, env=environment,
+                             stdout=subprocess.DEVNULL, start_new_session=True)
+
+    def rostests_running():
+        return [line for line in processes.marked(mark, processes.RUN_MARKER).values() if "bin/rostest" in line]
+    try:
+        wait_until(lambda: len(rostests_running()) >= 2, "two tests run", 60.0)
+        os.killpg(child.pid, signal.SIGINT)  # as Ctrl-C in a terminal
+        child.wait(60)
+        assert processes.wait_until_gone(mark, 30.0, processes.RUN_MARKER) == {}
+    finally:
+        processes.kill_all(mark, processes.RUN_MARKER)
+
+
+def test_help_names_every_option(capsys):
+    with pytest.raises(SystemExit) as ending:
+        run_tests.main(["--help"])
+    assert ending.value.code == 0
+    told = capsys.readouterr().out
+    assert all(word in told for word in ("--changed", "--long", "--busy", "--repeat", "--shuffle"))
+
+
+def test_tests_of_rostest_skip_so_that_it_is_counted():
+    command = ["git", "-C", ROOT, "grep", "-lE", r"self[.]skipTest[(]|@unittest[.]skip", "--", "*/test/*.py", "tests/"]
+    found = subprocess.run(command, capture_output=True, text=True).stdout.split()
+    assert found == []

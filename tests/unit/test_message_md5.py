@@ -14,8 +14,6 @@ import genmsg.msg_loader
 import pytest
 import yaml
 
-pytestmark = pytest.mark.tree
-
 SRC = Path(__file__).resolve().parents[2] / "src"
 TABLES = sorted(SRC.glob("**/test/md5sums.yaml"))
 

@@ -58,7 +58,6 @@ def workspace(tmp_path):
     return root
 
 
-@pytest.mark.build
 def test_theirs_is_fetched_built_and_wins_and_ours_comes_back(workspace, tmp_path):
     bash('import_overlay "$@"', workspace, tmp_path / "sdk.rosinstall")
     assert bash('leave_out_overlaid "$@"', workspace) == "robot_sdk\n"

@@ -70,7 +70,6 @@ def run_page(page, kind, folder):
             page_blocks.run(block, folder, LIMIT_S[kind], ROS_MASTER_URI="http://localhost:1")
 
 
-@pytest.mark.build  # once is enough for all locales
 @pytest.mark.parametrize("page", [page for page in tracked("*.md") if any(b.kind == "quick" for b in blocks_of(page))])
 def test_commands_run(page, tmp_path):
     run_page(page, "quick", tmp_path)

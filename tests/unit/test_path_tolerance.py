@@ -17,8 +17,6 @@ from joint_trajectory import Command, Outcome
 from joint_trajectory_action.arm_motion import ArmMotion, GoalDefaults, Mode
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
-
 HARDWARE = Path(rospkg.RosPack().get_path("baxter_sim_hardware"))
 NAMES = list(joint_names("left"))
 START = np.tile([0.0, -0.1, 0.0, 0.6, 0.0, 0.6, 0.0], 2)

@@ -9,8 +9,6 @@ import pytest
 
 from baxter_sim_examples import BlockLost, Trial
 
-pytestmark = pytest.mark.tree
-
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 SEED = 1
 LOOKED_SEED, LOOKED_SERIAL = 20, 2

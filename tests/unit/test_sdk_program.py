@@ -13,8 +13,6 @@ from lab_testing.processes import is_alive
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "sdk"))
 from program import Program  # noqa: E402
 
-pytestmark = pytest.mark.once
-
 ECHO = """
 import sys, termios, tty
 tty.setraw(0)

@@ -15,7 +15,6 @@ from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.build
 LIMIT_S = 60
 # The command that hangs or fails, step by step, as a pattern of the shell's. A step's half work is a file named half*.
 COMMANDS = {

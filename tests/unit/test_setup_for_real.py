@@ -17,7 +17,6 @@ from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [
-    pytest.mark.build,
     pytest.mark.long,
     pytest.mark.skipif(os.geteuid() != 0, reason="taking the network away and filling a disk need root"),
 ]

@@ -20,7 +20,6 @@ SERVER_ADDRESS, CLIENT_ADDRESS, SERVER_NAME = "10.77.0.1", "10.77.0.2", "lab-rob
 COMMAND_LIMIT_S = 120
 
 pytestmark = [
-    pytest.mark.build,
     pytest.mark.long,
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
     pytest.mark.skipif(shutil.which("ip") is None, reason="ip, of the package iproute2, is not installed"),

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs the unit tests under a locale that writes 0,5 for 0.5.
+"""The unit tests' locale, which writes 0,5 for 0.5.
 
-This module is also a pytest plugin. Python itself starts with LC_NUMERIC=C; a window toolkit, or a C library that calls
+Python itself starts with LC_NUMERIC=C; a window toolkit, or a C library that calls
 setlocale(), changes that for the whole process, and from then on strtod() in C code stops at the point in "0.5".
 """
 
-import locale
-import os
 import subprocess
 from pathlib import Path
 
 NAME = "de_DE.UTF-8"
+VARIABLES = ("LOCPATH", "LC_ALL")
 
 
-def environment(folder: Path) -> dict[str, str]:
-    """Variables for a child process; the locale is compiled into folder if the folder does not have it yet.
+def variables(folder: Path) -> dict[str, str]:
+    """The environment variables for it; the locale is compiled into folder if the folder does not have it yet.
 
     Raises OSError or subprocess.CalledProcessError if localedef or its sources are missing.
     """
@@ -26,10 +25,4 @@ def environment(folder: Path) -> dict[str, str]:
         done = subprocess.run(command, capture_output=True, text=True)
         if not (target / "LC_NUMERIC").is_file():
             raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
-    return {**os.environ, "LOCPATH": str(folder), "LC_ALL": NAME}
-
-
-def pytest_configure(config):
-    locale.setlocale(locale.LC_ALL, "")
-    if locale.localeconv()["decimal_point"] != ",":
-        raise RuntimeError(f"locale {NAME} is not in force: {locale.setlocale(locale.LC_ALL)}")
+    return {"LOCPATH": str(folder), "LC_ALL": NAME}

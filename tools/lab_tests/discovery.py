@@ -1,127 +1,161 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the tests of the workspace, and selects those of a command line."""
 
+from __future__ import annotations
+
+import functools
 import os
 import re
+import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
-LINTERS = ("ruff", "catkin_lint")
+# Tests that have a short name on the command line.
+LINTERS = {name: f"tests/unit/test_lint.py::test_{name}" for name in ("ruff", "catkin_lint")}
+# The package of files at the root, whose tests look at the whole tree.
+WHOLE_TREE = "workspace_tests"
 # pytest options that take a value, which is not a test's name.
-_OPTIONS_WITH_VALUE = set("-k -m -p -o -c -W -r --maxfail --deselect --ignore --tb --durations".split())
+_OPTIONS_WITH_VALUE = set("-k -m -p -o -c -W -r -n --dist --maxfail --deselect --ignore --tb --durations --junitxml"
+                          " --shuffle".split())
+_DEPENDENCIES = ("depend", "build_depend", "build_export_depend", "exec_depend", "test_depend")
 
 
 class SelectionError(Exception):
     """The command line names a test that does not exist."""
 
 
-@dataclass(frozen=True)
-class Rostest:
-    """One .test file: its package, and whether it says `<!-- long -->` and `<!-- beside others -->`."""
+@functools.cache
+def _has_mark(path: Path, mark: str) -> bool:
+    return path.suffix == ".test" and f"<!-- {mark} -->" in path.read_text(encoding="utf-8")
 
-    path: Path
-    package: str
-    is_long: bool
-    is_beside_others: bool = False
+
+def is_long(path: Path) -> bool:
+    """Whether a .test file takes minutes."""
+    return _has_mark(path, "long")
+
+
+def mostly_waits(path: Path) -> bool:
+    """Whether a .test file leaves the processor to others: no simulator, a small one, or one slowed on purpose."""
+    return _has_mark(path, "beside others")
+
+
+def is_whole_machine(path: Path) -> bool:
+    """Whether a .test file must run alone, because it measures time."""
+    return _has_mark(path, "whole machine")
+
+
+def looks_at_the_whole_tree(path: Path) -> bool:
+    """Whether a test file says that it reads files of all packages."""
+    return "pytest.mark.tree" in path.read_text(encoding="utf-8")
 
 
 @dataclass
 class Inventory:
-    """Every test of a workspace. unit_files: package name -> its test_*.py files."""
+    """Every test of a workspace.
 
-    unit_files: dict[str, list[Path]] = field(default_factory=dict)
-    rostests: list[Rostest] = field(default_factory=list)
-    packages: set[str] = field(default_factory=set)
-
-    def all_unit_files(self) -> list[Path]:
-        return [path for name in sorted(self.unit_files) for path in self.unit_files[name]]
-
-
-@dataclass
-class Selection:
-    """The tests of one run. unit_targets are pytest's own arguments: files or node ids.
-
-    left_out: long rostests that were selected and do not run.
+    files: package -> its test_*.py and .test files; folders: package -> its folder; needs: package -> the packages of
+    the workspace that its manifest names.
     """
 
-    linters: list[str]
-    unit_targets: list[str]
-    rostests: list[Rostest]
-    pytest_arguments: list[str]
-    is_whole_suite: bool
-    left_out: list[Rostest] = field(default_factory=list)
+    files: dict[str, list[Path]] = field(default_factory=dict)
+    folders: dict[str, Path] = field(default_factory=dict)
+    needs: dict[str, set[str]] = field(default_factory=dict)
+
+    def all_files(self) -> list[Path]:
+        return [path for name in sorted(self.files) for path in self.files[name]]
 
 
 def take_inventory(root: Path) -> Inventory:
     """Find all packages and tests below root/src and root/tests; links are not followed, CATKIN_IGNORE is honoured."""
     inventory = Inventory()
+    named: dict[str, set[str]] = {}
     for top in (root / "src", root / "tests"):
         for folder, subfolders, names in os.walk(top):
             if "CATKIN_IGNORE" in names:
                 subfolders.clear()
                 continue
             subfolders.sort()
-            _add_folder(inventory, root, Path(folder), sorted(names))
+            here = Path(folder)
+            if "package.xml" in names:
+                manifest = ElementTree.parse(here / "package.xml").getroot()
+                package = (manifest.findtext("name") or "").strip()
+                inventory.folders[package] = here
+                named[package] = {(one.text or "").strip() for kind in _DEPENDENCIES for one in manifest.iter(kind)}
+            if here.parent == root / "tests" or here.parent.name == "test":
+                pattern = {"unit": r"test_.*\.py", "rostest": r".*\.test"}.get(here.name)
+                found = [here / name for name in sorted(names) if pattern and re.fullmatch(pattern, name)]
+                if found:
+                    inventory.files.setdefault(package_of(here, root), []).extend(found)
+    inventory.needs = {package: needs & set(named) for package, needs in named.items()}
     return inventory
 
 
-def _add_folder(inventory, root, folder, names):
-    if "package.xml" in names:
-        inventory.packages.add(_package_name(folder / "package.xml"))
-    in_tests = folder.parent == root / "tests" or folder.parent.name == "test"
-    if folder.name == "unit" and in_tests:
-        files = [folder / name for name in names if re.fullmatch(r"test_.*\.py", name)]
-        if files:
-            inventory.unit_files.setdefault(_package_of(folder, root), []).extend(files)
-    elif folder.name == "rostest" and in_tests:
-        for name in names:
-            if name.endswith(".test"):
-                path = folder / name
-                text = path.read_text(encoding="utf-8")
-                marks = (f"<!-- {mark} -->" in text for mark in ("long", "beside others"))
-                inventory.rostests.append(Rostest(path, _package_of(folder, root), *marks))
-
-
-def _package_of(folder, root):
-    """Name of the package that a folder belongs to; of no package: the workspace itself."""
-    while folder != root:
+def package_of(path: Path, root: Path) -> str:
+    """Name of the package that a file or folder belongs to; of no package: that of the whole tree's tests."""
+    for folder in (path, *path.parents):
+        if folder == root:
+            break
         if (folder / "package.xml").is_file():
-            return _package_name(folder / "package.xml")
-        folder = folder.parent
-    return "workspace"
+            return (ElementTree.parse(folder / "package.xml").getroot().findtext("name") or "").strip()
+    return WHOLE_TREE
 
 
-def _package_name(manifest):
-    return ElementTree.parse(manifest).getroot().findtext("name").strip()
+@dataclass
+class Selection:
+    """What pytest is to run: files and node ids, and its own arguments. ``title`` says it in words."""
+
+    targets: list[str]
+    pytest_arguments: list[str]
+    title: str = "everything"
 
 
-def select(inventory: Inventory, arguments: list[str], long: bool) -> Selection:
+def select(inventory: Inventory, arguments: list[str], root: Path, changed: list[Path] | None = None) -> Selection:
     """What to run for a command line; raises SelectionError for an unknown name.
 
     Names are packages, test files (with or without folder and suffix), pytest node ids, or a linter. Everything that
-    starts with a dash goes to pytest. Without any name everything runs; with pytest arguments alone, the unit layer.
+    starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that depend on them.
     """
     names, pytest_arguments = _split(arguments)
-    rostests = [test for test in inventory.rostests if long or not test.is_long]
+    title = ", ".join(names) if changed is None else "what has changed"
+    if changed is not None:
+        packages = touched(inventory, changed, root)
+        if not packages:
+            return Selection([], pytest_arguments, "nothing: no file has changed")
+        names += sorted(packages) + [f"{root}/{name}" for name in LINTERS.values()]
+        if WHOLE_TREE not in packages:
+            names += [str(path) for path in inventory.files.get(WHOLE_TREE, []) if looks_at_the_whole_tree(path)]
     if not names:
-        unit_targets = [str(path) for path in inventory.all_unit_files()]
-        if pytest_arguments:
-            return Selection([], unit_targets, [], pytest_arguments, False)
-        return Selection(list(LINTERS), unit_targets, rostests, [], True, _without(inventory.rostests, rostests))
-    selection = Selection([], [], [], pytest_arguments, False)
-    for name in names:
-        _add_named(selection, inventory, long, name)
+        return Selection([str(path) for path in inventory.all_files()], pytest_arguments)
+    targets = [target for name in names for target in _named(inventory, name, root)]
     # A package and one of its files may both have been named.
-    selection.unit_targets = list(dict.fromkeys(selection.unit_targets))
-    chosen = list(dict.fromkeys(selection.rostests))
-    selection.rostests = chosen
-    selection.left_out = _without(dict.fromkeys(selection.left_out), chosen)
-    return selection
+    return Selection(list(dict.fromkeys(targets)), pytest_arguments, title)
 
 
-def _without(tests, others):
-    return [test for test in tests if test not in others]
+def changed_files(root: Path, since: str) -> list[Path]:
+    """Files that differ from a commit, and new ones. Raises SelectionError where git does not know the commit."""
+    found = []
+    for words in (["diff", "--name-only", since, "--"], ["ls-files", "--others", "--exclude-standard"]):
+        done = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True)
+        if done.returncode:
+            raise SelectionError(f"--changed: git says: {done.stderr.strip()}")
+        found += [root / line for line in done.stdout.splitlines()]
+    return found
+
+
+def touched(inventory: Inventory, changed: list[Path], root: Path) -> set[str]:
+    """The packages of changed files and all that depend on them; the whole tree's tests only if they have changed."""
+    users: dict[str, set[str]] = {}
+    for package, needs in inventory.needs.items():
+        for need in needs:
+            users.setdefault(need, set()).add(package)
+    found, waiting = set(), {package_of(path, root) for path in changed}
+    while waiting:
+        package = waiting.pop()
+        found.add(package)
+        # The whole tree's package names nearly all others, for its benches and long runs.
+        waiting |= users.get(package, set()) - found - {WHOLE_TREE}
+    return found & set(inventory.files)
 
 
 def _split(arguments):
@@ -137,31 +171,24 @@ def _split(arguments):
     return names, pytest_arguments
 
 
-def _add_named(selection, inventory, long, name):
+def _named(inventory: Inventory, name: str, root: Path) -> list[str]:
     if name in LINTERS:
-        selection.linters.append(name)
-        return
-    if name in inventory.packages | set(inventory.unit_files):
-        selection.unit_targets += [str(path) for path in inventory.unit_files.get(name, [])]
-        for test in inventory.rostests:
-            if test.package == name:
-                (selection.left_out if test.is_long and not long else selection.rostests).append(test)
-        return
-    file_name, _, test_id = name.partition("::")
-    unit = [path for path in inventory.all_unit_files() if _means(file_name, path, ".py")]
-    # A long rostest that is called by its own name runs without --long.
-    ros = [test for test in inventory.rostests if _means(file_name, test.path, ".test")]
-    if not unit and not ros:
+        return [f"{root}/{LINTERS[name]}"]
+    if name in inventory.folders or name in inventory.files:
+        return [str(path) for path in inventory.files.get(name, [])]
+    file_name, separator, test_id = name.partition("::")
+    found = [path for path in inventory.all_files() if _means(file_name, path)]
+    if not found:
         raise SelectionError(
             f"'{name}' is not a package, a test file or a pytest option. "
-            f"Packages: {', '.join(sorted(inventory.packages))}"
+            f"Packages: {', '.join(sorted(inventory.folders))}"
         )
-    selection.unit_targets += [f"{path}::{test_id}" if test_id else str(path) for path in unit]
-    selection.rostests += ros
+    # A .test file that is called by its own name runs even if it is long, as one test does that is called so.
+    return [f"{path}::rostest" if path.suffix == ".test" else f"{path}{separator}{test_id}" for path in found]
 
 
-def _means(name, path, suffix):
+def _means(name: str, path: Path) -> bool:
     """Whether a name on the command line means this test file."""
     if "/" in name:
         return Path(name).resolve() == path.resolve()
-    return name in (path.name, path.name.removesuffix(suffix))
+    return name in (path.name, path.stem)

@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 MARKER = "LAB_TEST_RUN"
+RUN_MARKER = "LAB_TEST_WHOLE_RUN"
 NOTEBOOK_MARKER = "LAB_NOTEBOOK_RUN"
 
 

@@ -18,14 +18,13 @@ TOLD_CHARACTERS = 1200
 class Tally:
     """Tests passed and failed, and those that did not run.
 
-    details: one text per failure, its first line the test's name; is_told: they have been printed already;
-    skips: (test, reason) of skipped tests; long: the long tests left out.
+    details: one text per failure, its first line the test's name; skips: (test, reason) of skipped tests; long: the
+    long tests left out.
     """
 
     passed: int = 0
     failed: int = 0
     details: list[str] = field(default_factory=list)
-    is_told: bool = False
     skips: list[tuple[str, str]] = field(default_factory=list)
     long: list[str] = field(default_factory=list)
 

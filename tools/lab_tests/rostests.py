@@ -6,15 +6,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
-import time
 import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
 from lab_environment.ports import free_port
 from lab_tests import processes
-from lab_tests.discovery import Rostest
+from lab_tests.discovery import is_long
 from lab_tests.results import Tally, failure, read_rostest_results
 
 TIME_LIMIT_S = 240.0
@@ -22,7 +20,6 @@ LONG_TIME_LIMIT_S = 1200.0
 # roslaunch gives a node 15 s after SIGINT and 2 s after SIGTERM before it kills it.
 STOP_TIMEOUT_S = 20.0
 LEFTOVER_GRACE_S = 2.0
-ENDING_POLL_S = 0.5
 OUTPUT_LINES_SHOWN = 80
 # Environment variable with the factor of time limits, for rostest and for the tests' own deadlines
 # (lab_testing.waiting).
@@ -35,30 +32,13 @@ def declared_s(path: Path) -> float:
     return 60.0 + sum(float(test.get("time-limit", 60.0)) for test in ElementTree.parse(path).getroot().iter("test"))
 
 
-def names(test: Rostest, root: Path) -> list[str]:
-    """The tests of a file, by names relative to the workspace."""
-    file = test.path.relative_to(root)
-    return [f"{file}::{one.get('test-name')}" for one in ElementTree.parse(test.path).getroot().iter("test")]
+def run(path: Path, work_folder: Path, time_limit_s: float | None = None, stretch: float = 1.0) -> Tally:
+    """Run it and count. work_folder is emptied first; logs and results stay in it.
 
-
-class Ended(Exception):
-    """The run was cancelled before the test ended."""
-
-
-def run(
-    test: Rostest,
-    work_folder: Path,
-    time_limit_s: float | None = None,
-    ending: threading.Event | None = None,
-    stretch: float = 1.0,
-):
-    """Run it and return a Tally. work_folder is emptied first; logs and results stay in it.
-
-    Where `ending` is given and becomes set, the test is stopped and Ended is raised. stretch: factor of all time
-    limits, including those in the file, when the processes get only a part of the machine.
+    stretch: factor of all time limits, including those in the file, when the processes get only a part of the machine.
     """
     if time_limit_s is None:
-        time_limit_s = stretch * max(LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S, declared_s(test.path))
+        time_limit_s = stretch * max(LONG_TIME_LIMIT_S if is_long(path) else TIME_LIMIT_S, declared_s(path))
     shutil.rmtree(work_folder, ignore_errors=True)
     (work_folder / "results").mkdir(parents=True)
     run_id = uuid.uuid4().hex
@@ -79,7 +59,7 @@ def run(
     with output.open("wb") as stream:
         # Do not trust the results of rostest --text (it exits with 0 when tests fail), but the XML files.
         child = subprocess.Popen(
-            [*command, str(test.path)],
+            [*command, str(path)],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=stream,
@@ -87,7 +67,7 @@ def run(
             start_new_session=True,
         )
         try:
-            _wait(child, time_limit_s, ending)
+            child.wait(time_limit_s)
         except subprocess.TimeoutExpired:
             timed_out = True
             _stop(child)
@@ -99,34 +79,19 @@ def run(
     leftovers = processes.wait_until_gone(run_id, LEFTOVER_GRACE_S)
     processes.kill_all(run_id)
     if timed_out:
-        tally.add(failure(f"{test.path.name}: not finished after {time_limit_s:.0f} s"))
+        tally.add(failure(f"{path.name}: not finished after {time_limit_s:.0f} s"))
     else:
         tally.add(read_rostest_results(work_folder / "results"))
         if child.returncode != 0 and tally.failed == 0:
-            tally.add(failure(f"{test.path.name}: rostest ended with exit code {child.returncode}"))
+            tally.add(failure(f"{path.name}: rostest ended with exit code {child.returncode}"))
         if leftovers:
             listing = "\n".join(f"  {pid}: {command}" for pid, command in sorted(leftovers.items()))
-            tally.add(failure(f"{test.path.name}: left processes behind (killed now):\n{listing}"))
+            tally.add(failure(f"{path.name}: left processes behind (killed now):\n{listing}"))
     if tally.failed:
         lines = output.read_text(errors="replace").splitlines()
         tail = "\n".join(lines[-OUTPUT_LINES_SHOWN:])
-        tally.details.append(f"output of {test.path.name} (logs in {work_folder}):\n{tail}")
+        tally.details.append(f"output of {path.name} (logs in {work_folder}):\n{tail}")
     return tally
-
-
-def _wait(child, time_limit_s, ending):
-    """Wait for the child's end. Raises subprocess.TimeoutExpired, or Ended."""
-    deadline = time.monotonic() + time_limit_s
-    while True:
-        remaining = deadline - time.monotonic()
-        try:
-            child.wait(max(0.0, min(remaining, ENDING_POLL_S)))
-            return
-        except subprocess.TimeoutExpired:
-            if ending is not None and ending.is_set():
-                raise Ended from None
-            if remaining <= 0.0:
-                raise
 
 
 def _stop(child):

@@ -7,8 +7,6 @@ import pytest
 
 from baxter_tools.path_planner import ESCAPE_SLACK_M, NoPath, PathPlanner
 
-pytestmark = pytest.mark.tree
-
 LOWER, UPPER = (-1.0, -1.0), (1.0, 1.0)
 MARGIN_M = 0.05
 START, GOAL = (-0.8, 0.0), (0.8, 0.0)

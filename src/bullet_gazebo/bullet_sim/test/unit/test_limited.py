@@ -11,8 +11,6 @@ import pytest
 from bullet_sim.limited import LimitedProcess, LimitError
 from lab_testing.waiting import wait_until
 
-pytestmark = pytest.mark.tree
-
 
 @pytest.fixture
 def process():

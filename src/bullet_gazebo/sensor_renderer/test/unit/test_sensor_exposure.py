@@ -15,8 +15,6 @@ from sensor_renderer.structured_light import StructuredLight, shadowed
 from urdf_model.transforms import matrix_from_quaternion
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 GREY = np.full((100, 200, 3), 120, dtype=np.uint8)
 PINHOLE = Pinhole.from_field_of_view(320, 240, 1.0, 0.05, 20.0)
 KINECT = Pinhole.from_field_of_view(640, 480, 1.0, 0.1, 100.0)

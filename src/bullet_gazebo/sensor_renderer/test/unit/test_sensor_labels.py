@@ -16,8 +16,6 @@ from sensor_renderer.sensor_element import CameraElement
 from sensor_renderer.tiny_renderer import TinyRenderer
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 PINHOLE = Pinhole.from_field_of_view(320, 240, 1.0, 0.05, 20.0)
 BARREL = Distortion(-0.25, 0.08, 0.001, -0.001, 0.0)
 EYE = """<robot name="eye"><link name="eye"/></robot>"""

@@ -15,8 +15,6 @@ from sensor_renderer.sides import Sides
 from urdf_model.transforms import pose_matrix
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 URDF = """<robot name="ball">
 <link name="link"><visual><geometry><mesh filename="%s"/></geometry></visual></link></robot>"""
 XACRO = """<robot name="ball" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="mesh" value="%s"/>

@@ -18,7 +18,6 @@ print(flush=True)
 while True:
     pass
 """
-pytestmark = pytest.mark.once
 
 
 def used_s(process):

@@ -20,8 +20,6 @@ from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse, pose_matrix
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 CUBE_M = 0.1
 CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.1 0.1 0.1"/></geometry>
 <material name="r"><color rgba="0.9 0 0 1"/></material></visual></link></robot>"""

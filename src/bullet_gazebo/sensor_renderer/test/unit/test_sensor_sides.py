@@ -12,8 +12,6 @@ from sensor_renderer.sides import Sides, indexed
 from urdf_model.transforms import pose_matrix
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 URDF = """<robot name="thing"><link name="link"><visual><geometry><mesh filename="%s"/></geometry>
 <material name="r"><color rgba="0.9 0 0 1"/></material></visual></link></robot>"""
 PINHOLE = Pinhole.from_field_of_view(320, 320, 1.0, 0.05, 20.0)

@@ -14,8 +14,6 @@ from urdf_model import Cylinder, Sphere
 from urdf_model.transforms import pose_matrix
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 UPRIGHT = [0, 0, 0, 0, 0, 0, 1]
 PINHOLE = Pinhole.from_field_of_view(120, 120, 1.0, 0.05, 20.0)
 EVEN = {"lights": [], "ambient": [0.6, 0.6, 0.6], "background": [0, 0, 0]}

@@ -22,7 +22,6 @@ from lab_testing.waiting import wait_until
 HERE = Path(__file__).parent
 SQUARE, TROUBLE = "small_jobs:Square", "small_jobs:Trouble"
 # A worker starts in a new Python, which reads the jobs from this folder.
-pytestmark = pytest.mark.once
 
 
 @pytest.fixture(autouse=True)

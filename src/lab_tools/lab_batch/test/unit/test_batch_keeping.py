@@ -16,7 +16,6 @@ from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).parent
 # A worker starts in a new Python, which reads the jobs from this folder.
-pytestmark = pytest.mark.once
 
 
 @pytest.fixture(autouse=True)

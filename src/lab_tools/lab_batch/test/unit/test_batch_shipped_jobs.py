@@ -13,8 +13,6 @@ from lab_batch import JobError, Spec, load
 from lab_batch.processes import Limits, map_seeds
 from lab_batch.shipped import JOBS, Command
 
-pytestmark = pytest.mark.once
-
 
 def test_a_program_gets_its_seed_and_a_separate_master():
     program = ("import os, json; print('noise'); "

@@ -109,7 +109,6 @@ with claimed_folder("ray-") as folder:
     signal.pause()
 """
 SLEEP = "import signal; print(flush=True); signal.pause()"
-pytestmark = pytest.mark.once
 
 
 def run(name, count, **parameters):

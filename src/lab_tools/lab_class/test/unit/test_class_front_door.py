@@ -5,7 +5,6 @@ import contextlib
 import json
 from pathlib import Path
 
-import pytest
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
@@ -13,8 +12,6 @@ from lab_class import front_door, roster
 from lab_class.labs import MOST_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
 from web_bridge import passing
-
-pytestmark = pytest.mark.once
 
 LIMIT_S = 20.0
 PAGE = Path(__file__).resolve().parents[2] / "page"
@@ -465,8 +462,6 @@ def test_the_cookie_of_the_door_does_not_reach_the_lab(tmp_path):
             assert token.encode() not in heads[0] and b"Cookie: a=1\r\n" in heads[0]
 
     run(check())
-
-
 
 
 def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awake(tmp_path):

@@ -14,7 +14,6 @@ from lab_class.store import ClassRecord, Options
 from lab_testing.browser import Browser, why_not
 from lab_testing.waiting import wait_until
 
-pytestmark = pytest.mark.once
 PAGE = Path(__file__).resolve().parents[2] / "page"
 
 

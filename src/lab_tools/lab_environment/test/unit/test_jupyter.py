@@ -15,7 +15,6 @@ from lab_environment.family import children_of
 from lab_testing.processes import is_alive
 from lab_testing.waiting import stretched, wait_until
 
-pytestmark = pytest.mark.once
 # Starts the server, says where it is, and waits to be ended.
 OWNER = """import signal, sys
 from pathlib import Path

@@ -15,8 +15,6 @@ from motion_planning.scene import Scene, WorldObject
 from urdf_model import Box
 from urdf_model.transforms import rigid
 
-pytestmark = pytest.mark.tree
-
 # As long as a slow machine may need: what is tested is the answer. Anytime planners take all they get.
 PATIENCE_S, BRIEF_S = 60.0, 3.0
 

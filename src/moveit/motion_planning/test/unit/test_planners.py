@@ -21,8 +21,6 @@ from motion_planning.spheres import SphereChecker, SphereModel
 from urdf_model import Box, Cylinder
 from urdf_model.transforms import pose_matrix as pose
 
-pytestmark = pytest.mark.once
-
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 60.0
 

@@ -5,10 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-pytestmark = pytest.mark.tree
-
 PACKAGE = Path(__file__).resolve().parents[2]
 URDF = """<robot name="crank">
 <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>

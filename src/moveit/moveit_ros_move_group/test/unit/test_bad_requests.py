@@ -17,8 +17,6 @@ from good_requests import good_requests, many_objects, nothing_left  # noqa: E40
 from in_process import Node  # noqa: E402
 from small_arm import SIX, joint_state, parameters  # noqa: E402
 
-pytestmark = pytest.mark.once
-
 
 @pytest.fixture(scope="module")
 def node():

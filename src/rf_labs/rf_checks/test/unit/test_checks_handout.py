@@ -80,7 +80,6 @@ def test_it_goes_into_an_empty_folder_elsewhere(workspace, tmp_path, monkeypatch
     assert "check --list" in capsys.readouterr().out
 
 
-@pytest.mark.tree
 def test_this_workspace_reveals_nothing(tmp_path):
     handout.make(HERE, tmp_path / "students")
     left = [path for path in (tmp_path / "students").rglob("*") if handout.is_left_out(

@@ -12,8 +12,6 @@ from lab_testing.waiting import wait_until
 from rf_checks import hidden, pacing, sandbox
 from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
 
-pytestmark = pytest.mark.once
-
 WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), reason=isolation.problem()))
 
 

@@ -21,8 +21,6 @@ from ros_controllers.joint_trajectory_controller import (
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from trajectory_arm import JOINTS, NS, Arm, trajectory  # noqa: E402
 
-pytestmark = pytest.mark.tree
-
 GAINS = {joint: {"p": 40.0, "d": 0.0} for joint in JOINTS}
 
 R = FollowJointTrajectoryResult

@@ -16,8 +16,6 @@ from control_msgs.msg import FollowJointTrajectoryResult
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from trajectory_arm import DT, NS, Arm, trajectory  # noqa: E402
 
-pytestmark = pytest.mark.tree
-
 QUARTER = math.pi / 4.0
 BOTH = [(1.0, [QUARTER, 0.0]), (2.0, [0.0, -QUARTER]), (4.0, [-QUARTER, QUARTER])]
 ALONE = [(1.0, [QUARTER]), (2.0, [2.0 * QUARTER]), (4.0, [-2.0 * QUARTER])]

@@ -16,8 +16,6 @@ from ros_controllers.speed_limits import SpeedLimits
 from ros_controllers.wheel_odometry import WheelOdometry
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.tree
-
 DT = 0.01
 RADIUS, APART, LONG = 0.11, 0.4, 0.6
 TABLE = ControllerTable(yaml.safe_load((Path(__file__).parents[2] / "config" / "controllers.yaml").read_text()))

@@ -25,7 +25,6 @@ from lab_web.libraries import LibrariesError, fetched
 from lab_web.serving import SCREEN
 from world_picture.snapshot import SnapshotWriter
 
-pytestmark = pytest.mark.once
 HERE = Path(__file__).resolve().parent
 PACKAGE = HERE.parents[1]
 START_S = 60.0

@@ -4,8 +4,6 @@ import pytest
 
 from lab_testing.waiting import wait_until
 
-pytestmark = pytest.mark.once
-
 #: All controls that can be used now, numbered in the order of the page.
 CONTROLS = """[...document.querySelectorAll("a[href], button, input, select, summary, [tabindex]")].filter((one) =>
     one.checkVisibility() && !one.disabled && one.tabIndex >= 0)"""

@@ -4,7 +4,6 @@ import pytest
 
 from lab_testing.waiting import wait_until
 
-pytestmark = pytest.mark.once
 FRAME = "document.getElementById('notebook-frame')"
 BOX = ("(({left, right, top, bottom}) => [left, right, top, bottom])"
        "(document.querySelector('%s').getBoundingClientRect())")

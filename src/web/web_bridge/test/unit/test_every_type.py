@@ -6,7 +6,6 @@ import string
 
 import cbor2
 import genpy
-import pytest
 import roslib.message
 import rosmsg
 import rospkg
@@ -65,7 +64,6 @@ def one(base, draw):
     return filled(message_class(base), draw)
 
 
-@pytest.mark.once
 def test_every_type_survives_both_ways():
     draw, reader = random.Random(1), Reader(message_class, now)
     to_json, to_cbor = Writer(message_class, JsonForm()), Writer(message_class, CborForm())

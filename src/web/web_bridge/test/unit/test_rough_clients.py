@@ -15,8 +15,6 @@ from web_lab import WebLab
 from lab_testing.waiting import wait_until
 from web_bridge.access import Access
 
-pytestmark = pytest.mark.once
-
 
 @pytest.fixture
 def witness(lab):

@@ -10,8 +10,6 @@ from rough import check_loses_old_messages, check_refuses_foreign_pages, check_v
 from std_msgs.msg import Int32, String
 from std_srvs.srv import SetBoolRequest
 
-pytestmark = pytest.mark.once
-
 TYPES = {"/tick": "std_msgs/Int32", "/big": "std_msgs/String"}
 
 

@@ -23,8 +23,6 @@ from web_bridge.pictures import Form
 from web_bridge.serving import Serving
 from web_bridge.video import Query, QueryError, VideoOptions, VideoServer, read_query, routes
 
-pytestmark = pytest.mark.once
-
 IMAGE, PACKED = "/cam/image", "/cam/image/compressed"
 TYPES = {IMAGE: Image._type, PACKED: CompressedImage._type, "/plain": Image._type, "/cam/camera_info": "x/Info",
          "/text": String._type}

@@ -11,8 +11,6 @@ from gazebo_ros.world_file import read_world
 from model_files.resources import model_folders, model_sizes
 from sdf_model import ModelFolders
 
-pytestmark = pytest.mark.once
-
 WORLDS = sorted((Path(__file__).parents[2] / "worlds").glob("*.world"))
 SECONDS = 2.0
 # Plugins are not loaded here: the conveyor stands still.

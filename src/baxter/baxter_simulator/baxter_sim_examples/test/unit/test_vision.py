@@ -25,8 +25,6 @@ from urdf_model.transforms import inverse, pose_matrix, quaternion_from_matrix
 from urdf_model.writer import drawing_urdf
 from world_picture.drawing import DrawingCache
 
-pytestmark = pytest.mark.once
-
 # The hands' and the head's camera as they start, and the Kinect.
 CAMERAS = {"hand": Pinhole.from_field_of_view(800, 800, 1.3962634, 0.02, 10.0),
            "kinect": Pinhole.from_field_of_view(640, 480, 1.047, 0.1, 100.0)}

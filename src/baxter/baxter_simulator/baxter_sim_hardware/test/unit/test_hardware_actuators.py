@@ -13,7 +13,6 @@ from baxter_sim_hardware.arms.actuators import Actuators
 from baxter_sim_hardware.arms.joint_sensors import JointSensors
 from baxter_sim_hardware.errors import HardwareError
 
-pytestmark = pytest.mark.once
 HEARD = ("joint_states",)
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4

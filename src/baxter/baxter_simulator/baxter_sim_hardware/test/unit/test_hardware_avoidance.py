@@ -11,7 +11,6 @@ from baxter_sim_hardware.arms import avoidance, collision
 from baxter_sim_hardware.topics.collision import guards_of
 from baxter_sim_kinematics import Chain
 
-pytestmark = pytest.mark.once
 HEARD = ("state", "limb/*/collision_avoidance_state")
 
 POSITION, VELOCITY = 1, 2

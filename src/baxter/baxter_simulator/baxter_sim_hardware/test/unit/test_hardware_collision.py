@@ -10,7 +10,6 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from baxter_model import JOINTS
 from baxter_sim_hardware.arms import collision, stopping
 
-pytestmark = pytest.mark.tree
 HEARD = ("state", "assembly/*", "limb/*/state", "head/state", "limb/*/collision_*_state")
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4

@@ -6,7 +6,6 @@ from std_msgs.msg import Float64
 
 from baxter_model import JOINTS, SIDES
 
-pytestmark = pytest.mark.tree
 HEARD = ("*controller/state", "head/head_state")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 

@@ -7,7 +7,6 @@ import xacro
 from baxter_model import JOINTS
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
 HEARD = ("joint_states", "limb/*/gravity_compensation_torques")
 
 TORQUE, RAW = 3, 4

@@ -16,8 +16,6 @@ from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
 from loop_ros.request_queue import RequestQueue
 
-pytestmark = pytest.mark.tree
-
 TICK_S = 0.002
 INPUTS = [(row, name) for row in interface.TOPICS if not row.is_published for _, name in row.names()]
 OUTPUTS = [name for row in interface.TOPICS if row.is_published and row.rate != interface.LATCHED

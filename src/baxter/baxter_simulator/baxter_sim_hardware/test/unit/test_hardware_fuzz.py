@@ -13,8 +13,6 @@ from std_msgs.msg import Bool, Empty, Float64
 
 from baxter_sim_hardware.topics import interface
 
-pytestmark = pytest.mark.tree
-
 SIDES = ("left", "right")
 INPUTS = [(name, roslib.message.get_message_class(row.type))
           for row in interface.TOPICS if not row.is_published for _, name in row.names()]

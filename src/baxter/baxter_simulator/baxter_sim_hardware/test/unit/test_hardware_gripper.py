@@ -13,7 +13,6 @@ from baxter_sim_hardware.grippers.electric import ElectricGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.tree
 HEARD = ("end_effector/*",)
 
 SIDES = ("left", "right")

@@ -11,7 +11,6 @@ from baxter_sim_hardware.arms import hand_load
 from baxter_sim_hardware.errors import CommandRefused
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.tree
 HEARD = ("limb/*/endpoint_state",)
 # Hand down, 0.94 m from the shoulder.
 REACHING = np.tile([0.0, -0.2, 0.0, 0.6, 0.0, 1.0, 0.0], 2)

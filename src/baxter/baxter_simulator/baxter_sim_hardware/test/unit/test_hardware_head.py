@@ -10,7 +10,6 @@ from std_msgs.msg import Bool
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import ACCELERATION, FULL_SPEED, NOD_S, Head
 
-pytestmark = pytest.mark.tree
 HEARD = ("head/head_state", "joint_states")
 LIMIT = math.pi / 2
 

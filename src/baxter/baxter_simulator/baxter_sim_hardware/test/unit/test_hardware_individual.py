@@ -16,7 +16,6 @@ from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer.pinhole import Pinhole
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
 HEARD = ("limb/*/endpoint_state",)
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "robot_of_serial"

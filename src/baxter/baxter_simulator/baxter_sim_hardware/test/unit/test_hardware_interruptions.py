@@ -8,7 +8,6 @@ from baxter_core_msgs.msg import EndEffectorCommand, HeadPanCommand
 from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Empty
 
-pytestmark = pytest.mark.once
 HEARD = ("state", "sim/resets")
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4

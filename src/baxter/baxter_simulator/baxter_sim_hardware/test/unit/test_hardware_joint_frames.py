@@ -9,7 +9,6 @@ from baxter_sim_hardware.joint_frames import Due, JointFrames
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
 
-pytestmark = pytest.mark.tree
 TIME_NS = 12_345_678_901
 ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
 <joint name="turns" type="revolute"><parent link="a"/><child link="b"/><origin xyz="1 2 3" rpy="0.3 -1.2 3.1"/>

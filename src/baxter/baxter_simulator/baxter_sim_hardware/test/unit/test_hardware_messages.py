@@ -7,8 +7,6 @@ from baxter_core_msgs.msg import EndEffectorCommand
 from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware.message_delay import Late, MessageDelay
 
-pytestmark = pytest.mark.once
-
 RAW = 4
 TICK_S = 0.002
 ROWS = {"least": {"message": 0.005}, "most": {"message": 0.008}}

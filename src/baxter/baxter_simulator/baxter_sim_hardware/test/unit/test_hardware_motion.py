@@ -7,7 +7,6 @@ from std_msgs.msg import Bool, Empty, Float64
 from baxter_model import JOINTS
 from baxter_sim_hardware.arms import stopping
 
-pytestmark = pytest.mark.once
 HEARD = ()
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4

@@ -17,8 +17,6 @@ from gazebo_ros.model_plugin import PluginError
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion
 
-pytestmark = pytest.mark.tree
-
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 FINGERS = tuple("%s_gripper_%s_finger_joint" % (hand, finger) for hand in "lr" for finger in "lr")

@@ -17,7 +17,6 @@ from bullet_sim.mesh_loading import load_scene
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
 HEARD = ("limb/*/collision_*_state",)
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4

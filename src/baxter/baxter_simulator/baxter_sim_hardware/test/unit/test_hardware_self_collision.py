@@ -5,7 +5,6 @@ import pytest
 
 from baxter_model import JOINTS
 
-pytestmark = pytest.mark.tree
 HEARD = ()
 POSITION = 1
 SIDES = ("left", "right")

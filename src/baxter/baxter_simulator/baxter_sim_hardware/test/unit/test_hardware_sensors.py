@@ -14,7 +14,6 @@ from baxter_sim_hardware.topics.sensors import LIGHT_TURNS, SONAR_RATE_HZ
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.tree
 HEARD = ("range/*", "/sim/laserscan/*", "analog_io/*_hand_range/*", "sonar/*", "accelerometer/*", "/robustcontroller/*",
          "/usb/*", "/updater/*", "/update/*", "/diagnostics*", "*joint_states", "limb/*endpoint_state", "urdf")
 

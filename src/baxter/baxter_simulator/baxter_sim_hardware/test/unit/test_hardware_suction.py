@@ -14,7 +14,6 @@ from baxter_sim_hardware.grippers.suction import SuctionGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
 HEARD = ("end_effector/*", "analog_io/*", "digital_io/*")
 
 SIDES = ("left", "right")

@@ -14,8 +14,6 @@ import pytest
 
 from lab_testing.waiting import wait_until
 
-pytestmark = pytest.mark.once
-
 PACKAGE = Path(__file__).resolve().parents[2]
 NODE = "/ik_node_that_ends"
 # rospy's own thread for new connections may still be waiting on the socket that its shutdown has just closed.

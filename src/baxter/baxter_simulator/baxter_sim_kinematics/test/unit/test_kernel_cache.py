@@ -11,8 +11,6 @@ import baxter_sim_kinematics
 import numba_cache
 import urdf_model
 
-pytestmark = pytest.mark.tree
-
 # A kernel that calls some of other files; how far its tip is from the base; how often it came from the cache.
 _POSE_ERROR = """
 import numpy as np

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.once
-
 PACKAGE = Path(__file__).resolve().parents[2]
 BAXTER = PACKAGE.parents[1] / "baxter_common/baxter_description/urdf/baxter.urdf"
 NEUTRAL = "0 -0.55 0 0.75 0 1.26 0".split()

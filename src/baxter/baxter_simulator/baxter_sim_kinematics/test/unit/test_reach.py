@@ -20,8 +20,6 @@ from baxter_sim_kinematics.reach_map import ReachMap, overlap
 from baxter_sim_kinematics.reach_places import Region, best_places, table_poses
 from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix, rigid, rpy_matrix
 
-pytestmark = pytest.mark.once
-
 PACKAGE = Path(__file__).resolve().parents[2]
 BAXTER = PACKAGE.parents[1] / "baxter_common/baxter_description/urdf/baxter.urdf"
 BAXTER_ARM = ("--urdf", str(BAXTER), "--base", "base", "--tip", "left_gripper")

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pytest plugin of `./baxter.sh test`: .test files as tests, two at a time beside those that wait, and the counts.
+
+The controller of pytest-xdist gives whole files to its workers, the longest first. There is a worker for each core, and
+one more, which runs only the .test files that leave the processor to others.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import locale
+import os
+import random
+import resource
+from pathlib import Path
+
+import pytest
+from xdist.scheduler import LoadScopeScheduling
+
+from lab_tests import comma_locale, left_threads, rostests
+from lab_tests.discovery import is_long, is_whole_machine, mostly_waits, package_of
+from lab_tests.results import Tally, summary
+
+LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
+# What files took in earlier runs, and what a fresh clone begins with: file below the root -> seconds.
+DURATIONS, FIRST_DURATIONS = "durations.json", Path(__file__).with_name("durations.json")
+# Files that take less are ordered by name [s].
+MIN_DURATION_S = 2.0
+
+
+def pytest_addoption(parser):
+    group = parser.getgroup("lab", "./baxter.sh test")
+    group.addoption("--long", action="store_true", help="also run the tests that take minutes")
+    group.addoption("--shuffle", type=int, metavar="SEED", help="run the files, and the tests in them, in random order")
+    group.addoption("--stretch", type=float, default=1.0, metavar="FACTOR",
+                    help="factor of all time limits, for a slow machine")
+
+
+def work_folder(config) -> Path:
+    """Where logs and results of tests stay."""
+    folder = config.rootpath / ".baxter" / "tests"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def pytest_configure(config):
+    is_worker = hasattr(config, "workerinput")
+    if not is_worker:
+        config.pluginmanager.register(Controller(config), "lab controller")
+    # A few files run in this process itself.
+    if is_worker or not config.option.numprocesses:
+        config.pluginmanager.register(Worker(config), "lab worker")
+
+
+def pytest_collect_file(file_path, parent):
+    if file_path.suffix == ".test" and file_path.parent.name == "rostest":
+        return RostestFile.from_parent(parent, path=file_path)
+    return None
+
+
+class RostestFile(pytest.File):
+    def collect(self):
+        yield Rostest.from_parent(self, name="rostest")
+
+
+class Rostest(pytest.Item):
+    """One .test file, run by rostest; the tests in it are counted one by one."""
+
+    def runtest(self):
+        folder = work_folder(self.config) / f"{package_of(self.path, self.config.rootpath)}-{self.path.stem}"
+        tally = rostests.run(self.path, folder, stretch=self.config.option.stretch)
+        tally.refuse_bare_skips()
+        self.user_properties += [("passed", tally.passed), ("failed", tally.failed), ("skips", tally.skips)]
+        if tally.failed:
+            raise RostestFailure("\n".join(tally.details))
+        if not tally.passed:
+            pytest.skip("; ".join(dict.fromkeys(reason for _, reason in tally.skips)))
+
+    def repr_failure(self, excinfo, style=None):
+        if isinstance(excinfo.value, RostestFailure):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self):
+        return self.path, None, self.path.name
+
+
+class RostestFailure(Exception):
+    """Tests of a .test file failed; the text has their names and messages, and the end of the output."""
+
+
+def file_of(nodeid: str) -> str:
+    return nodeid.partition("::")[0]
+
+
+def read_durations(folder: Path) -> dict[str, float]:
+    """File below the root -> seconds that it took last time."""
+    found: dict[str, float] = {}
+    for path in (FIRST_DURATIONS, folder / DURATIONS):
+        with contextlib.suppress(OSError, ValueError):
+            found.update(json.loads(path.read_text(encoding="utf-8")))
+    return found
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config, items):
+    """Leave long tests out, unless one was named; then the longest files first, or all in random order."""
+    named = tuple(argument for argument in config.args if "::" in argument)
+    if not (config.option.long or config.option.markexpr):
+        left_out = [item for item in items
+                    if _is_long(item) and not str(config.rootpath / item.nodeid).startswith(named)]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
+        _tell(config, "long", [item.nodeid for item in left_out])
+    durations = read_durations(work_folder(config))
+    by_file: dict[str, list] = {}
+    for item in items:
+        by_file.setdefault(file_of(item.nodeid), []).append(item)
+    files = sorted(by_file, key=lambda file: (-durations.get(file, 0.0), file))
+    if config.option.shuffle is not None:
+        source = random.Random(config.option.shuffle)
+        source.shuffle(files)
+        for file in files:
+            source.shuffle(by_file[file])
+    # Tests that need the whole machine first: later they would wait for a moment in which nothing else runs.
+    files.sort(key=lambda file: not is_whole_machine(config.rootpath / file))
+    items[:] = [item for file in files for item in by_file[file]]
+
+
+def _is_long(item) -> bool:
+    return is_long(item.path) if isinstance(item, Rostest) else item.get_closest_marker("long") is not None
+
+
+def _tell(config, name: str, value):
+    """Tell the controller something, which may be in this process."""
+    if hasattr(config, "workeroutput"):
+        config.workeroutput[name] = value
+    else:
+        config.pluginmanager.get_plugin("lab controller").take({name: value})
+
+
+class Worker:
+    """In each worker: the locale, the lock on the machine, and what each test took."""
+
+    def __init__(self, config):
+        self._config = config
+        self._usual = {name: os.environ.get(name) for name in comma_locale.VARIABLES}
+        self._comma = comma_locale.variables(LOCALE_FOLDER)
+        self._set_locale(self._comma)
+        self._machine = open(work_folder(config) / "machine.lock", "w")
+
+    @staticmethod
+    def _set_locale(variables):
+        for name, value in variables.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+        locale.setlocale(locale.LC_ALL, "")
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item):
+        is_rostest = isinstance(item, Rostest)
+        whole = is_rostest and is_whole_machine(item.path)
+        fcntl.flock(self._machine, fcntl.LOCK_EX if whole else fcntl.LOCK_SH)
+        if is_rostest:
+            self._set_locale(self._usual)
+        self._before_s = _processor_s()
+        try:
+            return (yield)
+        finally:
+            if is_rostest:
+                self._set_locale(self._comma)
+            fcntl.flock(self._machine, fcntl.LOCK_UN)
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_makereport(self, item, call):
+        if call.when == "teardown":
+            item.user_properties.append(("processor_s", _processor_s() - self._before_s))
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session):
+        if session.testscollected and (names := left_threads.busy_ones()):
+            _tell(self._config, "left_threads", names)
+
+    def pytest_unconfigure(self):
+        self._set_locale(self._usual)
+        self._machine.close()
+
+
+def _processor_s() -> float:
+    both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in both)
+
+
+class Controller:
+    """In the process that the user started: which worker runs what, the counts, the last line."""
+
+    def __init__(self, config):
+        self._folder = work_folder(config)
+        self._total = Tally()
+        self._took: dict[str, list[float]] = {}
+
+    def pytest_xdist_make_scheduler(self, config, log):
+        return FileScheduling(config, log)
+
+    def pytest_runtest_logreport(self, report):
+        took = self._took.setdefault(file_of(report.nodeid), [0.0, 0.0])
+        took[0] += report.duration
+        properties = dict(report.user_properties)
+        if report.when == "teardown":
+            took[1] += properties.get("processor_s", 0.0)
+        if report.failed:
+            self._total.failed += max(1, properties.get("failed", 1) if report.when == "call" else 1)
+            self._total.details.append(f"{report.nodeid}\n{report.longreprtext}")
+        elif report.when == "call" and report.passed:
+            self._total.passed += properties.get("passed", 1)
+        elif report.skipped and "skips" not in properties:
+            # (file, line, "Skipped: reason"); without a reason only "Skipped".
+            reason = report.longrepr[2] if isinstance(report.longrepr, (tuple, list)) else ""
+            self._total.skips.append((report.nodeid, reason.removeprefix("Skipped").removeprefix(": ")))
+        if report.when == "call":
+            self._total.skips += [tuple(skip) for skip in properties.get("skips", [])]
+
+    def pytest_collectreport(self, report):
+        if report.failed:
+            self._fail(f"{report.nodeid}\n{report.longreprtext}")
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node, error):
+        self.take(getattr(node, "workeroutput", {}))
+
+    def take(self, told: dict):
+        """What a worker says in the end."""
+        self._total.long = told.get("long", self._total.long)
+        if names := told.get("left_threads"):
+            self._fail(f"after the last test, threads of a process still compute; there are: {names}")
+
+    def _fail(self, detail: str):
+        self._total.failed += 1
+        self._total.details.append(detail)
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session):
+        self._total.refuse_bare_skips()
+        if self._total.failed or not self._total.passed:
+            session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
+        took = {file: round(both[0], 1) for file, both in self._took.items() if both[0] >= MIN_DURATION_S}
+        text = json.dumps({**read_durations(self._folder), **took}, indent=0, sort_keys=True)
+        (self._folder / DURATIONS).write_text(text, encoding="utf-8")
+        with (self._folder / "took.csv").open("w", encoding="utf-8") as stream:
+            stream.write("seconds,processor_seconds,file\n")
+            for file, both in sorted(self._took.items(), key=lambda row: -row[1][1]):
+                stream.write(f"{both[0]:.2f},{both[1]:.2f},{file}\n")
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_unconfigure(self):
+        print(summary(self._total), flush=True)
+
+
+class FileScheduling(LoadScopeScheduling):
+    """A file's tests run in one worker. The last worker gets only .test files that mostly wait, the others those last."""
+
+    def _split_scope(self, nodeid):
+        return file_of(nodeid)
+
+    def _is_extra(self, node) -> bool:
+        return self.numnodes > 1 and node.gateway.id == f"gw{self.numnodes - 1}"
+
+    def _assign_work_unit(self, node):
+        waiting = {scope: mostly_waits(self.config.rootpath / scope) for scope in self.workqueue}
+        wanted = next((scope for scope, waits in waiting.items() if waits == self._is_extra(node)), None)
+        if wanted is None and self._is_extra(node):
+            node.shutdown()
+            return
+        self.workqueue.move_to_end(wanted or next(iter(self.workqueue)), last=False)
+        super()._assign_work_unit(node)
