@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serve robot/end_effector/<gripper>/gripper_action for one gripper or both."""
+"""Serve robot/end_effector/<gripper>/gripper_action for one gripper or both.
+
+Actions: robot/end_effector/SIDE_gripper/gripper_action. Publishes: robot/end_effector/SIDE_gripper/command.
+Subscribes: state and properties beside it, robot/state. dynamic_reconfigure has its parameters.
+"""
 import argparse
 import functools
 import sys
@@ -16,7 +20,7 @@ from gripper_action.gripper_action import GripperActionServer
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-g", "--gripper", choices=("both", *SIDES), default="both", help="which gripper (both)")
     arguments = parser.parse_args(rospy.myargv()[1:])
     sides = SIDES if arguments.gripper == "both" else (arguments.gripper,)

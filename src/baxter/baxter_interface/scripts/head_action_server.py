@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serve robot/head/head_action."""
+"""Serve robot/head/head_action.
+
+Publishes: robot/head/command_head_pan. Subscribes: robot/head/head_state, robot/state. dynamic_reconfigure has its
+parameters.
+"""
 import argparse
 import functools
 import sys
@@ -15,7 +19,8 @@ from head_action.head_action import HeadActionServer
 
 
 def main():
-    argparse.ArgumentParser(description=__doc__).parse_args(rospy.myargv()[1:])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args(rospy.myargv()[1:])
 
     def body():
         config = ParameterServer(HeadActionServerConfig, lambda config, level: config)

@@ -1,6 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Serve robot/limb/<limb>/follow_joint_trajectory for one arm or both."""
+"""Serve robot/limb/<limb>/follow_joint_trajectory for one arm or both.
+
+Actions: robot/limb/SIDE/follow_joint_trajectory. Publishes: robot/limb/SIDE/joint_command,
+.../inverse_dynamics_command, robot/joint_state_publish_rate. Subscribes: robot/state, robot/joint_states, the
+cuffs' switches.
+dynamic_reconfigure has its parameters: tolerances and gains of each joint.
+"""
 import argparse
 import functools
 import sys
@@ -33,7 +39,7 @@ def positive(text):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-l", "--limb", choices=("both", *SIDES), default="both", help="which arm (both)")
     parser.add_argument("-r", "--rate", type=positive, default=100.0, help="commands per second [Hz] (100)")
     parser.add_argument("-m", "--mode", choices=CONFIGS, default="position_w_id",

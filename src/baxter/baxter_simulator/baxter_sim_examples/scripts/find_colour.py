@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where blocks of a colour are: find_colour.py COLOUR, in the picture of a camera that looks at the table.
+"""Where blocks of a colour are, in the picture of a camera that looks at the table.
 
 Prints x and y in `base` [m] of each patch that is as large as a block on the table. Parameters: ~image, ~info: the
 camera's topics, the Kinect's by default.
 """
+import argparse
 import sys
 
 import rospy
@@ -26,7 +27,7 @@ def look(colour):
 
 
 if __name__ == "__main__":
-    words = rospy.myargv()[1:]
-    if len(words) != 1 or words[0] not in HUES:
-        sys.exit("usage: find_colour.py %s" % " | ".join(HUES))
-    sys.exit(run("find_colour", lambda: look(words[0]), anonymous=True))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("colour", choices=HUES)
+    sought = parser.parse_args(rospy.myargv()[1:]).colour
+    sys.exit(run("find_colour", lambda: look(sought), anonymous=True))

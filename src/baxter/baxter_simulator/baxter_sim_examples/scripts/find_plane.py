@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How high the table is, and what stands on it, by the points of a depth camera.
 
-Prints the table's height in `base` [m], its tilt [degrees], and how many of the points stand on it. Parameter: ~points:
-the camera's topic, the Kinect's by default.
+Prints the table's height in `base` [m], its tilt [degrees], and how many of the points stand on it. Parameter:
+~points: the camera's topic, the Kinect's by default.
 """
+import argparse
 import math
 import sys
 
@@ -40,4 +41,6 @@ def look():
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_known_args()
     sys.exit(run("find_plane", look, anonymous=True))

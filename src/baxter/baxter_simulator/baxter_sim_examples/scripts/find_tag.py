@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where tags are (AprilTag 36h11): find_tag.py SIDE, the side of their black border [m].
+"""Where tags are (AprilTag 36h11).
 
-Prints x y z [m] and the quaternion x y z w of each tag's frame in `base`: x to its right, y to its upper edge, z out of
-it. Parameters: ~image, ~info: the camera's topics, the Kinect's by default.
+Prints x y z [m] and the quaternion x y z w of each tag's frame in `base`: x to its right, y to its upper edge,
+z out of it. Parameters: ~image, ~info: the camera's topics, the Kinect's by default.
 """
+import argparse
 import sys
 
 import rospy
@@ -26,13 +27,11 @@ def look(side_m):
 
 
 def main():
-    words = rospy.myargv()[1:]
-    try:
-        side_m = float(words[0]) if len(words) == 1 else 0.0
-    except ValueError:
-        side_m = 0.0
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("side", type=float, metavar="SIDE", help="of the tags' black border [m], 0.12 for instance")
+    side_m = parser.parse_args(rospy.myargv()[1:]).side
     if not 0.0 < side_m < 10.0:
-        return "usage: find_tag.py SIDE, the side of the tags' black border [m], 0.12 for instance"
+        parser.error("SIDE is more than 0 and less than 10 m, got %g" % side_m)
     return run("find_tag", lambda: look(side_m), anonymous=True)
 
 

@@ -5,6 +5,7 @@
 Parameters: ~rounds: how many ways, 0 for ever; ~seed: decides where the block lies, its mass and its friction;
 ~looking: the arm is not told where the block lies, but looks with the camera of its hand, and feels for the table.
 """
+import argparse
 import itertools
 import sys
 from dataclasses import replace
@@ -105,4 +106,6 @@ def demo():
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_known_args()
     sys.exit(run("ik_pick_and_place_demo", demo))

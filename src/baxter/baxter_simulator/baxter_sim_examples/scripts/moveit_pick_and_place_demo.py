@@ -4,6 +4,7 @@
 
 Parameters: ~trials: how many seeds are tried, 0 for ever; ~seed: the first of them. It fails if one of them does.
 """
+import argparse
 import itertools
 import sys
 
@@ -32,4 +33,6 @@ def demo():
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_known_args()
     sys.exit(run("moveit_pick_and_place_demo", demo))

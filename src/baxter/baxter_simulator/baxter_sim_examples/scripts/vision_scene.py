@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Puts a table with coloured blocks and a board with a tag in front of the robot, and ends."""
+"""Puts a table with coloured blocks and a board with a tag in front of the robot, and ends. Calls the services of
+/gazebo."""
+import argparse
 import sys
 from pathlib import Path
 
@@ -33,4 +35,6 @@ def build():
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_known_args()
     sys.exit(run("vision_scene", build))

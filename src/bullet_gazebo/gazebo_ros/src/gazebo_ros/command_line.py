@@ -2,6 +2,16 @@
 """The command line of gzserver, as people's launch files write it into ``args``. ROS-free."""
 import argparse
 
+_DESCRIPTION = """The simulator: physics, /clock and the services under /gazebo.
+
+Publishes: /clock, ~model_states, ~link_states, ~contacts, ~parameter_updates, /diagnostics, and what the models'
+plugins publish.
+Subscribes: ~set_model_state, ~set_link_state, ~drag, and what the plugins subscribe to.
+Services: ~spawn_urdf_model, ~spawn_sdf_model, ~delete_model, ~get_model_state, ~set_model_state, ~pause_physics,
+~unpause_physics, ~reset_world, ~advance and others; rosservice list /gazebo shows them all.
+Parameters: ~world_name, ~paused, ~seed, ~clock_rate [Hz], ~real_time_factor (0: as fast as possible), ~model_plugins (a
+table of further plugins). It sets ~snapshot and, where it is not set, /use_sim_time.
+"""
 # Options of Gazebo's gzserver: those with a value, and switches that can be ignored without a warning.
 _WITHOUT_EFFECT = (
     (("-s", "--server-plugin"), True), (("-g", "--gui-plugin"), True), (("-e", "--physics"), True),
@@ -20,16 +30,18 @@ class CommandLine:
 
         Raises ``ValueError`` that says what is wrong.
         """
-        parser = _Parser(add_help=False, allow_abbrev=False)
-        parser.add_argument("world_name", nargs="?")
-        parser.add_argument("-u", "--pause", action="store_true")
-        parser.add_argument("--seed", type=int)
-        parser.add_argument("--verbose", action="store_true")
+        parser = _Parser(description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter,
+                         allow_abbrev=False, epilog="Gazebo's other options are accepted, without effect.")
+        parser.add_argument("world_name", nargs="?", help="a world file (SDF); default: the parameter's")
+        parser.add_argument("-u", "--pause", action="store_true", help="start paused")
+        parser.add_argument("--seed", type=int, help="seed of the world's random numbers")
+        parser.add_argument("--verbose", action="store_true", help=argparse.SUPPRESS)
         # Of empty_world.launch, which starts the renderer as a node, or not at all. No parameter: that would stay on
         # the master.
-        parser.add_argument("--no-renderer", action="store_true")
+        parser.add_argument("--no-renderer", action="store_true", help="start no sensor_renderer for the first camera")
         for names, takes_value in _WITHOUT_EFFECT:
-            parser.add_argument(*names, dest=names[-1], action="append" if takes_value else "store_true")
+            parser.add_argument(*names, dest=names[-1], action="append" if takes_value else "store_true",
+                                help=argparse.SUPPRESS)
         options, unknown = parser.parse_known_args(arguments)
         self.world_name = options.world_name
         self.paused = options.pause

@@ -29,6 +29,21 @@ from rospy_start import MissingParameter, end_on_signals, wait_for_param
 # Wall time to wait for the robot's model [s].
 _DESCRIPTION_TIMEOUT_S = 60.0
 
+_DESCRIPTION = """Plan and execute motions behind MoveIt's interface.
+
+Actions: move_group, execute_trajectory, pickup, place, sequence_move_group.
+Services: plan_kinematic_path, compute_ik, compute_fk, compute_cartesian_path, check_state_validity,
+get_planning_scene, apply_planning_scene, clear_octomap, query_planner_interface, get_planner_params,
+set_planner_params, plan_sequence_path, execute_kinematic_path, ~save_map, ~load_map; by the capabilities.
+Subscribes: joint_states, planning_scene, collision_object, attached_collision_object, planning_scene_world,
+trajectory_execution_event, and the sensors' topics. Publishes: ~monitored_planning_scene, ~display_planned_path,
+~display_contacts, ~display_octomap, ~display_grasp_markers, ~failures.
+Parameters: ~robot_description (the name of the URDF's), ~controller_list, ~moveit_controller_manager,
+~ros_control_namespace, ~initial, ~allow_trajectory_execution, ~planning_pipelines, ~default_planning_pipeline,
+~capabilities, ~disable_capabilities, ~sensors, ~octomap_frame, ~octomap_resolution [m], ~max_range [m],
+~trajectory_execution/..., ~plan_execution/..., ~planning_scene_monitor/..., ~planning_scene_monitor_options/...
+"""
+
 
 def build():
     """Return what has to be kept alive. Raises PlanningError, MissingParameter."""
@@ -104,7 +119,7 @@ def _capabilities(context, wanted, description, may_execute):
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Plan and execute motions behind MoveIt's interface.")
+    parser = argparse.ArgumentParser(description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--debug", action="store_true", help="log more")
     options = parser.parse_args(rospy.myargv()[1:])
     end_on_signals()

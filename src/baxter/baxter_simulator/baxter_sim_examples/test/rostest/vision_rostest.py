@@ -109,11 +109,11 @@ class VisionTest(unittest.TestCase):
         self.assert_tag_is_found(0.003, 0.5)
 
     def test_d_what_is_not_there_is_said(self):
-        for words, text in ((("find_colour.py", "yellow"), "no yellow block is in the picture"),
-                            (("find_colour.py", "pink"), "usage: find_colour.py red | yellow | green | blue"),
-                            (("find_tag.py",), "usage: find_tag.py SIDE")):
+        for words, wrong, text in ((("find_colour.py", "yellow"), 1, "no yellow block is in the picture"),
+                                   (("find_colour.py", "pink"), 2, "'red', 'yellow', 'green', 'blue'"),
+                                   (("find_tag.py",), 2, "SIDE")):
             status, output = said(*words)
-            self.assertEqual(status, 1, output)
+            self.assertEqual(status, wrong, output)
             self.assertIn(text, output)
             self.assertNotIn("Traceback", output)
 
