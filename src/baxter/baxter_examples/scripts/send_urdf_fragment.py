@@ -11,15 +11,19 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface.programs import ProgramFailed, run
+from lab_environment.user_files import PIPE_WAIT_S, read_text
 
 RATE_HZ = 5.0
+# Of a fragment; a whole robot has less.
+MOST_BYTES = 4_000_000
 
 
 def send(path, link, joint):
-    with open(path, encoding="utf-8") as stream:
-        text = stream.read()
     try:
+        text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
         ElementTree.fromstring(text)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProgramFailed("%s cannot be read: %s" % (path, getattr(error, "strerror", error))) from error
     except ElementTree.ParseError as error:
         raise ProgramFailed("%s is not XML: %s" % (path, error)) from error
     publisher = rospy.Publisher("/robot/urdf", URDFConfiguration, queue_size=10)

@@ -6,6 +6,7 @@ import sys
 
 import cv2
 import cv_bridge
+import numpy as np
 import rospy
 from sensor_msgs.msg import Image
 
@@ -14,16 +15,23 @@ from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed, run
 from lab_environment.options import MOST_SECONDS, number
+from lab_environment.user_files import PIPE_WAIT_S, check_picture, read_file
 
 # A latched picture disappears with its publisher: time for new subscribers to receive it [s].
 HAND_OVER_S = 1.0
+# Of a picture; the screen has 614,400 pixels.
+MOST_BYTES, MOST_PIXELS = 100_000_000, 64_000_000
 
 
 def show(path, delay_s):
-    picture = cv2.imread(str(path))
+    try:
+        content = read_file(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
+        check_picture(content, MOST_PIXELS)
+    except OSError as error:
+        raise ProgramFailed("%s: %s" % (path, error.strerror)) from error
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
-        raise ProgramFailed("%s: %s" % (path, "this is not a picture that OpenCV reads" if path.is_file()
-                                        else "there is no such file"))
+        raise ProgramFailed("%s: this is not a picture that OpenCV reads" % path)
     publisher = rospy.Publisher("/robot/xdisplay", Image, latch=True, queue_size=1)
     RosClock().sleep(delay_s)
     startup.wait_for_subscribers(publisher)

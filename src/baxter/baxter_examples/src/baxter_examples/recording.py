@@ -5,11 +5,15 @@ The first line names the columns: time [s], then for each side its joints [rad] 
 """
 import bisect
 import csv
+import io
 import math
 
 from baxter_interface.joint_checks import limb_joint_names
 from baxter_model import SIDES
+from lab_environment.user_files import PIPE_WAIT_S, read_text
 
+#: An hour of both arms at 100 Hz has a quarter of it.
+MOST_BYTES = 200_000_000
 COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side), side + "_gripper"))]
 
 
@@ -58,8 +62,11 @@ def write_row(stream, values):
 
 def read(path):
     """Read a recording. Raises BadRecording, OSError."""
-    with open(path, newline="", encoding="utf-8") as stream:
-        return parse(stream, path)
+    try:
+        text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
+    except UnicodeDecodeError as error:
+        raise BadRecording("%s is no text: %s" % (path, error)) from None
+    return parse(io.StringIO(text, newline=""), path)
 
 
 def parse(stream, path):

@@ -40,7 +40,6 @@ def test_values_between_and_beyond_the_rows(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "says"), [
-    ("", "first line must name the columns"),
     ("left_s0\n1\n", "first line must name the columns"),
     ("time,left_s9\n", "found left_s9"),
     ("time\n1\n", "found none"),
@@ -53,3 +52,12 @@ def test_values_between_and_beyond_the_rows(tmp_path):
 def test_bad_file_is_refused_with_its_line(tmp_path, text, says):
     with pytest.raises(BadRecording, match=says):
         recording.read(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(("make", "says"), [
+    (lambda path: path.symlink_to("/dev/zero"), "a device"), (lambda path: path.touch(), "empty"),
+    (lambda path: path.mkdir(), "directory|folder")])
+def test_what_is_no_file_is_not_waited_for(tmp_path, make, says):
+    make(tmp_path / "motion.csv")
+    with pytest.raises(OSError, match=says):
+        recording.read(tmp_path / "motion.csv")

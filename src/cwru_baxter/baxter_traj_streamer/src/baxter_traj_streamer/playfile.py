@@ -5,11 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lab_environment.user_files import PIPE_WAIT_S, read_text
+
 from .errors import GoalRefused
 from .judging import judge
 from .settings import JOINTS, arm_joint_names
 from .timing import arrival_times
 
+#: Of a playfile; the notes' have some kilobytes.
+MOST_BYTES = 100_000_000
 _COLUMNS = len(JOINTS) + 1
 
 
@@ -30,7 +34,7 @@ class Playfile(NamedTuple):
     def read(cls, path):
         """Read a file. Raises PlayfileError, OSError."""
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
         except UnicodeDecodeError as error:
             raise PlayfileError("%s is not a text: %s" % (path, error)) from error
         return cls.parse(text, str(path))

@@ -8,6 +8,7 @@ command line may take a pipe too, as in `spawn_model -file <(xacro robot.xacro)`
 from __future__ import annotations
 
 import errno
+import io
 import os
 import select
 import stat
@@ -47,6 +48,22 @@ def read_text(path: str | os.PathLike, most_bytes: int, *, pipe_wait_s: float = 
 def check_file(path: str | os.PathLike, most_bytes: int) -> None:
     """For a library that opens the file itself: raises OSError where `read_file` would, but reads nothing."""
     _check(os.stat(path), path, most_bytes)
+
+
+def check_picture(content: bytes, most_pixels: int) -> None:
+    """Raise OSError unless ``content`` is a picture of at most ``most_pixels``, by its header alone: some kilobytes may
+    unpack to gigabytes in the library that reads it next."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(content)) as picture:
+            width, height = picture.size
+    except (UnidentifiedImageError, SyntaxError, ValueError):
+        raise OSError(errno.EINVAL, "it is no picture in a format that is read") from None
+    except Image.DecompressionBombError:
+        raise OSError(errno.EFBIG, "it has more pixels than expected, at most %d" % most_pixels) from None
+    if width * height > most_pixels:
+        raise OSError(errno.EFBIG, "it has %d x %d pixels, expected at most %d" % (width, height, most_pixels))
 
 
 def kind_of(mode: int) -> str:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
+import struct
 import threading
+import zlib
 
 import pytest
 
-from lab_environment.user_files import check_file, read_file, read_text
+from lab_environment.user_files import check_file, check_picture, read_file, read_text
 
 
 @pytest.mark.parametrize("make, message", [
@@ -77,3 +79,21 @@ def test_a_pipe_without_an_end_is_given_up(tmp_path):
         end.write(b"a" * 11)
         with pytest.raises(OSError, match="expected at most 10"):
             read_file(tmp_path / "pipe", 10, pipe_wait_s=60.0)
+
+
+def png(width, height):
+    """A grey PNG of that size, all black, which is a thousandth of its pixels."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)) + chunk(
+        b"IDAT", zlib.compress(b"\0" * (width + 1) * min(height, 10))) + chunk(b"IEND", b"")
+
+
+def test_a_picture_is_checked_before_it_is_unpacked():
+    check_picture(png(10, 10), 100)
+    with pytest.raises(OSError, match="11 x 10 pixels, expected at most 100"):
+        check_picture(png(11, 10), 100)
+    with pytest.raises(OSError, match="at most 100"):
+        check_picture(png(100_000, 100_000), 100)
+    with pytest.raises(OSError, match="no picture"):
+        check_picture(b"anything else", 100)

@@ -7,6 +7,8 @@ from pathlib import Path
 import rosgraph
 from geometry_msgs.msg import PoseStamped
 
+from urdf_model import bounds, read_text
+
 from .conversions import list_to_pose
 from .exception import MoveItCommanderException
 from .planning_scene_interface import PlanningSceneInterface
@@ -187,7 +189,7 @@ class MoveGroupCommandInterpreter:
         if not path.exists() and (Path("cmd") / path).is_file():
             path = Path("cmd") / path
         answers = []
-        for line in path.read_text(encoding="utf-8").splitlines():
+        for line in read_text(path, bounds.DESCRIPTION_BYTES).splitlines():
             level, answer = self.execute(line)
             if self._trace and line.strip():
                 answers.append(line)

@@ -17,6 +17,7 @@ from motion_planning.errors import PlanningError
 from motion_planning.occupancy import Mask, OccupancyMap, View
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
+from urdf_model import read_file
 
 # Defaults [m]: size of cells, and range of a sensor.
 _RESOLUTION_M, _MAX_RANGE_M = 0.1, 5.0
@@ -164,11 +165,7 @@ class Sensors:
     def _load(self, request):
         """The cubes of the file take the place of those of the map, in ``~octomap_frame``."""
         try:
-            with open(request.filename, "rb") as file:
-                content = file.read(_LONGEST_FILE + 1)
-            if len(content) > _LONGEST_FILE:
-                raise ValueError("it is longer than %d bytes" % _LONGEST_FILE)
-            octree = octree_of_file(content)
+            octree = octree_of_file(read_file(request.filename, _LONGEST_FILE))
             frame = self._pose(self._frame, self._monitor.scene(), rospy.Time())
             with self._lock:
                 self._map.take(octree)

@@ -20,6 +20,7 @@ from controller_manager_msgs.srv import (
 from std_msgs.msg import Bool
 
 from rospy_limits.node import limit_ports
+from urdf_model import bounds, read_text
 
 # Polling period, and how long a signal may wait [wall s].
 _POLL_S, _WAKE_S = 0.1, 0.5
@@ -145,9 +146,8 @@ class ControllerLifetime:
                 names.append(argument)
                 continue
             try:
-                with open(argument, encoding="utf-8") as file:
-                    content = yaml.safe_load(file)
-            except (OSError, yaml.YAMLError) as error:
+                content = yaml.safe_load(read_text(argument, bounds.DESCRIPTION_BYTES))
+            except (OSError, ValueError, yaml.YAMLError) as error:
                 raise NotThere("%s cannot be read as YAML: %s" % (argument, " ".join(str(error).split()))) from error
             if not isinstance(content, dict) or not content:
                 raise NotThere("%s has no controllers: expected a mapping of names to parameters" % argument)

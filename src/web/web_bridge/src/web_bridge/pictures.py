@@ -11,12 +11,15 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from lab_environment.user_files import check_picture
 from web_bridge.errors import BridgeError
 
 #: Quality of a JPEG, 0 to 100, and compression of a PNG, 0 to 9, where a client does not say them.
 JPEG_QUALITY, PNG_COMPRESSION = 95, 3
 #: Forms in which one image is kept: each may have 50 MB, and clients may ask for any number of sizes.
 MOST_FORMS = 8
+#: Of a compressed image, which may be a thousandth of its pixels.
+MOST_PIXELS = 64_000_000
 _MACHINE_IS_BIG_ENDIAN = sys.byteorder == "big"
 #: Encoding -> (bits of a channel, channels, conversion to OpenCV's order of colours or None).
 _COLOURS = {
@@ -105,7 +108,14 @@ def decoded(message):
     Distances and other numbers (16UC1, 32FC1) become grey, the largest one white.
     """
     if not hasattr(message, "encoding"):
-        pixels = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED) if message.data else None
+        pixels = None
+        if message.data:
+            try:
+                check_picture(bytes(message.data), MOST_PIXELS)
+            except OSError as error:
+                raise PictureError("its %d bytes of format %r are not shown: %s" % (
+                    len(message.data), message.format, error.strerror)) from None
+            pixels = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
         if pixels is None:
             raise PictureError("its %d bytes of format %r are no JPEG or PNG" % (len(message.data), message.format))
         return _scaled(pixels) if pixels.dtype != np.uint8 else pixels

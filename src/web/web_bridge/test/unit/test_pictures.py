@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import asyncio
+import struct
 import threading
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -15,6 +17,12 @@ pytestmark = pytest.mark.once
 
 # Red, green above blue, white; wide enough that a Bayer pattern and a pair of pixels share a colour.
 RED, GREEN, BLUE, WHITE = (0, 0, 255), (0, 255, 0), (255, 0, 0), (255, 255, 255)
+
+# A PNG that says it has 30000 x 30000 pixels, 2.7 GB in colour.
+HUGE = bytearray(cv2.imencode(".png", np.zeros((10, 10), np.uint8))[1].tobytes())
+HUGE[16:24] = struct.pack(">II", 30000, 30000)
+HUGE[29:33] = struct.pack(">I", zlib.crc32(HUGE[12:29]))
+HUGE = bytes(HUGE)
 
 
 def scene(height=16, width=24):
@@ -114,6 +122,7 @@ def test_a_compressed_image_is_read():
     (Image(height=1, width=1, encoding="", step=3, data=bytes(3)), "'' is not known"),
     (Image(height=1, width=1, encoding="8UC2", step=2, data=bytes(2)), "two channels"),
     (CompressedImage(format="jpeg", data=b"no picture"), "10 bytes of format 'jpeg'"),
+    (CompressedImage(format="png", data=HUGE), "at most 64000000"),
     (CompressedImage(format="jpeg"), "0 bytes")])
 def test_what_cannot_be_shown_is_named(bad, text):
     with pytest.raises(PictureError) as caught:

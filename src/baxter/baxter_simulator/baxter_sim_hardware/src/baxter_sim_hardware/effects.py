@@ -9,6 +9,8 @@ import numpy as np
 import rospkg
 import yaml
 
+from urdf_model import bounds, read_text
+
 from .errors import HardwareError
 
 NAMES = ("lag", "noise", "safety", "delay", "states", "uncalibrated")
@@ -43,8 +45,8 @@ def read(path):
     Raises HardwareError for what is missing or no number.
     """
     try:
-        table = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
+        table = yaml.safe_load(read_text(path, bounds.DESCRIPTION_BYTES))
+    except (OSError, ValueError, yaml.YAMLError) as error:
         raise HardwareError("%s cannot be read: %s" % (path, error)) from error
     found = {}
     for effect in SECTIONS:

@@ -25,6 +25,10 @@ from baxter_sim_kinematics.reach_map import ReachMap, overlap
 from baxter_sim_kinematics.reach_places import Region, best_places, nearest_rotations, table_poses
 from baxter_sim_kinematics.target import pose_from_quaternion
 from lab_environment.options import MOST_WORKERS, number
+from lab_environment.user_files import PIPE_WAIT_S, read_text
+
+# Of a file of poses.
+MOST_BYTES = 100_000_000
 
 
 def _reach_parser():
@@ -226,7 +230,7 @@ def _is_solved(chain, pose, checker):
 
 def _task_poses(path):
     poses = []
-    for row, line in enumerate(path.read_text().splitlines(), 1):
+    for row, line in enumerate(read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines(), 1):
         words = line.replace(",", " ").replace(";", " ").split()
         if not words or words[0].startswith("#"):
             continue

@@ -11,10 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from baxter_sim_kinematics.reach import ReachError
+from lab_environment.user_files import check_file
 from urdf_model.transforms import quaternion_from_matrix
 
 # Rows that are written to HDF5 at a time.
 _ROWS = 65536
+# Of a map in a file; the largest that reach makes has a tenth of it.
+MOST_BYTES = 2_000_000_000
 # A capability map has a cone for a cell with at most this share of its orientations, and a sphere for one with more.
 _MOST_IN_CONE = 0.2
 # Reuleaux's measures of a cone: its opening angle is pi divided by one of these.
@@ -71,6 +74,7 @@ class ReachMap:
         """Return the map in ``path``: reach.npz, or the folder that holds it. Raises ReachError, OSError."""
         path = Path(path)
         path = path / "reach.npz" if path.is_dir() else path
+        check_file(path, MOST_BYTES)
         try:
             with np.load(path) as data:
                 missing = [name for name in _REQUIRED if name not in data]
