@@ -28,13 +28,13 @@ class FakeLab:
     def __init__(self):
         self.served = []
         self.left = []
-        self.beats = 0
+        self.beats = []
 
     def serve(self, client, may_act, operation):
         self.served.append((client, may_act, operation))
 
-    def beat(self, client):
-        self.beats += 1
+    def beat(self, client, page_answers=True):
+        self.beats.append(page_answers)
 
     def gone(self, client):
         self.left.append(client)
@@ -131,10 +131,11 @@ def test_a_page_learns_what_it_may_do_and_its_operations_arrive(server, token, m
     assert until(socket, lambda operation: operation["op"] == "control") == {
         "op": "control", "mine": False, "free": True, "pages": 1}
     socket.send("beat")
+    socket.send("busy")
     socket.send('{"op": "stop"}')
     wait_until(lambda: server.pages.lab.served, "the operation")
     (client, acts, operation), = server.pages.lab.served
-    assert (acts, operation, server.pages.lab.beats) == (may_act, {"op": "stop"}, 1)
+    assert (acts, operation, server.pages.lab.beats) == (may_act, {"op": "stop"}, [True, False])
     server.pages.lab.holder = client
     server.pages.control_changed()
     assert until(socket, lambda operation: operation["op"] == "control" and operation["mine"])
@@ -171,6 +172,17 @@ def upload(server, token, content, origin=None, path="screen", page="7"):
 def test_a_number_that_no_page_has_is_no_fault_of_the_server(server, page):
     assert upload(server, "drive", b"x", page=page) == 204
     assert [client for client, *_ in server.pages.lab.served] == [0]
+
+
+def test_a_request_that_fails_leaves_no_token_in_the_log(server, caplog):
+    def serve(*_):
+        raise RuntimeError("at /screen?token=drive")
+    server.pages.lab.serve = serve
+    for page, status in (("7", 500), ("%ff", 400)):
+        with pytest.raises(urllib.error.HTTPError, match=str(status)) as caught:
+            upload(server, "drive", b"x", page=page)
+        assert "drive" not in caught.value.read().decode()
+    assert "RuntimeError" in caplog.text and "/screen?token=…" in caplog.text and "drive" not in caplog.text
 
 
 def test_a_picture_for_the_screen_is_an_operation_of_its_page(server):

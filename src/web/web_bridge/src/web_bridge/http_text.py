@@ -18,8 +18,8 @@ _ANSWER = frozenset((
 _NOT_PASSED = frozenset((
     "Connection", "Content-Length", "Cookie", "Expect", "Forwarded", "Host", "Keep-Alive", "Origin",
     "Proxy-Authorization", "Proxy-Connection", "Referer", "Te", "Trailer", "Transfer-Encoding", "Upgrade"))
-# A masked frame of a client's WebSocket: its first byte, and the second one with the length. The page's heartbeat is
-# the text "beat" (4 bytes); browsers answer pings by pongs.
+# A masked frame of a client's WebSocket: its first byte, and the second one with the length. The page's heartbeats are
+# the texts "beat" and "busy" (4 bytes); browsers answer pings by pongs.
 _MASK_BYTES, _TEXT, _PONG, _BEAT_LENGTH, _MASKED = 4, 0x81, 0x8A, 4, 0x80
 #: An answer's head may have this size [bytes].
 LARGEST_HEAD = 65536

@@ -4,6 +4,8 @@ import ssl
 
 from tornado import httpserver, netutil
 
+from web_bridge.access import hide_in_logs
+
 #: Connections that are no WebSocket: streams of cameras, files, clients that have not asked for anything yet. They need
 #: no token, so their number and their memory are limited.
 MOST_CONNECTIONS = 700
@@ -42,6 +44,7 @@ class LimitedServer(httpserver.HTTPServer):
 
     def initialize(self, *args, **kwargs):
         super().initialize(*args, **kwargs)
+        hide_in_logs()
         self._streams = {}  # the oldest first
 
     def handle_stream(self, stream, address):
