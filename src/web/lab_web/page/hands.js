@@ -58,7 +58,7 @@ export class Hands {
   // All hands that are shown, together.
   go() {
     const shown = [...this.hands.values()].filter((hand) => hand.shown && hand.reaches);
-    this.send(this.plans.choose({op: "move", joints: Object.assign({}, ...shown.map((hand) => hand.joints))}));
+    this.send(this.plans.choose({op: "go", joints: Object.assign({}, ...shown.map((hand) => hand.joints))}));
   }
 
   answered(answer) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The lab's page: connects what the server sends to what is on the screen.
+import {Camera} from "./camera.js";
 import {Controls} from "./controls.js";
 import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
@@ -44,6 +45,7 @@ const comparison = new Interface(send);
 const notebook = new Notebook(send, query);
 const simulation = new Simulation(send, () => view);
 const overlay = new Overlay(send, () => view);
+const camera = new Camera(() => ({paused: simulation.paused, factor: state.factor}));
 let robot = {};
 let noteTimer = 0;
 let noted = null;
@@ -129,7 +131,7 @@ const served = {
   robot(described) {
     robot = described;
     buildPanels();
-    buildCameras();
+    camera.build(robot.cameras ?? []);
     sayOfView();
     refresh();
   },
@@ -137,6 +139,9 @@ const served = {
     panel.settle();
     plans.answered(null);
     note(code, detail);
+  },
+  rested() {
+    panel.rested();
   },
   simulation(is) {
     simulation.show(is);
@@ -219,16 +224,6 @@ function buildPanels() {
   simulation.build(robot);
 }
 
-function buildCameras() {
-  const chosen = byId("camera").value;
-  const options = (robot.cameras ?? []).map((topic) => element("option", {
-    value: topic, textContent: topic.replace(/^\/cameras\//, "").replace(/\/(image|image_raw)?\/?compressed$/, "")}));
-  byId("camera").replaceChildren(element("option", {value: "", textContent: text("camera_off")}), ...options);
-  byId("camera").value = chosen;
-  if (byId("camera").value !== chosen) byId("camera").value = "";
-  if (byId("picture-said").textContent) byId("picture-said").textContent = text("picture_awaited");
-}
-
 function startTopics() {
   const topics = new Topics(`${sockets}rosbridge${query}`);
   topics.subscribe("/robot/state", "baxter_core_msgs/AssemblyState", 100, 1, (message) => {
@@ -254,21 +249,7 @@ function startTopics() {
     if (wasAtEnd) log.scrollTop = log.scrollHeight;
   });
   controls.start(topics);
-  let camera = "";
-  byId("camera").onchange = () => {
-    if (camera) topics.unsubscribe(camera);
-    camera = byId("camera").value;
-    byId("picture").hidden = true;
-    byId("picture-said").textContent = camera ? text("picture_awaited") : "";
-    if (!camera) return;
-    const topic = camera;
-    byId("picture").alt = text("picture_of", {topic});
-    topics.subscribe(topic, "sensor_msgs/CompressedImage", 66, 1, ({format, data}) => {
-      byId("picture").src = `data:image/${format.includes("png") ? "png" : "jpeg"};base64,${data}`;
-      byId("picture").hidden = false;
-      byId("picture-said").textContent = "";
-    });
-  };
+  camera.start(topics);
 }
 
 function paintView() {
@@ -283,7 +264,7 @@ function startChoices(language) {
     localStorage.setItem("language", byId("language").value);
     await load(byId("language").value);
     buildPanels();
-    buildCameras();
+    camera.build(robot.cameras ?? []);
     exercises.refresh();
     comparison.refresh();
     notebook.refresh();
@@ -339,7 +320,9 @@ sayOfView();
 refresh();
 worker.onmessage = ({data}) => served[data.op]?.(data);
 send({address: `${sockets}lab${query}`});
-setInterval(() => send({}), ALIVE_MS);
+const sayAlive = () => send({visible: !document.hidden});
+setInterval(sayAlive, ALIVE_MS);
+document.addEventListener("visibilitychange", sayAlive);
 startTopics();
 // For the console, and for tests.
 globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, served};

@@ -6,6 +6,8 @@ import {has, text} from "./texts.js";
 const ARRIVED_RAD = 0.02;
 // Between two targets of a slider that is being dragged.
 const SEND_MS = 50;
+// A slider that was moved within this time is still in somebody's hand.
+const HELD_MS = 300;
 
 export function element(name, properties = {}, ...children) {
   const made = Object.assign(document.createElement(name), properties);
@@ -22,6 +24,7 @@ export class Panel {
     this.wanted = new Map();
     this.unsent = {};
     this.timer = 0;
+    this.touched = 0;
     this.enabled = false;
   }
 
@@ -53,6 +56,7 @@ export class Panel {
     input.setAttribute("aria-label", name);
     input.oninput = () => {
       const target = Math.min(upper, Math.max(lower, input.valueAsNumber));
+      this.touched = performance.now();
       this.wanted.set(name, target);
       this.unsent[name] = target;
       output.textContent = shown(target);
@@ -77,6 +81,11 @@ export class Panel {
   settle() {
     this.wanted.clear();
     this.unsent = {};
+  }
+
+  // The motion is over, wherever the joints are.
+  rested() {
+    setTimeout(() => { if (performance.now() - this.touched >= HELD_MS) this.settle(); }, HELD_MS);
   }
 
   // Positions by joint [rad].

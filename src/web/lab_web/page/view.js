@@ -130,7 +130,10 @@ export class View {
   }
 
   makeGhost(name, numbers, dragged) {
-    const material = new THREE.MeshLambertMaterial({transparent: true, opacity: GHOST_OPACITY, depthWrite: false});
+    // Nearer by an offset than it is: a ghost that lies on its arm would otherwise be seen in patches that flicker.
+    const material = new THREE.MeshLambertMaterial({
+      transparent: true, opacity: GHOST_OPACITY, depthWrite: false, polygonOffset: true, polygonOffsetFactor: -1,
+      polygonOffsetUnits: -4});
     const [group, base, hand] = [new THREE.Group(), new THREE.Group(), new THREE.Group()];
     const links = new Map(numbers.map((number) => {
       const link = new THREE.Group();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The page's connection to the server, in a thread of the browser that drawing does not hold up.
-// Heartbeats say that the page is there: they end when the page itself has not answered for a while.
+// Heartbeats say that the page is there. While the page itself does not answer, others say that its browser is: they hold
+// a motion of one click, and no stream, for as long as the server allows. A page that nobody sees sends none.
 const PAGE_SILENCE_MS = 500;
 const RETRY_MS = 1000;
 
@@ -8,6 +9,8 @@ let socket = null;
 let address = "";
 let timer = 0;
 let seen = performance.now();
+let visible = true;
+let hangs = 0;
 
 function connect() {
   socket = new WebSocket(address);
@@ -22,6 +25,7 @@ function connect() {
     if (operation.op === "hello") {
       clearInterval(timer);
       timer = setInterval(beat, operation.heartbeat_ms);
+      hangs = operation.hangs_ms;
     }
     postMessage(operation);
   };
@@ -33,11 +37,14 @@ function connect() {
 }
 
 function beat() {
-  if (performance.now() - seen < PAGE_SILENCE_MS && socket.readyState === WebSocket.OPEN) socket.send("beat");
+  const silent = performance.now() - seen;
+  if (!visible || silent >= hangs || socket.readyState !== WebSocket.OPEN) return;
+  socket.send(silent < PAGE_SILENCE_MS ? "beat" : "busy");
 }
 
 onmessage = ({data}) => {
   seen = performance.now();
+  if (data.visible !== undefined) visible = data.visible;
   if (data.address) {
     address = data.address;
     connect();

@@ -3,8 +3,14 @@
 
 #: Period of a page's heartbeats [s]; the page gets it from here.
 HEARTBEAT_S = 0.04
-#: Silence after which the arms are stopped [s]. With the period of the commands it stays below 0.2 s.
+#: Silence of a page after which what it streams or holds ends [s]: sliders, buttons. With the period of commands it
+#: stays below 0.2 s.
 SILENCE_S = 0.15
+#: Silence of the page's connection after which a motion of one click ends [s]: on a busy machine a browser may be
+#: silent that long. Such a motion is slow, and ends by itself where the click said.
+CONNECTION_SILENCE_S = 1.0
+#: How long the connection of a page speaks for a page that does not answer [s]; the page gets it from here.
+PAGE_HANGS_S = 2.0
 
 
 class NotInControl(Exception):
@@ -20,14 +26,14 @@ class Control:
 
     def __init__(self, silence_s=SILENCE_S):
         self._silence_s = silence_s
-        self._heard_s = 0.0
+        self._heard_s = self._connected_s = 0.0
         #: The client that holds the control, or None.
         self.holder = None
 
     def take(self, client, now_s):
         """Make ``client`` the holder; returns whether that changed anything."""
         changed = self.holder != client
-        self.holder, self._heard_s = client, now_s
+        self.holder, self._heard_s, self._connected_s = client, now_s, now_s
         return changed
 
     def release(self, client):
@@ -37,18 +43,26 @@ class Control:
         self.holder = None
         return True
 
-    def beat(self, client, now_s):
-        """A heartbeat of ``client`` has come."""
+    def beat(self, client, now_s, page_answers=True):
+        """A heartbeat of ``client`` has come; of its connection alone where the page does not answer."""
         if self.holder == client:
-            self._heard_s = now_s
+            self._connected_s = now_s
+            if page_answers:
+                self._heard_s = now_s
 
     def is_alive(self, now_s):
         """Is there a holder, and has its page been heard recently?"""
         return self.holder is not None and now_s - self._heard_s <= self._silence_s
 
-    def check(self, client, now_s):
-        """Raise NotInControl unless ``client`` holds the control and its page is alive."""
+    def is_connected(self, now_s):
+        """Is there a holder, and has its connection been heard recently enough for a motion of one click?"""
+        return self.holder is not None and now_s - self._connected_s <= max(self._silence_s, CONNECTION_SILENCE_S)
+
+    def check(self, client, now_s, is_stream=True):
+        """Raise NotInControl unless ``client`` holds the control and its page is alive, or, for a motion of one click,
+        connected.
+        """
         if self.holder != client:
             raise NotInControl("not_in_control", "this page does not have the control; press \"Take control\" first")
-        if not self.is_alive(now_s):
-            raise NotInControl("page_silent", "no sign of life of this page for %g s; try again" % self._silence_s)
+        if not (self.is_alive(now_s) if is_stream else self.is_connected(now_s)):
+            raise NotInControl("page_silent", "no sign of life of this page; try again")

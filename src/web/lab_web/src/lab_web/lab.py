@@ -2,7 +2,8 @@
 """What pages may do with the robot: one holds the control, everybody may stop. No ROS: the robot is an argument, with
 
 - ``limits``: {joint: motion.Limits}, empty until the robot is known; ``poses``: {name: {joint: angle [rad]}}
-- ``measured()``: {joint: position [rad]}; ``why_not_ready()``: "" or a sentence
+- ``measured()``: {joint: position [rad]}, of ``time_s`` in the robot's time; ``why_not_ready()``: "" or a sentence
+- ``explain(joint, tell)``: calls ``tell(sentence)`` soon, on any thread: what keeps a joint from moving
 - ``command(setpoints)``: {joint: [rad], of a recording also SIDE_gripper: [%]}; ``stop()``, ``enable()``,
   ``disable()``, ``grip(side, action)``: do not wait, and raise RobotError
 """
@@ -11,7 +12,7 @@ import threading
 import time
 
 from lab_web.control import SILENCE_S, Control, NotInControl
-from lab_web.motion import Motion, MotionError, held
+from lab_web.motion import Motion, MotionError, Standstill, held
 
 #: Period of commands to the robot while it moves [s].
 TICK_S = 0.01
@@ -25,17 +26,22 @@ class RobotError(Exception):
 
 class Lab:
     """All pages share one. Operations come from any thread; ``changed()`` is called after the control has changed,
-    ``told(client, code, text)`` tells one page (None: all) something.
+    ``told(client, code, text)`` tells one page (None: all) something, ``rested(client)`` that its motion is over.
+
+    A motion is a stream, which follows a slider, or what one click has begun: a page may be silent for longer then.
     """
 
-    def __init__(self, robot, changed, told, silence_s=SILENCE_S, clock=time.monotonic):
+    def __init__(self, robot, changed, told, silence_s=SILENCE_S, clock=time.monotonic, rested=lambda client: None):
         self._robot = robot
         self._changed = changed
         self._told = told
+        self._rested = rested
         self._clock = clock
         self._lock = threading.Lock()
         self._control = Control(silence_s)
         self._motion = Motion({})
+        self._is_stream = True
+        self._standstill = Standstill()
         # Of the last step of the motion.
         self._setpoints = {}
         self._moving = threading.Event()
@@ -101,10 +107,10 @@ class Lab:
             self._halt()
         self._told(None, "stopped", "a page has pressed stop")
 
-    def beat(self, client):
-        """A page has shown that it is there."""
+    def beat(self, client, page_answers=True):
+        """A page has shown that it is there, or its connection that it is, while the page does not answer."""
         with self._lock:
-            self._control.beat(client, self._clock())
+            self._control.beat(client, self._clock(), page_answers)
 
     def gone(self, client):
         """A page has gone: what it moved stops."""
@@ -118,23 +124,33 @@ class Lab:
     def tick(self, dt):
         """Send the next set-points, ``dt`` [s] after the last ones; stop where the page or the robot is not ready."""
         with self._lock:
+            client, now_s = self._control.holder, self._clock()
+            is_alive = self._control.is_alive(now_s)
+            if not is_alive:
+                for release in self._releases_of_silent:
+                    release()
             if not self._motion.is_moving:
+                if self._moving.is_set():
+                    self._rested(client)
                 self._moving.clear()
                 self._setpoints = {}
-                if not self._control.is_alive(self._clock()):
-                    for release in self._releases_of_silent:
-                        release()
                 return
-            client, why, lost = self._control.holder, self._robot.why_not_ready(), None
-            if self._control.is_alive(self._clock()) and not why:
+            if not self._is_stream:
+                is_alive = self._control.is_connected(now_s)
+            why, lost, still, measured = self._robot.why_not_ready(), None, "", self._measured()
+            if is_alive and not why:
                 try:
-                    self._setpoints = self._motion.step(dt, self._measured())
-                    self._robot.command(self._setpoints)
-                    return
+                    still = self._standstill.look(self._robot.time_s, self._setpoints, measured)
+                    if not still:
+                        self._setpoints = self._motion.step(dt, measured)
+                        self._robot.command(self._setpoints)
+                        return
                 except MotionError as error:
                     lost = error
             self._halt()
-        if lost:
+        if still:
+            self._robot.explain(still, lambda what: self._told(client, "held", "%s stands still: %s" % (still, what)))
+        elif lost:
             self._told(client, "refused", str(lost))
         elif why:
             self._told(client, "not_ready", why)
@@ -182,37 +198,43 @@ class Lab:
         self.gone(client)
 
     def _move(self, client, operation):
-        targets = operation.get("joints")
-        if not isinstance(targets, dict):
-            raise MotionError("\"joints\" must be an object of joints and angles")
-        self._aim(client, targets)
+        self._aim(client, _joints_of(operation), is_stream=True)
+
+    def _go(self, client, operation):
+        self._aim(client, _joints_of(operation), is_stream=False)
 
     def _pose(self, client, operation):
         name = operation.get("name")
         targets = self._robot.poses.get(name) if isinstance(name, str) else None
         if targets is None:
             raise MotionError("there is no pose %r; there are %s" % (name, ", ".join(self._robot.poses)))
-        self._aim(client, targets)
+        self._aim(client, targets, is_stream=False)
 
     def start(self, client, make):
         """Move by ``make(limits, measured)``, which has what Motion has, in place of what is under way. Raises
         NotInControl, MotionError.
         """
         with self._lock:
-            self._require_ready(client)
+            self._require_ready(client, is_stream=False)
             self._motion = make(self._robot.limits, self._measured())
-            self._moving.set()
+            self._begin(is_stream=False)
 
-    def _aim(self, client, targets):
+    def _begin(self, is_stream):
+        if not (is_stream and self._moving.is_set()):
+            self._standstill = Standstill()
+        self._is_stream = is_stream
+        self._moving.set()
+
+    def _aim(self, client, targets, is_stream):
         with self._lock:
-            self._require_ready(client)
+            self._require_ready(client, is_stream)
             if not isinstance(self._motion, Motion) or self._motion.limits != self._robot.limits:
                 self._motion = Motion(self._robot.limits)
             self._motion.aim(targets, self._measured())
-            self._moving.set()
+            self._begin(is_stream)
 
-    def _require_ready(self, client):
-        self._control.check(client, self._clock())
+    def _require_ready(self, client, is_stream):
+        self._control.check(client, self._clock(), is_stream)
         why = self._robot.why_not_ready()
         if why:
             raise NotInControl("not_ready", why)
@@ -237,5 +259,12 @@ class Lab:
             self._control.check(client, self._clock())
 
 
-_OPERATIONS = {"take": Lab._take, "release": Lab._release, "move": Lab._move, "pose": Lab._pose, "enable": Lab._enable,
-               "disable": Lab._disable, "grip": Lab._grip}
+def _joints_of(operation):
+    targets = operation.get("joints")
+    if not isinstance(targets, dict):
+        raise MotionError("\"joints\" must be an object of joints and angles")
+    return targets
+
+
+_OPERATIONS = {"take": Lab._take, "release": Lab._release, "move": Lab._move, "go": Lab._go, "pose": Lab._pose,
+               "enable": Lab._enable, "disable": Lab._disable, "grip": Lab._grip}

@@ -19,6 +19,9 @@ LOST_RAD = 2.0 * LEAD_RAD
 #: A joint that is further behind its set-point than this [rad] is held by something; a free one is by 0.03 s of its
 #: speed, and by 0.15 s of it beside other work on the machine.
 FREE_RAD = 0.5 * LEAD_RAD
+#: A joint stands still that is behind its set-point by more than FREE_RAD, and has not moved this far [rad] for so
+#: long [s].
+STILL_RAD, STILL_S = 0.01, 1.5
 #: A joint nearer to its target than this has arrived [rad].
 NEAR_RAD = 1e-4
 
@@ -50,6 +53,24 @@ def check_not_lost(setpoints, measured):
         if abs(position - measured.get(joint, position)) > LOST_RAD:
             raise MotionError("something else has moved %s: it is at %.2f rad, and was sent to %.2f rad"
                               % (joint, measured[joint], position))
+
+
+class Standstill:
+    """Notices a joint that does not follow its set-points."""
+
+    def __init__(self):
+        self._since = {}  # joint -> (time [s], position [rad])
+
+    def look(self, time_s, setpoints, measured):
+        """A joint that stands still, or "". ``time_s``: the robot's time, which may pause [s]; ``setpoints``,
+        ``measured``: {joint: [rad]}.
+        """
+        behind = {joint: measured[joint] for joint, setpoint in setpoints.items()
+                  if joint in measured and abs(setpoint - measured[joint]) > FREE_RAD}
+        self._since = {
+            joint: since if since[0] <= time_s and abs(position - since[1]) < STILL_RAD else (time_s, position)
+            for joint, position in behind.items() for since in [self._since.get(joint, (time_s, position))]}
+        return next((joint for joint, (since_s, _) in self._since.items() if time_s - since_s >= STILL_S), "")
 
 
 def held(joints, setpoints, measured):

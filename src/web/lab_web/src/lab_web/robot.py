@@ -7,6 +7,7 @@ import time
 import rospy
 from baxter_core_msgs.msg import (
     AssemblyState,
+    CollisionAvoidanceState,
     EndEffectorCommand,
     EndEffectorProperties,
     EndEffectorState,
@@ -19,7 +20,7 @@ from std_msgs.msg import Empty
 from baxter_interface import RobotEnable
 from baxter_interface.presence import Presence
 from baxter_model import BASE_FRAME, HEAD_JOINT, SIDES, joint_names, poses, tip_of
-from baxter_model.readiness import why_not_ready
+from baxter_model.readiness import held_by_avoidance, why_not_ready
 from lab_web.lab import RobotError
 from lab_web.motion import limits_of
 from urdf_model import UrdfError, parse_urdf
@@ -32,6 +33,8 @@ ARM_LINKS = {side: (BASE_FRAME, tip_of(side)) for side in SIDES}
 _ACTIONS = {"open": ("go", {"position": EndEffectorState.POSITION_OPEN}),
             "close": ("go", {"position": EndEffectorState.POSITION_CLOSED}), "calibrate": ("calibrate", {})}
 _SENDER = "lab_web"
+# How long the robot may take to say what collision avoidance keeps an arm away from [s].
+_AVOIDANCE_S = 1.0
 # A gripper is told to follow a recording where it has moved by more than this.
 GRIPPER_STEP_PERCENT = 1.0
 
@@ -45,6 +48,8 @@ class Baxter:
         self._positions = {}
         self._state = None
         self._heard_s = 0.0
+        #: The stamp of the newest positions [s].
+        self.time_s = 0.0
         self._presence = Presence("/robot/state", lambda: time.monotonic() - self._heard_s)
         self._grippers = {}
         self._grippers_of_kind = {}
@@ -149,6 +154,10 @@ class Baxter:
             self._head.publish(HeadPanCommand(setpoints[HEAD_JOINT], HeadPanCommand.MAX_SPEED_RATIO,
                                               HeadPanCommand.REQUEST_PAN_ENABLE))
 
+    def explain(self, joint, tell):
+        """Ask the robot what keeps a joint from moving, and ``tell(sentence)`` on a separate thread."""
+        threading.Thread(target=lambda: tell(_what_holds(joint)), daemon=True).start()
+
     def stop(self):
         """As the stop button."""
         self._stop.publish(Empty())
@@ -209,7 +218,8 @@ class Baxter:
         self._positions.update(zip(message.name, message.position, strict=False))
         grippers = {"%s_gripper" % side: self._grippers[side].position for side in self.grippers
                     if side in self._grippers}
-        self.heard(message.header.stamp.to_sec(), {**self._positions, **grippers})
+        self.time_s = message.header.stamp.to_sec()
+        self.heard(self.time_s, {**self._positions, **grippers})
 
     def _on_state(self, message):
         self._state, self._heard_s = message, time.monotonic()
@@ -219,3 +229,16 @@ class Baxter:
 
     def _on_kind(self, message, side):
         self._grippers_of_kind[side] = message.ui_type
+
+
+def _what_holds(joint):
+    side = joint.partition("_")[0]
+    if side in SIDES:
+        try:
+            state = rospy.wait_for_message("/robot/limb/%s/collision_avoidance_state" % side, CollisionAvoidanceState,
+                                           _AVOIDANCE_S)
+        except rospy.ROSException:
+            state = CollisionAvoidanceState()
+        if state.collision_object:
+            return held_by_avoidance(state.collision_object)
+    return "something is in its way, or another program moves it"

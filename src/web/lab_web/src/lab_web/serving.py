@@ -9,7 +9,7 @@ import threading
 
 from tornado import web
 
-from lab_web.control import HEARTBEAT_S
+from lab_web.control import HEARTBEAT_S, PAGE_HANGS_S
 from lab_web.motion import MotionError
 from lab_web.playback import recording_of, text_of
 from web_bridge.errors import Refused
@@ -280,7 +280,7 @@ class PageSocket(BufferedSocket):
     def open(self, *_):
         self.start_writing(self._pages.loop_thread)
         self.send({"op": "hello", "number": self.number, "may_act": self.may_act,
-                   "heartbeat_ms": 1000.0 * HEARTBEAT_S})
+                   "heartbeat_ms": 1000.0 * HEARTBEAT_S, "hangs_ms": 1000.0 * PAGE_HANGS_S})
         for operation in self._pages.shared:
             self.send(operation)
         if self._pages.poses is not None:
@@ -294,8 +294,8 @@ class PageSocket(BufferedSocket):
     async def on_message(self, message):
         lab = self._pages.lab
         # Most frames are heartbeats.
-        if message == "beat":
-            lab.beat(self.number)
+        if message in ("beat", "busy"):
+            lab.beat(self.number, page_answers=message == "beat")
             return
         try:
             if not isinstance(message, str) or len(message) > _LARGEST_OPERATION:

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,6 +43,8 @@ class Robot:
         self.poses = {"neutral": dict(self.positions)}
         self.enabled, self.stopped = False, False
         self.switched = []
+        #: {joint: how far it gets [rad]}
+        self.walls = {}
 
     def measured(self):
         return dict(self.positions)
@@ -49,8 +52,15 @@ class Robot:
     def why_not_ready(self):
         return "stopped" if self.stopped else "" if self.enabled else "not enabled"
 
+    @property
+    def time_s(self):
+        return time.monotonic()
+
     def command(self, setpoints):
-        self.positions.update(setpoints)
+        self.positions.update({joint: min(angle, self.walls.get(joint, angle)) for joint, angle in setpoints.items()})
+
+    def explain(self, joint, tell):
+        tell("the crate is near")
 
     def stop(self):
         self.enabled, self.stopped = False, True
@@ -122,7 +132,8 @@ class Server:
         self._sockets = set()
         self.loop = LoopThread()
         self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop)
-        self.lab = self.pages.lab = Lab(self.robot, self.pages.control_changed, self.pages.tell)
+        self.lab = self.pages.lab = Lab(self.robot, self.pages.control_changed, self.pages.tell,
+                                        rested=lambda client: self.pages.answer(client, {"op": "rested"}))
         hands = Hands(self.robot.measured, lambda chain, joints: ghost(self.pages.picture, chain, joints),
                       self.pages.answer)
         description = parse_urdf(URDF, source="robot")

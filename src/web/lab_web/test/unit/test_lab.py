@@ -2,7 +2,7 @@
 """Who may move the robot, how it moves, and what stops it. A clock and a robot of the test's own."""
 import pytest
 
-from lab_web.control import HEARTBEAT_S, SILENCE_S
+from lab_web.control import CONNECTION_SILENCE_S, HEARTBEAT_S, SILENCE_S
 from lab_web.lab import TICK_S, Lab, RobotError
 from lab_web.motion import LEAD_RAD, RAMP_S, SPEED_SHARE, Limits, Motion, MotionError, limits_of
 from urdf_model import parse_urdf
@@ -19,8 +19,11 @@ class Robot:
     def __init__(self):
         self.limits = LIMITS
         self.positions = dict(START)
+        self.time_s = 0.0
         self.done = []
         self.why = ""
+        #: {joint: how far it gets [rad]}
+        self.walls = {}
 
     def measured(self):
         return dict(self.positions)
@@ -29,8 +32,11 @@ class Robot:
         return self.why
 
     def command(self, setpoints):
-        self.positions.update(setpoints)
+        self.positions.update({joint: min(angle, self.walls.get(joint, angle)) for joint, angle in setpoints.items()})
         self.done.append("command")
+
+    def explain(self, joint, tell):
+        tell("a wall keeps %s" % joint)
 
     def stop(self):
         self.done.append("stop")
@@ -51,20 +57,23 @@ class Hall:
 
     def __init__(self):
         self.now_s = 10.0
-        self.told = []
+        self.told, self.rested = [], []
         self.changes = 0
         self.robot = Robot()
-        self.lab = Lab(self.robot, self.change, lambda *told: self.told.append(told), clock=lambda: self.now_s)
+        self.lab = Lab(self.robot, self.change, lambda *told: self.told.append(told), clock=lambda: self.now_s,
+                       rested=self.rested.append)
 
     def change(self):
         self.changes += 1
 
-    def pass_time(self, seconds, beats_of=None):
+    def pass_time(self, seconds, beats_of=None, page_answers=True, is_paused=False):
         beat_s = self.now_s
         for _ in range(round(seconds / TICK_S)):
             self.now_s += TICK_S
+            if not is_paused:
+                self.robot.time_s += TICK_S
             if beats_of is not None and self.now_s - beat_s >= HEARTBEAT_S:
-                self.lab.beat(beats_of)
+                self.lab.beat(beats_of, page_answers)
                 beat_s = self.now_s
             self.lab.tick(TICK_S)
 
@@ -101,6 +110,66 @@ def test_an_arm_stops_within_a_fifth_of_a_second_when_the_page_falls_silent(hall
     # Heartbeats alone do not begin it again.
     hall.pass_time(1.0, beats_of=1)
     assert hall.robot.positions == stopped_at
+
+
+ONE_CLICK = pytest.mark.parametrize("operation", [
+    {"op": "pose", "name": "neutral"}, {"op": "go", "joints": {"left_s0": 0.0, "left_w2": 0.0}}], ids=["pose", "go"])
+
+
+@ONE_CLICK
+def test_a_motion_of_one_click_goes_on_while_the_page_is_too_busy_to_answer(hall, operation):
+    hall.robot.positions["left_s0"] = -1.7
+    hall.lab.serve(1, True, {"op": "take"})
+    released = []
+    hall.lab.when_lost(lambda: released.append(hall.now_s))
+    hall.lab.serve(1, True, operation)
+    hall.pass_time(1.5, beats_of=1, page_answers=False)
+    # What the page holds ends as ever.
+    assert released and released[0] - 10.0 < 0.2
+    hall.pass_time(0.9 * CONNECTION_SILENCE_S)
+    assert hall.lab.is_moving and hall.told == []
+    hall.pass_time(4.0, beats_of=1, page_answers=False)
+    assert hall.robot.positions["left_s0"] == 0.0 and hall.told == [] and hall.rested == [1]
+    # A stream does not begin, and does not go on.
+    move(hall, left_s0=1.0)
+    assert hall.codes() == ["page_silent"] and not hall.lab.is_moving
+
+
+@ONE_CLICK
+def test_a_motion_of_one_click_ends_with_the_connection(hall, operation):
+    hall.robot.positions["left_s0"] = -1.7
+    hall.lab.serve(1, True, {"op": "take"})
+    hall.lab.serve(1, True, operation)
+    hall.pass_time(CONNECTION_SILENCE_S + 0.05)
+    stopped_at = dict(hall.robot.positions)
+    hall.pass_time(1.0)
+    assert hall.codes() == ["page_silent"] and hall.robot.positions == stopped_at
+
+
+def test_a_slider_that_takes_over_from_a_click_is_a_stream(hall):
+    hall.lab.serve(1, True, {"op": "take"})
+    hall.lab.serve(1, True, {"op": "pose", "name": "neutral"})
+    move(hall, left_s0=1.5)
+    hall.pass_time(0.2, beats_of=1, page_answers=False)
+    assert hall.codes() == ["page_silent"] and not hall.lab.is_moving
+
+
+def test_a_joint_that_something_holds_ends_the_motion_with_the_reason(hall):
+    hall.robot.walls["left_s0"] = 0.5
+    hall.lab.serve(1, True, {"op": "take"})
+    move(hall, left_s0=1.5)
+    hall.pass_time(1.5, beats_of=1)
+    # A paused simulation holds nothing.
+    hall.pass_time(5.0, beats_of=1, is_paused=True)
+    assert hall.lab.is_moving and hall.told == []
+    hall.pass_time(2.0, beats_of=1)
+    (told,) = hall.told
+    assert told[:2] == (1, "held") and "left_s0" in told[2] and "a wall keeps left_s0" in told[2]
+    assert not hall.lab.is_moving and hall.robot.positions["left_s0"] == 0.5
+    # Away from the wall is free.
+    move(hall, left_s0=0.0)
+    hall.pass_time(4.0, beats_of=1)
+    assert hall.robot.positions["left_s0"] == 0.0 and len(hall.told) == 1
 
 
 def test_an_arm_stops_when_the_page_goes(hall):

@@ -53,6 +53,10 @@ def test_a_camera_that_sends_nothing_yet_is_awaited_in_words(lab, browser):
     said = "document.getElementById('picture-said').textContent"
     choose(CAMERA)
     assert browser.evaluate(said) == "No picture has come yet …"
+    browser.wait(said + ".includes('processor time')")
+    lab.pages.share("simulation", {"paused": True})
+    browser.wait(said + ".includes('paused')")
+    lab.pages.share("simulation", {"paused": False})
     lab.camera = base64.b64encode(cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))[1]).decode()
     browser.wait("document.getElementById('picture').naturalWidth === 30 && !%s" % said)
     lab.camera = ""

@@ -30,6 +30,8 @@ class Robot:
     def why_not_ready(self):
         return "" if self.enabled else "not enabled"
 
+    time_s = 0.0
+
     def command(self, setpoints):
         self.positions.update(setpoints)
 
