@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """help_of_programs.py FOLDER PROGRAM…: run `PROGRAM --help` of each, some at a time, and print one line of JSON.
+PROGRAM is a file, or -mMODULE.
 
 The line is a list of [exit code or None, standard output, standard error]; None: it did not end in LIMIT_S. Each runs
 in a child of this process, which has imported most of what they import: one by one, they would take minutes.
@@ -28,7 +29,10 @@ def become(program: str):
     signal.signal(signal.SIGINT, signal.default_int_handler)
     code = 0
     try:
-        runpy.run_path(program, run_name="__main__")
+        if program.startswith("-m"):
+            runpy.run_module(program[2:], run_name="__main__", alter_sys=True)
+        else:
+            runpy.run_path(program, run_name="__main__")
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
         if isinstance(end.code, str):

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`--help` of every installed program: on standard output, with exit code 0, without a master."""
+"""`--help` of every installed program and every mode of baxter.sh: on standard output, with exit code 0, without a
+master.
+
+test_baxter_sh.py has the modes without a build.
+"""
 import json
 import os
 import re
@@ -27,6 +31,14 @@ def programs() -> list[str]:
     return sorted(found)
 
 
+def programs_of_modes() -> dict[str, str]:
+    """{mode: its program} of the modes of baxter.sh that have one of Python's."""
+    text = re.search(r"^declare -A PROGRAMS=\($(.*?)^\)$", (ROOT / "baxter.sh").read_text(), re.M | re.S)[1]
+    commands = {mode: line.split() for mode, line in re.findall(r'\[([a-z-]+)\]="(.*)"', text)}
+    return {mode: words[-1].replace("$LAB_ROOT/", "") if words[-1].startswith("$") else "-m" + words[-1]
+            for mode, words in commands.items() if words[0] == "python3"}
+
+
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory):
     """{program: (exit code, standard output, standard error) of its --help}."""
@@ -35,9 +47,10 @@ def answers(tmp_path_factory):
     # A port that nobody listens to.
     environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:9", "ROS_HOSTNAME": "localhost", "COLUMNS": "100",
                    "DISPLAY": ""}
-    done = subprocess.run([*command, *programs()], cwd=ROOT, env=environment, capture_output=True, text=True)
+    called = [*programs(), *programs_of_modes().values()]
+    done = subprocess.run([*command, *called], cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return dict(zip(programs(), json.loads(done.stdout.splitlines()[-1]), strict=True))
+    return dict(zip(called, json.loads(done.stdout.splitlines()[-1]), strict=True))
 
 
 def test_help_is_answered_without_a_master(answers):

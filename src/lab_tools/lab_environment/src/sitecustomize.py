@@ -94,8 +94,8 @@ def _run_the_next():
 
 
 def _report(kind, error, trace):
-    """An uncaught exception: as Python does, but `program | head` ends without one, as other programs of Unix do, and so
-    does a program that Ctrl-C ends before it has begun."""
+    """An uncaught exception: as Python does, but `program | head` ends without one, as other programs of Unix do, and
+    so does a program that Ctrl-C ends before it has begun."""
     is_early = issubclass(kind, KeyboardInterrupt) and not hasattr(sys, "ps1") and _is_starting(trace)
     if not is_early and not (issubclass(kind, BrokenPipeError) and _has_lost_reader()):
         sys.__excepthook__(kind, error, trace)

@@ -9,10 +9,10 @@ import threading
 import time
 from pathlib import Path
 
-from lab_environment.options import MOST_WORKERS, number, seconds
+from lab_environment.options import MOST_WORKERS, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
-from .job import JobError, Spec, class_of, parameters_of
+from .job import JobError, Spec, check, class_of, parameters_of
 from .records import Records, RecordsError, summary, versions
 from .shipped import JOBS
 
@@ -79,7 +79,7 @@ def parse(argv):
                         help="processes at a time (default: one for each processor, %(default)s)")
     parser.add_argument("--time-limit", type=seconds(), metavar="S", help="longest wall time of an episode")
     parser.add_argument("--memory", type=number(float, LEAST_GB, MOST_GB), metavar="GB",
-                        help="most memory of a worker with all its processes (default: its share of %d %% of this "
+                        help="most memory of a worker with all its processes (default: its share of %d %%%% of this "
                              "machine's; on a cluster: no limit but Ray's own)" % (100 * keeping.SHARE))
     parser.add_argument("--recycle", type=number(int, 1, MOST_RECYCLE), default=200, metavar="N",
                         help="a worker is replaced after N episodes (default %(default)s)")
@@ -88,8 +88,13 @@ def parse(argv):
     parser.add_argument("--parquet", type=Path, metavar="FILE",
                         help="write the results of these seeds as Parquet as well; pyarrow is installed on first use")
     options = parser.parse_args(argv)
-    if not options.list and not (options.job and options.seeds):
+    if not options.list and not options.job:
         parser.error("JOB and --seeds are needed, or --list")
+    if options.job and ":" not in options.job and options.job not in JOBS:
+        parser.error("there is no job '%s'%s; JOB is a name of --list, or package.module:Class"
+                     % (options.job, did_you_mean(options.job, JOBS)))
+    if not options.list and not options.seeds:
+        parser.error("--seeds is needed, such as --seeds 0:100")
     return options
 
 
@@ -190,7 +195,7 @@ def list_jobs():
 def run(options):
     settings = options.set
     spec = Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(settings))
-    class_of(spec.name)  # a wrong name is told before anything starts
+    check(spec)  # wrong names are told before anything starts
     if options.parquet:
         parquet.ensure_installed(ROOT)
     if options.engine == "ray":

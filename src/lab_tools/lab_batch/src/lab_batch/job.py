@@ -96,14 +96,20 @@ def parameters_of(kind):
             if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
 
 
-def load(spec):
-    """Return an instance of the job that is ready for run(). Raises JobError."""
+def check(spec: Spec) -> type:
+    """Return the class of a job that has these parameters. Raises JobError."""
     kind = class_of(spec.name)
     known = parameters_of(kind)
     unknown = sorted(set(spec.parameters) - set(known))
     if unknown:
         raise JobError("job %s has no parameter %s; it has %s" % (
             spec.name, ", ".join(unknown), ", ".join(known) or "none"))
+    return kind
+
+
+def load(spec):
+    """Return an instance of the job that is ready for run(). Raises JobError."""
+    kind = check(spec)
     try:
         job = kind(**spec.parameters)
         job.start()

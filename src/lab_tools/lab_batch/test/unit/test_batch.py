@@ -286,13 +286,19 @@ def test_a_disk_without_space_ends_the_batch_with_one_line(capsys):
     assert capsys.readouterr().err.startswith("batch: [Errno 28]")
 
 
-def test_a_wrong_job_is_one_line(tmp_path, capsys):
-    assert run("nothing", "--seeds", "1", "--out", tmp_path / "r") == 1
-    assert capsys.readouterr().err.startswith("batch: a job is named package.module:Class")
-    assert not (tmp_path / "r").exists()
+@pytest.mark.parametrize("words, text", [
+    (["nothing", "--seeds", "1"], "no job 'nothing'"), (["reech"], "did you mean reach"),
+    (["ik"], "--seeds is needed")])
+def test_a_wrong_job_is_told_before_anything_else(capsys, words, text):
     with pytest.raises(SystemExit) as caught:
-        run("ik")
-    assert caught.value.code == 2
+        run(*words)
+    assert caught.value.code == 2 and text in capsys.readouterr().err
+
+
+def test_a_wrong_parameter_names_the_jobs_own_before_a_file_is_made(tmp_path, capsys):
+    assert run("ik", "--seeds", "1", "--set", "sid=right", "--out", tmp_path / "r") == 1
+    said = capsys.readouterr().err
+    assert "sid" in said and "side" in said and said.count("\n") == 1 and not (tmp_path / "r").exists()
 
 
 def test_list_names_every_job_with_its_parameters(capsys):

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers on command lines: types for argparse that refuse what a program cannot compute with. Free of ROS."""
+"""Words on command lines: types for argparse that refuse numbers with which a program cannot compute, and the name
+that a slip may have meant. Free of ROS."""
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 #: Longest time that a program is told to wait or to run [s], thirty years; Python's own limit ends in a traceback.
 MOST_SECONDS = 1e9
@@ -33,3 +35,9 @@ def number(kind: type, least: float, most: float, *, above: bool = False) -> Cal
 def seconds(least: float = 0.0) -> Callable[[str], float]:
     """As :func:`number`: a time [s] above ``least``."""
     return number(float, least, MOST_SECONDS, above=True)
+
+
+def did_you_mean(word: str, names: Iterable[str]) -> str:
+    """Return a question for the name that is most like ``word``, to be put behind an error; "" if none is."""
+    near = difflib.get_close_matches(word, list(names), 1)
+    return "; did you mean %s?" % near[0] if near else ""

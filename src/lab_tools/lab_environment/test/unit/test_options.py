@@ -3,7 +3,7 @@ import argparse
 
 import pytest
 
-from lab_environment.options import number, seconds
+from lab_environment.options import did_you_mean, number, seconds
 
 
 @pytest.mark.parametrize("text", ["1", "10", " 7"])
@@ -25,3 +25,8 @@ def test_a_bound_may_be_left_out():
     for text in ("0", "1e300"):
         with pytest.raises(argparse.ArgumentTypeError, match="above 0, at most 1000000000"):
             seconds()(text)
+
+
+def test_a_slip_is_answered_with_the_nearest_name():
+    assert "notebook" in did_you_mean("notebok", ("check", "notebook", "web"))
+    assert did_you_mean("xyz", ("check", "notebook")) == ""
