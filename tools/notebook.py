@@ -12,6 +12,7 @@ import uuid
 from pathlib import Path
 
 from lab_environment import jupyter, ports
+from lab_environment.options import did_you_mean
 from lab_tests import processes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,9 +37,9 @@ def find(name: str) -> Path:
     exact = [path for path in notebooks() if path.stem == wanted]
     found = exact or [path for path in notebooks() if wanted in path.stem]
     if len(found) != 1:
-        names = ", ".join(path.stem for path in found or notebooks())
-        raise NotebookError(f"'{name}' names {'several notebooks' if found else 'no notebook'}; "
-                            f"{'which of' if found else 'there are'}: {names}")
+        stems = [path.stem for path in found or notebooks()]
+        what = "several notebooks; which of" if found else "no notebook; there are"
+        raise NotebookError(f"'{name}' names {what}: {', '.join(stems)}{'' if found else did_you_mean(wanted, stems)}")
     return found[0]
 
 

@@ -48,6 +48,8 @@ def test_package_installs_its_notebooks(path):
 def test_part_of_a_name_is_enough_if_it_is_one_notebooks():
     assert tool.find("waving").stem == "7_waving"
     assert tool.find("ros_control.ipynb").stem == "ros_control"
+    with pytest.raises(tool.NotebookError, match=r"did you mean 7_waving\?"):
+        tool.find("wavng")
     with pytest.raises(tool.NotebookError, match="'dancing' names no notebook; there are: .*7_waving"):
         tool.find("dancing")
     with pytest.raises(tool.NotebookError, match="several notebooks; which of: "):

@@ -91,7 +91,7 @@ def parse(argv):
     if not options.list and not options.job:
         parser.error("JOB and --seeds are needed, or --list")
     if options.job and ":" not in options.job and options.job not in JOBS:
-        parser.error("there is no job '%s'%s; JOB is a name of --list, or package.module:Class"
+        parser.error("there is no job '%s'; JOB is a name of --list, or package.module:Class%s"
                      % (options.job, did_you_mean(options.job, JOBS)))
     if not options.list and not options.seeds:
         parser.error("--seeds is needed, such as --seeds 0:100")
