@@ -84,8 +84,9 @@ def test_package_xml_names_what_is_imported():
 
 
 @pytest.mark.parametrize("module", [
-    "angles", "diagnostic_updater", "image_geometry", "laser_geometry", "map_msgs", "message_filters", "resource_retriever",
-    "scipy", "stereo_msgs", "tf2_geometry_msgs", "tf2_kdl", "tf2_sensor_msgs", "tf_conversions", "topic_tools"])
+    "angles", "diagnostic_updater", "image_geometry", "laser_geometry", "map_msgs", "message_filters",
+    "resource_retriever", "scipy", "stereo_msgs", "tf2_geometry_msgs", "tf2_kdl", "tf2_sensor_msgs", "tf_conversions",
+    "topic_tools"])
 def test_set_up_installs_what_programs_for_a_ros_desktop_import(module):
     assert importlib.util.find_spec(module) is not None
 

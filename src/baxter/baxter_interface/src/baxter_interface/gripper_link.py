@@ -2,6 +2,7 @@
 """The wire to one gripper: its state and properties, and commands that it acknowledges."""
 import errno
 import json
+import time
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
@@ -9,15 +10,19 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from baxter_dataflow import Signal, wait_for
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, is_unlimited
+from baxter_model.readiness import NOT_ENABLED
 from rospy_limits.json_object import JsonRefused, read_object
 
 from . import startup
 from .gripper_types import TYPES
+from .hindrance import IgnoredCommands
 
 # Numbers of commands wrap here.
 SEQUENCE_END = 2**31 - 1
 # Least time for the effect of a command after the wait for its acknowledgement [s].
 EFFECT_TIMEOUT_S = 0.5
+# Commands that a robot takes that is not enabled.
+NEED_NO_POWER = ("configure", "set", "no_op")
 
 
 class NoGripper(OSError):
@@ -35,6 +40,7 @@ class GripperLink:
         self.on_gripping_changed = Signal()
         self.on_moving_changed = Signal()
         self._sequence = 0
+        self._ignored, self._refusal = IgnoredCommands(), ""
         self._prefix = "/robot/end_effector/%s/" % self.name
         self._publisher = rospy.Publisher(self._prefix + "command", EndEffectorCommand, queue_size=10)
         self.kind = None
@@ -67,27 +73,35 @@ class GripperLink:
     def command(self, command, block=False, test=None, timeout_s=0.0, args=None, delay_s=0.0):
         """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.
 
-        Repeats it at 100 Hz until the gripper acknowledges it, and calls `test` only from `delay_s` later.
+        Repeats it at 100 Hz until the gripper acknowledges it, and calls `test` only from `delay_s` later. Ends early
+        where the gripper has no power.
         """
         self._sequence = self._sequence % SEQUENCE_END + 1
         message = EndEffectorCommand(
             id=self.state.id, command=command, sender="%s_%s" % (rospy.get_name(), command), sequence=self._sequence,
             args="" if args is None else json.dumps(args))
+        self._refusal = ""
+        if command not in NEED_NO_POWER:
+            self._ignored.sent(time.monotonic())
         self._publisher.publish(message)
         if not block:
             return True
         clock = RosClock()
         watch = Stopwatch(clock.now())
-        acknowledged = wait_for(lambda: self._acknowledges(message), timeout_s, raise_on_error=False, rate=100,
-                                body=lambda: self._publisher.publish(message))
+        wait_for(lambda: self._acknowledges(message) or self._refusal, timeout_s, raise_on_error=False, rate=100,
+                 body=lambda: self._publisher.publish(message))
+        acknowledged = self._acknowledges(message)
         clock.sleep(delay_s)
         remaining_s = timeout_s
         if not is_unlimited(timeout_s):
             remaining_s = max(EFFECT_TIMEOUT_S, timeout_s - watch.elapsed_s(clock.now()))
-        done = wait_for(test or (lambda: True), remaining_s, raise_on_error=False)
-        if not done:
-            self.warn("%s was %s, but had not the effect it should within %.1f s" % (
-                command, "acknowledged" if acknowledged else "not even acknowledged", watch.elapsed_s(clock.now())))
+        has_effect = test or (lambda: True)
+        wait_for(lambda: has_effect() or self._refusal, remaining_s, raise_on_error=False)
+        done = bool(has_effect())
+        if not done and not self._refusal:
+            self.warn("%s was %s, but had not the effect it should within %.1f s%s" % (
+                command, "acknowledged" if acknowledged else "not even acknowledged", watch.elapsed_s(clock.now()),
+                "; the gripper reports an error, which reset() clears" if self.state.error == 1 else ""))
         return done
 
     def configure(self):
@@ -130,6 +144,9 @@ class GripperLink:
 
     def _on_state(self, message):
         before, self.state = self.state, message
+        if why := self._ignored.heard(time.monotonic(), NOT_ENABLED if message.enabled == 0 else ""):
+            self._refusal = why
+            self.warn("a command has no effect: %s" % why)
         if before is None:
             return
         for changed, old, new in ((self.on_gripping_changed, before.gripping, message.gripping),

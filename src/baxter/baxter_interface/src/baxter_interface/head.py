@@ -7,6 +7,7 @@ from std_msgs.msg import Bool
 from baxter_dataflow import wait_for
 
 from . import startup
+from .hindrance import wait_for_motion
 from .joint_checks import require_number
 from .settings import HEAD_PAN_ANGLE_TOLERANCE
 
@@ -61,10 +62,9 @@ class Head:
                                  enable_pan_request=HeadPanCommand.REQUEST_PAN_ENABLE)
         self._pan_publisher.publish(command)
         if timeout != 0:
-            wait_for(lambda: abs(self.pan() - angle) <= HEAD_PAN_ANGLE_TOLERANCE, timeout, rate=100,
-                     body=lambda: self._pan_publisher.publish(command),
-                     timeout_msg="the head did not turn to %.3f rad within %.1f s; it turns from -1.57 to 1.57 rad, "
-                                 "while the robot is enabled" % (angle, timeout))
+            wait_for_motion(lambda: abs(self.pan() - angle) <= HEAD_PAN_ANGLE_TOLERANCE, timeout,
+                            lambda: self._pan_publisher.publish(command),
+                            "the head, which turns from -1.57 to 1.57 rad, did not turn to %.3f rad" % angle)
 
     def command_nod(self, timeout=5.0):
         """Nod once and wait for its end; `timeout` [s, ROS time] applies to its start, and again to its end.
@@ -73,8 +73,8 @@ class Head:
         """
         self._nod_publisher.publish(True)
         if timeout != 0:
-            wait_for(self.nodding, timeout, rate=100, body=lambda: self._nod_publisher.publish(True),
-                     timeout_msg="the head did not begin to nod within %.1f s" % timeout)
+            wait_for_motion(self.nodding, timeout, lambda: self._nod_publisher.publish(True),
+                            "the head did not begin to nod")
             wait_for(lambda: not self.nodding(), timeout, rate=100, body=lambda: self._nod_publisher.publish(False),
                      timeout_msg="the head did not end its nod within %.1f s" % timeout)
 

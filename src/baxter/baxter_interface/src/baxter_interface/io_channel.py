@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Base of digital and analogue channels: find a channel, and set it until it reports the value."""
 import errno
+import re
 
 import rospy
 
@@ -8,22 +9,36 @@ from baxter_dataflow import wait_for
 
 from . import startup
 
+# What channels of the navigators, then called ITB, were named in SDK 1.0.
+OLD_NAME = re.compile("((?:torso_)?(?:left|right))_itb_(button[012]|light_inner|light_outer|wheel)")
+NEW_PARTS = {"button0": "button_ok", "button1": "button_back", "button2": "button_show", "light_inner": "inner_light",
+             "light_outer": "outer_light", "wheel": "wheel"}
+
+
+def present_name(name: str) -> str:
+    """Return the name that a channel has since SDK 1.1."""
+    old = OLD_NAME.fullmatch(name)
+    return "%s_%s" % (old[1], NEW_PARTS[old[2]]) if old else name
+
 
 class IOChannel:
     """A channel of the robot by its name.
 
     A subclass defines its name (`KIND` in the topics' names, `ADJECTIVE` in errors), its messages, and how to read a
-    value from a state; it may override `_on_change`. Raises OSError with errno ETIMEDOUT if the channel does not
+    value from a state; it may override `_on_change`. A name of SDK 1.0, such as "left_itb_button0", is replaced by the
+    present one, with a warning. Raises OSError with errno ETIMEDOUT if the channel does not
     report, rospy.ROSInitException before rospy.init_node.
     """
 
     KIND = ADJECTIVE = STATE = COMMAND = None
 
     def __init__(self, component_id):
-        self._id = component_id
+        self._id = present_name(component_id)
+        if self._id != component_id:
+            rospy.logwarn("the %s channel %r of SDK 1.0 is now called %r", self.ADJECTIVE, component_id, self._id)
         self._last = None
         self._publisher = None
-        topic = "/robot/%s_io/%s/state" % (self.KIND, component_id)
+        topic = "/robot/%s_io/%s/state" % (self.KIND, self._id)
         self._subscriber = rospy.Subscriber(topic, self.STATE, self._on_state, queue_size=10)
         try:
             startup.wait_for_part(topic, lambda: self._last is not None)

@@ -2,7 +2,9 @@
 """One arm: its state, and commands to it."""
 import collections
 import copy
+import math
 import threading
+import time
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
@@ -14,8 +16,10 @@ from std_msgs.msg import Float64
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from baxter_model import BASE_FRAME, poses
+from baxter_model.readiness import why_not_ready
 
 from . import settings, startup
+from .hindrance import ArmHindrance, IgnoredCommands
 from .joint_checks import (
     beyond_a_turn,
     limb_joint_names,
@@ -24,12 +28,16 @@ from .joint_checks import (
     require_number,
     require_side,
 )
-from .joint_motion import Move
+from .joint_motion import Move, is_far
 from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
 
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
+# Shortest time between two log lines for the same reason, where a program repeats its commands [s].
+REPEAT_S = 5.0
+# A commanded speed above this moves an arm [rad/s].
+LEAST_SPEED_RAD_S = 0.02
 IK_TIMEOUT_S = 5.0
 IK_REPORT = "/ExternalTools/%s/PositionKinematicsNode/IKReport"
 
@@ -57,6 +65,8 @@ class Limb:
         self._angles, self._velocities, self._efforts = {}, {}, {}
         self._endpoint = None
         self._robot_state = None
+        self._ignored, self._hindrance = IgnoredCommands(), ArmHindrance(limb)
+        self._warned_at_s = {}
 
         prefix = "/robot/limb/%s/" % limb
         # Latched, so that a setting made right after construction still reaches the robot.
@@ -154,12 +164,15 @@ class Limb:
         mode = JointCommand.RAW_POSITION_MODE if raw else JointCommand.POSITION_MODE
         sent = self._command(mode, positions, "rad")
         if why := beyond_a_turn(sent):
-            rospy.logwarn_throttle(5.0, "%s arm: %s. The robot goes to its limit" % (self.name, why))
+            self._warn("limit", "%s. The robot goes to its limit" % why)
+        if not raw:
+            self._warn_if_hindered(is_far(self._angles_by_name(), sent))
 
     def set_joint_velocities(self, velocities):
         """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises the same
         errors."""
-        self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
+        sent = self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
+        self._warn_if_hindered(any(abs(speed) > LEAST_SPEED_RAD_S for speed in sent.values()))
 
     def set_joint_torques(self, torques):
         """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises the same
@@ -185,13 +198,15 @@ class Limb:
 
         Parameters:
             positions: dict of joint name to rad; joints left out keep their set-points.
-            timeout: longest time for it [s, ROS time]; negative or infinite means for ever.
+            timeout: longest time for it [s, ROS time]; negative or infinite means for ever. With less time than a
+                gentle move takes, 0 for example, the arm is commanded through the vendor's low-pass filter, and goes to
+                the last command; such calls are repeated at about 100 Hz.
             threshold: error of each joint below which it has arrived [rad].
             test: called at every step; when it returns True the arm stops.
         Returns True on arrival: the exact target is commanded last and held. Returns False on time-out, when `test`
-        stopped it, when the robot is not enabled, when its simulation was reset, when no joints were given, and when an
-        angle is beyond a full turn (nothing moves then); one logged line has the reason and the joint with the largest
-        error. Raises as set_joint_positions;
+        stopped it, when the robot is not enabled, when its collision avoidance holds the arm, when its simulation was
+        reset, when no joints were given, and when an angle is beyond a full turn (nothing moves then); one logged line
+        has the reason and the joint with the largest error. Raises as set_joint_positions;
         rospy.ROSInterruptException when the node is shut down meanwhile.
         """
         target = require_joint_values(positions, self._joint_names, "rad")
@@ -208,17 +223,26 @@ class Limb:
         clock = RosClock(gives_up=lambda: rospy.is_shutdown() or self.resets != resets)
         watch, ticker = Stopwatch(clock.now()), Ticker(clock, COMMAND_RATE_HZ)
         move = Move(self.joint_angles(), target, None if is_unlimited(timeout) else timeout, threshold)
+        if not move.is_hurried:
+            self._hindrance.begin()
         while not rospy.is_shutdown():
-            step = move.step(watch.elapsed_s(clock.now()), self.joint_angles(), self.joint_velocities(),
-                             enabled=self._enabled(), aborted=bool(callable(test) and test()),
-                             interrupted=PUT_ELSEWHERE if self.resets != resets else "")
+            angles = self.joint_angles()
+            hindrance = self._hindrance.look(clock.now(), is_far(angles, target), angles)
+            step = move.step(watch.elapsed_s(clock.now()), angles, self.joint_velocities(),
+                             refusal=self._refusal(), aborted=bool(callable(test) and test()),
+                             interrupted=PUT_ELSEWHERE if self.resets != resets else "",
+                             hindrance=hindrance)
             if step.command is not None:
-                self.set_joint_positions(step.command)
+                self._send(JointCommand.POSITION_MODE, step.command)
             elif step.halt:
                 self.halt()
-            if step.failure:
+            if step.failure and move.is_hurried:
+                self._warn("hindered" if hindrance.text else "hurried", step.failure)
+            elif step.failure:
                 rospy.logerr("%s arm: %s", self.name, step.failure)
             if step.is_last:
+                if not move.is_hurried:
+                    self._hindrance.close()
                 return step.arrived
             ticker.sleep()
         raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
@@ -253,11 +277,27 @@ class Limb:
         """Send one command; returns its values by joint name."""
         values = require_joint_values(values, self._joint_names, unit)
         if not values:
-            rospy.logwarn_throttle(5.0, "%s arm: a command without joints is not sent" % self.name)
+            self._warn("joints", "a command without joints is not sent")
             return values
+        self._ignored.sent(time.monotonic())
+        self._send(mode, values)
+        return values
+
+    def _send(self, mode, values):
         self._command_publisher.publish(
             JointCommand(mode=mode, names=list(values), command=list(values.values())))
-        return values
+
+    def _warn_if_hindered(self, is_far_from_goal):
+        hindrance = self._hindrance.look(rospy.get_time(), is_far_from_goal, self._angles_by_name())
+        if hindrance.text:
+            self._warn("hindered", hindrance.text)
+
+    def _warn(self, reason, text):
+        """Log `text`, and the same `reason` again after REPEAT_S: programs repeat their commands."""
+        now_s = time.monotonic()
+        if now_s - self._warned_at_s.get(reason, -math.inf) >= REPEAT_S:
+            self._warned_at_s[reason] = now_s
+            rospy.logwarn("%s arm: %s", self.name, text)
 
     def _angles_by_name(self):
         with self._lock:
@@ -274,11 +314,10 @@ class Limb:
     def _point(self, vector):
         return self.Point(vector.x, vector.y, vector.z)
 
-    def _enabled(self):
-        """Whether the robot reports that it is enabled; None without a report."""
+    def _refusal(self):
+        """Why the robot takes no commands, "" if it does, or has not reported yet."""
         with self._lock:
-            state = self._robot_state
-        return None if state is None else state.enabled and not state.stopped
+            return why_not_ready(self._robot_state) if self._robot_state is not None else ""
 
     def _has_joint_states(self):
         with self._lock:
@@ -301,6 +340,8 @@ class Limb:
     def _on_robot_state(self, message):
         with self._lock:
             self._robot_state = message
+        if why := self._ignored.heard(time.monotonic(), why_not_ready(message)):
+            self._warn("ignored", "a command has no effect: %s" % why)
 
     def _unregister(self):
         for end in (*self._subscribers, self._resets, self._speed_publisher, self._timeout_publisher,

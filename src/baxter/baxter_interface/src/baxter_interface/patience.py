@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wait for several conditions in order, in wall time, with one line of progress. Free of ROS."""
+import difflib
 import errno
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 # A wait that is shorter than this prints nothing [s].
@@ -10,6 +11,26 @@ FIRST_NOTICE_S = 1.0
 POLL_S = 0.05
 # Period of the checks whether the awaited thing is starting [s].
 LOOK_EVERY_S = 1.0
+
+
+def others_than(name: str, known: Iterable[str]) -> str:
+    """What to say after "there is no topic" (or service) `name`: those of the `known` names that may have been meant.
+
+    Names that differ in one part are of the same kind, such as the channels of a robot. Of others, the most similar.
+    """
+    parts, kinds = name.split("/"), {}
+    for other in known:
+        words = other.split("/")
+        places = [place for place, word in enumerate(words) if len(words) == len(parts) and word != parts[place]]
+        if len(places) == 1:
+            kinds.setdefault(places[0], set()).add(words[places[0]])
+    if not kinds:
+        near = difflib.get_close_matches(name, list(known))
+        return near and "; the most similar: %s" % ", ".join(near) or ""
+    place, words = max(kinds.items(), key=lambda kind: len(kind[1]))
+    near = difflib.get_close_matches(parts[place], sorted(words))
+    return "%s; in place of %s there are %s" % (
+        near and ". Is %s meant" % " or ".join(near) or "", parts[place], ", ".join(sorted(words)))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,10 @@
 import errno
 import threading
 
+import rosgraph
 import rospy
+
+from .patience import others_than
 
 
 class ServiceUnavailable(OSError, rospy.ROSException):
@@ -21,9 +24,16 @@ def wait_for_service(name, timeout_s):
     try:
         rospy.wait_for_service(name, timeout_s)
     except rospy.ROSException as failure:
-        raise ServiceUnavailable(
-            "there is no service %s after %.0f s: does this robot or simulator have it (rosservice list)?"
-            % (name, timeout_s)) from failure
+        raise ServiceUnavailable("there is no service %s after %.0f s%s" % (
+            name, timeout_s, others_than(name, _services()))) from failure
+
+
+def _services() -> list[str]:
+    """List the names of the services that the master knows; none if it does not answer."""
+    try:
+        return [service for service, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]]
+    except (OSError, rosgraph.MasterException):
+        return []
 
 
 def call_service(name, kind, *arguments, timeout_s=5.0):

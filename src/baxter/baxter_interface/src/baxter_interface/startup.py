@@ -18,7 +18,7 @@ from lab_environment.simulator_start import StartWatch
 from lab_environment.waiting_line import WaitingLine
 from rospy_limits.node import limit_ports
 
-from .patience import Condition, wait_in_order
+from .patience import Condition, others_than, wait_in_order
 
 # Longest wait for a robot [s, wall], not counting the time while a simulator is starting.
 STARTUP_TIMEOUT_S = 30.0
@@ -224,4 +224,6 @@ def _explain_topic(topic):
     if twins:
         return "nobody publishes it, but there is %s: is this program in the wrong namespace (%s)?" % (
             ", ".join(twins), rospy.get_namespace())
+    if rospy.resolve_name("robot/state") in published:
+        return "the robot is up, but has no such topic%s" % others_than(topic, published)
     return "the master is up, but nobody publishes it: %s" % _LAUNCH_HINT

@@ -28,6 +28,7 @@ CUSTOM_ID = 131073
 KNOBS = {
     "ui_type": EndEffectorProperties.ELECTRIC_GRIPPER,
     "firmware_date": "",  # of the electric one, in place of its own
+    "enabled": True,      # the robot
     "calibrated": True,   # at a reload
     "error": False,       # at a reload
     "acknowledges": True,
@@ -94,8 +95,8 @@ class FakeGripper:
             self._knobs = {name: rospy.get_param("~" + name, default) for name, default in KNOBS.items()}
             kind = self._knobs["ui_type"]
             self._hand = HANDS[kind](self._knobs) if kind in HANDS else NoHand()
-            # The robot is enabled here.
-            self._topics = GripperTopics({SIDE: self._hand}, RobotState(State.ENABLED))
+            state = RobotState(State.ENABLED if self._knobs["enabled"] else State.DISABLED)
+            self._topics = GripperTopics({SIDE: self._hand}, state)
             if kind == EndEffectorProperties.PASSIVE_GRIPPER:
                 self._take("gripper_set_properties", EndEffectorProperties(id=CUSTOM_ID, ui_type=kind))
         return TriggerResponse(success=True)

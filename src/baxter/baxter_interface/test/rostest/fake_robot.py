@@ -8,7 +8,7 @@ import threading
 import time
 
 import rospy
-from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
+from baxter_core_msgs.msg import AssemblyState, CollisionAvoidanceState, EndpointState, JointCommand
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, Float64
@@ -25,6 +25,8 @@ KNOBS = {
     "start_delay_s": 0.0,      # wall time between the node's start and its first topic
     "lag_s": 0.02,             # time constant with which joints follow their commands
     "stuck": [],               # joints that never move
+    "near": [],                # what collision avoidance finds too near to the left arm ...
+    "other_arm": False,        # ... and whether it is part of the other one
     "enabled": False,          # at the start
     "refuse_enable": False,    # enable requests change nothing
     "stop_button": False,      # pressed: stopped, and no reset helps
@@ -51,6 +53,8 @@ class FakeRobot:
         self._joint_publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
         self._endpoint_publishers = [
             rospy.Publisher("/robot/limb/%s/endpoint_state" % side, EndpointState, queue_size=1) for side in SIDES]
+        self._avoidance_publisher = rospy.Publisher("/robot/limb/left/collision_avoidance_state",
+                                                    CollisionAvoidanceState, queue_size=1)
         self._clock_publisher = None
         if self._knobs["clock_start_s"] >= 0.0:
             self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=1)
@@ -102,6 +106,7 @@ class FakeRobot:
             message.twist.angular.z = 0.25
             message.wrench.force.x = 3.0
             publisher.publish(message)
+        self._avoidance_publisher.publish(other_arm=self._knobs["other_arm"], collision_object=self._knobs["near"])
         if self._clock_publisher:
             self._clock_publisher.publish(rospy.Time.from_sec(self._knobs["clock_start_s"] + time_s))
 

@@ -4,6 +4,7 @@
 import errno
 import json
 import unittest
+from unittest import mock
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand
@@ -101,6 +102,15 @@ class ElectricTest(unittest.TestCase):
         gripper = gripper_of(ELECTRIC, works=False)
         self.assertIs(gripper.close(block=True, timeout=0.3), False)
         self.assertIs(gripper.close(), True)  # nobody waited
+
+    def test_command_to_a_robot_that_is_not_enabled_ends_soon_and_says_so(self):
+        gripper = gripper_of(ELECTRIC, enabled=False)
+        begin_s = rospy.get_time()
+        for block in (True, False):
+            with mock.patch.object(rospy, "logwarn") as log:
+                self.assertIs(gripper.close(block=block, timeout=60.0), not block)
+                wait_for(lambda log=log: any("not enabled" in str(call) for call in log.mock_calls), DEADLINE_S)
+        self.assertLess(rospy.get_time() - begin_s, 30.0)
 
     def test_gripper_that_never_acknowledges_is_judged_by_its_state(self):
         gripper = gripper_of(ELECTRIC, acknowledges=False)

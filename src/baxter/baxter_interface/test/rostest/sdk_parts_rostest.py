@@ -4,6 +4,7 @@
 import errno
 import time
 import unittest
+from unittest import mock
 
 import rospy
 from bullet_sim_msgs.srv import Press, PressRequest
@@ -23,6 +24,13 @@ def set_knobs(**knobs):
         rospy.set_param("/fake_parts/" + name, value)
     rospy.wait_for_service("/fake_parts/reload", DEADLINE_S)
     rospy.ServiceProxy("/fake_parts/reload", Trigger)()
+
+
+def enable_robot(enabled):
+    """Enable or disable the fake robot; in force when this returns."""
+    rospy.set_param("/fake_robot/enabled", enabled)
+    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
+    rospy.ServiceProxy("/fake_robot/reload", Trigger)()
 
 
 class Fingers:
@@ -90,7 +98,22 @@ class DigitalIOTest(PartsTest):
         self.assertEqual(seen, [True, False])
 
     def test_channel_that_is_not_there_is_named(self):
-        self.assert_times_out(lambda: DigitalIO("left_lower_cough"), "/robot/digital_io/left_lower_cough/state")
+        with self.assertRaises(OSError) as caught:
+            DigitalIO("left_lower_cough")
+        for text in ("/robot/digital_io/left_lower_cough/state", "left_lower_cuff", "torso_left_inner_light"):
+            self.assertIn(text, caught.exception.strerror)
+        self.assertNotIn("running", caught.exception.strerror)
+
+    def test_name_of_sdk_1_0_stands_for_the_present_one(self):
+        with mock.patch.object(rospy, "logwarn") as log:
+            button, fingers = DigitalIO("torso_left_itb_button0"), Fingers()
+        self.assertIn("torso_left_button_ok", str(log.mock_calls))
+        self.addCleanup(fingers.touch, "torso_left_button_ok", False)
+        fingers.touch("torso_left_button_ok", True)
+        wait_for(lambda: button.state, DEADLINE_S)
+        light = DigitalIO("torso_left_itb_light_inner")
+        light.set_output(True)
+        light.set_output(False)
 
 
 class AnalogIOTest(PartsTest):
@@ -187,6 +210,16 @@ class HeadTest(PartsTest):
         set_knobs(head_turns=False)
         self.assert_times_out(lambda: self.head.set_pan(-1.0, timeout=0.3), "did not turn to -1.000 rad within 0.3 s")
         self.assertRaises(ValueError, self.head.set_pan, float("nan"))
+
+    def test_head_of_a_robot_that_is_not_enabled_says_so_soon(self):
+        set_knobs(head_turns=False, nods=False)
+        self.addCleanup(enable_robot, True)
+        enable_robot(False)
+        for call in (lambda: self.head.set_pan(-1.0, timeout=DEADLINE_S),
+                     lambda: self.head.command_nod(timeout=DEADLINE_S)):
+            begin_s = time.monotonic()
+            self.assert_times_out(call, "not enabled")
+            self.assertLess(time.monotonic() - begin_s, 0.5 * DEADLINE_S)
 
     def test_nod_begins_and_ends(self):
         self.head.command_nod()

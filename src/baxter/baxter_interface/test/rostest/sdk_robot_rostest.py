@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 import baxter_model
 from baxter_dataflow import wait_for
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
-from baxter_interface.joint_motion import PEAK_SPEED_RAD_S
+from baxter_interface.joint_motion import MAKING_ROOM_S, PEAK_SPEED_RAD_S
 from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.robot_enable import ENABLE_TIMEOUT_S
 
@@ -281,14 +281,14 @@ class LimbTest(unittest.TestCase):
         limb, recorder = self.limbs["left"], self.commands_of("left")
         self.assertTrue(limb.move_to_joint_positions({"left_s0": -0.5}))
         commands, stamps = [limb.joint_angle("left_s0")], [rospy.get_time()]
-        set_joint_positions = limb.set_joint_positions
+        send = limb._send
 
-        def command(positions):
+        def command(mode, positions):
             commands.append(positions["left_s0"])
-            set_joint_positions(positions)
+            send(mode, positions)
 
         recorder.messages.clear()
-        with mock.patch.object(limb, "set_joint_positions", command):
+        with mock.patch.object(limb, "_send", command):
             self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.5},
                                                          test=lambda: stamps.append(rospy.get_time())))
         self.assertEqual(len(commands), len(stamps))
@@ -320,6 +320,40 @@ class LimbTest(unittest.TestCase):
         off = self.limbs["left"].joint_angle("left_w1") + 0.5
         self.assertIs(self.limbs["left"].move_to_joint_positions({"left_w1": off, "left_w2": 0.1}, timeout=2.5), False)
         self.log.wait_for_text("left arm: not there after 2.5 s: left_w1 is 0.5000 rad from its target")
+
+    def test_arm_held_by_collision_avoidance_ends_the_move_with_the_reason_and_the_command_that_helps(self):
+        set_knobs(enabled=True, stuck=["left_s1"], near=["collision_head_link_2"])
+        limb = self.limbs["left"]
+        off = {"left_s1": limb.joint_angle("left_s1") - 0.5}
+        begin_s = rospy.get_time()
+        self.assertIs(limb.move_to_joint_positions(off, timeout=DEADLINE_S), False)
+        self.assertLess(rospy.get_time() - begin_s, 0.5 * DEADLINE_S)
+        self.log.wait_for_text("too near to collision_head_link_2")
+        self.log.wait_for_text("tuck_arms.py -u")
+        # The same for commands that nobody waits for, and for short moves.
+        for command in (lambda: limb.set_joint_positions(off), lambda: limb.set_joint_velocities({"left_s1": -0.5}),
+                        lambda: limb.move_to_joint_positions(off, timeout=0.0)):
+            with mock.patch.object(rospy, "logwarn") as log:
+                wait_for(lambda log=log: any("too near" in str(call) for call in log.mock_calls), DEADLINE_S,
+                         body=command)
+            limb._warned_at_s.clear()
+
+    def test_other_arm_may_make_room(self):
+        set_knobs(enabled=True, stuck=["left_s1"], near=["right_lower_forearm"], other_arm=True)
+        off, begin_s = self.limbs["left"].joint_angle("left_s1") - 0.5, rospy.get_time()
+        self.assertIs(self.limbs["left"].move_to_joint_positions({"left_s1": off}, timeout=DEADLINE_S), False)
+        self.assertGreater(rospy.get_time() - begin_s, MAKING_ROOM_S)
+        self.log.wait_for_text("too near to right_lower_forearm")
+
+    def test_command_to_a_robot_that_is_not_enabled_says_so(self):
+        limb = self.limbs["left"]
+        limb.set_joint_positions(limb.joint_angles())
+        set_knobs(enabled=False)
+        limb._warned_at_s.clear()
+        wait_for(lambda: limb._refusal(), DEADLINE_S)
+        with mock.patch.object(rospy, "logwarn") as log:
+            wait_for(lambda: any("not enabled" in str(call) for call in log.mock_calls), DEADLINE_S,
+                     body=lambda: limb.set_joint_velocities({"left_s0": 0.1}))
 
     def test_own_test_stops_the_move(self):
         limb, recorder = self.limbs["left"], self.commands_of("left")

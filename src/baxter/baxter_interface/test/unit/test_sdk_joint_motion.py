@@ -8,10 +8,15 @@ from baxter_interface.joint_motion import (
     DISABLED_GRACE_S,
     PEAK_ACCELERATION_RAD_S2,
     PEAK_SPEED_RAD_S,
+    STILL_S,
+    Hindrance,
     Move,
     SmoothPath,
+    Standstill,
+    is_far,
 )
 from baxter_interface.settings import JOINT_ANGLE_TOLERANCE
+from baxter_model.readiness import NOT_ENABLED
 
 PERIOD_S = 0.01
 # From the simulator's start pose to neutral: the widest way is 1.6 rad, at s1.
@@ -91,11 +96,58 @@ def test_stuck_joint_is_named_with_its_error_and_the_threshold():
     assert commands[-1] == NEUTRAL, "the target stays commanded: the joint may come loose"
 
 
-def test_time_too_short_for_the_way_leaves_the_arm_where_it_is():
+def test_time_too_short_for_the_way_leaves_the_last_command():
     step, time_s, angles, commands = drive(Move(START, NEUTRAL, 0.5), START)
     assert not step.arrived and time_s == pytest.approx(0.5, abs=0.011)
-    assert commands[-1] == angles
+    assert abs(NEUTRAL["left_s1"] - commands[-1]["left_s1"]) < abs(NEUTRAL["left_s1"] - angles["left_s1"])
     assert "A gentle move takes" in step.failure
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, 0.01, 0.1, 0.3])
+def test_a_loop_of_short_calls_moves_the_arm_as_the_vendors_filter(timeout_s):
+    start, target = {"left_s0": 0.2}, {"left_s0": 0.5}
+    angles, time_s = start, 0.0
+    while time_s < 3.0:
+        step, duration_s, angles, _ = drive(Move(angles, target, timeout_s), angles, lag_s=PERIOD_S)
+        assert not step.is_last or "A gentle move takes" in step.failure or step.arrived
+        # The last command of a call acts until the next one.
+        angles = dict(step.command)
+        time_s += duration_s + PERIOD_S
+    # A low pass of 0.2 Hz leaves 1 - exp(-3 s / 0.8 s) = 2 % of the way.
+    assert 0.27 < angles["left_s0"] - start["left_s0"] <= 0.3
+
+
+def test_a_short_call_arrives_where_the_arm_is_near():
+    near = {name: angle + 0.5 * JOINT_ANGLE_TOLERANCE for name, angle in NEUTRAL.items()}
+    step = Move(near, NEUTRAL, 0.0).step(0.0, near, {})
+    assert step.arrived and step.command == NEUTRAL
+
+
+def test_an_arm_that_is_held_stays_where_it_is_and_says_why():
+    move = Move(START, NEUTRAL, 15.0)
+    step = move.step(3.0, START, {}, hindrance=Hindrance("too near to the head", True))
+    assert step.is_last and not step.arrived and step.command == START
+    assert "too near to the head" in step.failure and "left_s1 is 1.5970 rad" in step.failure
+    hurried = Move(START, NEUTRAL, 0.0).step(0.0, START, {}, hindrance=Hindrance("too near to the head", True))
+    assert "too near to the head" in hurried.failure and hurried.command != START, "the next call may lead away"
+    late = Move(START, NEUTRAL, 15.0).step(15.0, START, {}, hindrance=Hindrance("its cuff is squeezed"))
+    assert "its cuff" in late.failure and late.command == NEUTRAL
+
+
+def look_at(standstill, moments):
+    return [standstill.look(time_s, far, {"left_s0": angle}) for time_s, far, angle in moments]
+
+
+def test_an_arm_stands_still_that_is_far_from_its_goal_and_does_not_move():
+    still = look_at(Standstill(), [(t * 0.5, True, 0.001 * t) for t in range(5)])
+    assert still == [0.0, 0.5, 1.0, 1.5, 2.0] and STILL_S == 1.5
+    assert max(look_at(Standstill(), [(t * 0.5, True, 0.03 * t) for t in range(9)])) == 0.0, "it moves"
+    assert max(look_at(Standstill(), [(t * 0.5, False, 0.0) for t in range(9)])) == 0.0, "it is where it should be"
+    assert look_at(Standstill(), [(9.0, True, 0.0), (1.0, True, 0.0)]) == [0.0, 0.0], "the clock went back"
+
+
+def test_only_the_joints_of_a_goal_are_far_from_it():
+    assert is_far(START, NEUTRAL) and not is_far(START, {"left_w1": START["left_w1"] + 0.01})
 
 
 def test_own_test_stops_the_arm_where_it_is():
@@ -105,22 +157,22 @@ def test_own_test_stops_the_arm_where_it_is():
 
 
 def test_disabled_robot_ends_the_move_and_nothing_more_is_commanded():
-    step, time_s, _, _ = drive(Move(START, NEUTRAL, 15.0), START, enabled=False)
+    step, time_s, _, _ = drive(Move(START, NEUTRAL, 15.0), START, refusal=NOT_ENABLED)
     assert not step.arrived and step.command is None
     assert "not enabled" in step.failure and "enable_robot.py -e" in step.failure
     assert time_s == pytest.approx(DISABLED_GRACE_S, abs=0.011)
 
 
 def test_disabled_robot_at_the_target_has_not_arrived():
-    step, _, _, _ = drive(Move(NEUTRAL, NEUTRAL, 15.0), NEUTRAL, enabled=False)
+    step, _, _, _ = drive(Move(NEUTRAL, NEUTRAL, 15.0), NEUTRAL, refusal=NOT_ENABLED)
     assert not step.arrived and "not enabled" in step.failure
 
 
 def test_late_news_of_enabling_does_not_end_the_move():
     move = Move(START, NEUTRAL, 15.0)
-    assert not move.step(0.0, START, {}, enabled=False).is_last
-    assert not move.step(0.1, START, {}, enabled=True).is_last
-    assert not move.step(0.3, START, {}, enabled=False).is_last
+    assert not move.step(0.0, START, {}, refusal=NOT_ENABLED).is_last
+    assert not move.step(0.1, START, {}, refusal="").is_last
+    assert not move.step(0.3, START, {}, refusal=NOT_ENABLED).is_last
 
 
 def test_wide_threshold_ends_the_move_in_passing_with_the_target_commanded():

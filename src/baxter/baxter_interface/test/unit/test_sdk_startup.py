@@ -6,6 +6,8 @@ import math
 import pytest
 
 from baxter_interface import startup
+from baxter_interface.io_channel import present_name
+from baxter_interface.patience import others_than
 
 
 class Publisher:
@@ -29,3 +31,24 @@ def test_subscribers_are_waited_for_until_there_are_enough(monkeypatch, listed, 
     publisher = Publisher()
     startup.wait_for_subscribers(publisher, timeout=math.inf, enough=enough)
     assert publisher.looks == looks
+
+
+PUBLISHED = ("/robot/digital_io/left_lower_cuff/state", "/robot/digital_io/left_button_ok/state", "/robot/state",
+             "/clock", "/robot/joint_states")
+
+
+@pytest.mark.parametrize("name, told", [
+    ("/robot/digital_io/left_lower_cough/state", ["left_lower_cuff meant", "left_button_ok, left_lower_cuff"]),
+    ("/robot/digital_io/zzz/state", ["in place of zzz there are left_button_ok"]),
+    ("/robot/joint_state", ["joint_states"]), ("/a/b/c/d/e/f", [])])
+def test_who_asks_for_what_is_not_there_is_told_what_is(name, told):
+    text = others_than(name, PUBLISHED)
+    assert all(words in text for words in told) and bool(text) == bool(told)
+
+
+@pytest.mark.parametrize("old, new", [
+    ("left_itb_button0", "left_button_ok"), ("torso_right_itb_button2", "torso_right_button_show"),
+    ("right_itb_light_outer", "right_outer_light"), ("torso_left_itb_wheel", "torso_left_wheel"),
+    ("left_lower_cuff", "left_lower_cuff"), ("left_itb_button3", "left_itb_button3")])
+def test_channels_of_sdk_1_0_have_another_name_now(old, new):
+    assert present_name(old) == new

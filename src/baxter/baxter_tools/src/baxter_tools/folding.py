@@ -17,6 +17,7 @@ from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.programs import ProgramFailed
 from baxter_interface.resets import PUT_ELSEWHERE
 from baxter_model import SIDES, poses
+from baxter_model.readiness import NOT_ENABLED
 
 from .path_planner import NoPath, PathPlanner
 from .self_clearance import SelfClearance
@@ -78,7 +79,7 @@ class Arms:
 
     def _step(self, move, elapsed_s, enabled, resets):
         speeds = {name: speed for limb in self._limbs for name, speed in limb.joint_velocities().items()}
-        return move.step(elapsed_s, self.angles(), speeds, enabled=enabled,
+        return move.step(elapsed_s, self.angles(), speeds, refusal="" if enabled else NOT_ENABLED,
                          interrupted=PUT_ELSEWHERE if self._resets() != resets else "")
 
 

@@ -3,6 +3,7 @@
 """tuck_arms.py folds and unfolds the simulated arms without a touch."""
 import subprocess
 import unittest
+from unittest import mock
 
 import numpy as np
 import rospy
@@ -55,6 +56,20 @@ class TuckArmsTest(unittest.TestCase):
             self.assertGreater(np.ptp(trace.postures, axis=0).max(), 1.0)
             self.assertGreater(min(map(clearance, trace.postures)), 0.002)
             self.assertFalse(robot.state().enabled)  # as before
+            if option == "-t":
+                self.look_at_a_move_of_folded_arms(robot)
+
+    def look_at_a_move_of_folded_arms(self, robot):
+        """The robot holds them; the program hears soon why, and what helps."""
+        robot.enable()
+        self.addCleanup(robot.disable)
+        begin_s = rospy.get_time()
+        with mock.patch.object(rospy, "logerr") as log:
+            self.assertIs(Limb("left").move_to_neutral(), False)
+        self.assertLess(rospy.get_time() - begin_s, 10.0)
+        self.assertIn("too near to collision_head_link", str(log.mock_calls))
+        self.assertIn("tuck_arms.py -u", str(log.mock_calls))
+        robot.disable()
 
     def test_one_of_both_options_is_needed(self):
         for options in ((), ("-t", "-u")):

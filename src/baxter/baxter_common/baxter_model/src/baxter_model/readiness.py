@@ -3,6 +3,7 @@
 
 ENABLE = "rosrun baxter_tools enable_robot.py -e"
 RESET = "rosrun baxter_tools enable_robot.py -r"
+UNFOLD = "rosrun baxter_tools tuck_arms.py -u"
 NOT_ENABLED = "the robot is not enabled; enable it: " + ENABLE
 STOPPED = "the robot is stopped; release its stop button if it is pressed, then reset it: %s, and enable it: -e" % RESET
 
@@ -19,6 +20,12 @@ def why_not_ready(state):
     if state.stopped:
         return STOPPED
     return "" if state.enabled else NOT_ENABLED
+
+
+def held_by_avoidance(parts):
+    """Return the sentence that collision avoidance holds an arm; ``parts``: names of those that it is too near to."""
+    return ("collision avoidance holds it: it is too near to %s. Move it away by another way; unfold folded arms: %s"
+            % (", ".join(parts), UNFOLD))
 
 
 def lost(topic):

@@ -6,6 +6,7 @@ from std_msgs.msg import Header
 
 from baxter_model import BASE_FRAME, SIDES
 from baxter_model.description import arm_radius, head_guards
+from baxter_model.readiness import UNFOLD
 from baxter_model.self_collision import BODY
 from baxter_sim_hardware.arms import avoidance, collision, safety
 from sim_time.pace import Schedule
@@ -125,8 +126,8 @@ class CollisionTopics(Part):
                 if (field := self._field(side, self._world.time_s)).near]
         if not near:
             return ""
-        return ("in the field of collision avoidance: %s; unfold the arms by rosrun baxter_tools tuck_arms.py -u, "
-                "which suppresses it" % " and ".join(near))
+        return "in the field of collision avoidance: %s; unfold the arms by %s, which suppresses it" % (
+            " and ".join(near), UNFOLD)
 
     def _contacts(self):
         """[(link, link)] of the robot's own contacts that overlap or press."""
