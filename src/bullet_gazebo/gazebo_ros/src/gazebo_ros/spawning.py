@@ -25,6 +25,7 @@ from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.simulation import HostedPlugin
 from gazebo_ros.world_lights import lights_of_links
 from loop_ros.faults import SURVIVED, described
+from loop_ros.names import IllegalName
 from model_files.resources import ResourceFinder
 from sdf_model import ModelFolders, SdfError, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
@@ -191,7 +192,7 @@ class Spawner:
             self.lights[prepared.name] = prepared.lights
             for plugin_class, element, namespace in prepared.plugins:
                 self._start_plugin(prepared, model.name, plugin_class, element, namespace)
-        except (PluginError, BulletSimError) as error:
+        except (SpawnRefused, PluginError, BulletSimError) as error:
             self._remove(prepared.name)
             raise SpawnRefused(str(error)) from error
         except SURVIVED:
@@ -251,10 +252,11 @@ class Spawner:
                                 self._log, self._ros, prepared.parameters, host)
         try:
             plugin = plugin_class(context)
-        except PluginError as error:
+        except (PluginError, IllegalName) as error:
             context.close()
             if plugin_class.required:
-                raise
+                raise SpawnRefused("plugin '%s': %s" % (label, error)
+                                   if isinstance(error, IllegalName) else str(error)) from error
             self._leave_out(model_name, error)
             return
         except SURVIVED:
@@ -288,7 +290,7 @@ class Spawner:
                                % (filename, ", ".join(self._library.plugins.known)))
                 continue
             own = ""
-            if spawn_namespace is None and plugin_class.named_after_model and re.fullmatch(r"[A-Za-z]\w*", name):
+            if spawn_namespace is None and plugin_class.named_after_model and re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
                 own = name
             namespace = urdf_extras.namespace_of(element, spawn_namespace or own)
             if issubclass(plugin_class, DrawnSensor):

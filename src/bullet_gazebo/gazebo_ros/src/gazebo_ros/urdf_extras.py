@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the ``<gazebo>`` elements of a URDF. In an SDF they are our own extension. ROS-free."""
 import math
-import re
+
+from loop_ros.names import IllegalName, checked_name
 
 #: The element, inside <gazebo>, in which spawn_model hands over the joint positions of its option -J.
 START_CONFIGURATION = "start_configuration"
@@ -96,11 +97,17 @@ def with_start_configuration(xml, positions):
 
 
 def namespace_of(plugin, spawn_namespace):
-    """The absolute namespace of a plugin: its own ``robotNamespace``, else the one it was spawned with."""
+    """The absolute namespace of a plugin: its own ``robotNamespace``, else the one it was spawned with.
+
+    Raises :class:`ExtrasError` for a namespace that is none in ROS.
+    """
     own = (plugin.findtext("robotNamespace") or "").strip()
     name = (own or spawn_namespace or "").strip("/")
-    name = re.sub("/+", "/", name)
-    return "/" + name if name else ""
+    try:
+        return checked_name("/" + name) if name else ""
+    except IllegalName as error:
+        raise ExtrasError("the namespace of plugin '%s', %s: %s" % (
+            plugin.get("filename"), "its robotNamespace" if own else "robot_namespace of the request", error)) from None
 
 
 def _attribute(text):

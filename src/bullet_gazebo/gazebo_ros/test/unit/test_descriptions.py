@@ -41,6 +41,15 @@ def test_a_plugin_without_namespace_gets_the_one_it_is_spawned_with():
     assert urdf_extras.namespace_of(none, "") == ""
 
 
+@pytest.mark.parametrize("namespace", ["a\x01b", "a b", "/arm\0", "a-b", "\n"])
+def test_a_namespace_that_is_none_in_ros_is_refused_unless_a_plugin_has_its_own(namespace):
+    own, none = urdf_extras.plugins(parse_urdf(URDF))
+    assert urdf_extras.namespace_of(own, namespace) == "/arm"
+    with pytest.raises(urdf_extras.ExtrasError) as found:
+        urdf_extras.namespace_of(none, namespace)
+    assert "robot_namespace" in str(found.value) and "libb.so" in str(found.value) and str(found.value).isprintable()
+
+
 class Plain(ModelPlugin):
     pass
 

@@ -90,6 +90,10 @@ class NodeHandle:
         """Absolute names of all services that the node serves now, of all owners: a list."""
         return self._ros.served()
 
+    def subscribed(self):
+        """Absolute names of all topics that the node subscribes to in the loop now, of all owners: a list."""
+        return self._ros.subscribed()
+
     def withdraw(self, name):
         """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners,
         permanently. For an owner that restricts what clients may do.

@@ -101,7 +101,8 @@ class Faults(Protocol):
 
 
 class LoopRos(Protocol):
-    """Makes publishers, subscriptions and services from absolute names."""
+    """Makes publishers, subscriptions and services from absolute names; for a name that is none in ROS, each raises
+    ``loop_ros.names.IllegalName``."""
 
     faults: Faults
 
@@ -120,6 +121,9 @@ class LoopRos(Protocol):
 
     def served(self):
         """Names of the services that are served now: a list."""
+
+    def subscribed(self):
+        """Names of the topics that are subscribed to now: a list."""
 
     def withdraw(self, name):
         """Close all owners' service and subscriptions of this name; returns the service's handler, or None where there

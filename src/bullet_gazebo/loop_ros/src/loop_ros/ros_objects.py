@@ -12,6 +12,7 @@ import weakref
 import rospy
 
 from loop_ros.faults import SURVIVED, described
+from loop_ros.names import checked_name
 from loop_ros.publisher import LoopPublisher
 from loop_ros.request_queue import LoopEnded
 from loop_ros.subscriber import Connection
@@ -20,7 +21,8 @@ from rospy_limits.messages import largest_message_bytes
 
 
 class RosObjects:
-    """Makes publishers, subscriptions and services for the loop."""
+    """Makes publishers, subscriptions and services for the loop. Each raises ``loop_ros.names.IllegalName`` for a name
+    that is none in ROS."""
 
     def __init__(self, publishers, subscribers, requests, log, faults):
         """``publishers``: :class:`PublisherHub`; ``subscribers``: :class:`SubscriberHub`; ``requests``:
@@ -39,7 +41,7 @@ class RosObjects:
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
         """A :class:`LoopPublisher` for the absolute name ``topic``."""
-        registered = []
+        topic, registered = checked_name(topic), []
 
         def register():
             if publisher.is_closed:
@@ -63,6 +65,7 @@ class RosObjects:
 
     def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
         """A :class:`Subscription` to ``topic``; ``notice()`` is called after each message, in any thread."""
+        topic = checked_name(topic)
         subscription = Subscription(depth, notice, self._counting(topic))
         self._subscriptions[topic] = [*self._subscriptions.get(topic, ()), subscription]
         registered = []
@@ -97,6 +100,10 @@ class RosObjects:
     def served(self):
         """Names of the services that are advertised now: a list."""
         return list(self._services)
+
+    def subscribed(self):
+        """Names of the topics that are subscribed to now: a list."""
+        return [topic for topic, subscriptions in list(self._subscriptions.items()) if subscriptions]
 
     def withdraw(self, name):
         """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners.
@@ -142,6 +149,7 @@ class RosObjects:
         self._jobs.put(function)
 
     def _serve(self, name, srv_class, answer_in_thread, handler):
+        name = checked_name(name)
         service = self._services[name] = _Service(self, name, handler)
 
         def register():
@@ -166,9 +174,9 @@ class RosObjects:
             job = self._jobs.get()
             try:
                 job()
-            except Exception as error:  # noqa: BLE001  (one bad name or a lost master must not end the thread)
+            except SURVIVED as error:  # what one topic meets must not keep the others from the master
                 if not rospy.is_shutdown():
-                    self._log.error("cannot register with the ROS master: %s" % error)
+                    self.faults.note("registering with the ROS master", error)
 
 
 def answering(name, handler, faults):
@@ -272,4 +280,8 @@ class _Service:
         self._is_closed = True
         if self._objects._services.get(self._name) is self:
             del self._objects._services[self._name]
-        self._objects.later(lambda: self.registration.shutdown("closed"))
+        self._objects.later(self._unregister)
+
+    def _unregister(self):
+        if self.registration is not None:  # its registration may have failed
+            self.registration.shutdown("closed")

@@ -7,6 +7,7 @@ answers of services are the real code.
 import io
 
 from loop_ros.faults import Faults
+from loop_ros.names import checked_name
 from loop_ros.ros_objects import answering
 from loop_ros.subscription import Subscription
 
@@ -75,11 +76,13 @@ class FakeRos:
         self._reads = 0
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
+        _check(topic)
         first = self.publishers.get(topic)
         sent = _Sent(self._heard(topic), self._clock) if first is None else first._sent
         return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
 
     def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
+        _check(topic)
         subscription = Subscription(depth, notice, self._counting(topic))
         subscribed = self.subscriptions.setdefault(topic, FakeTopic(msg_class))
         subscribed.all.append(subscription)
@@ -95,6 +98,7 @@ class FakeRos:
         return subscription
 
     def service(self, name, srv_class, handler):
+        _check(name)
         service = _FakeService(self, name)
         self._handlers[name] = service, handler
         self.services[name] = answering(name, handler, self.faults)
@@ -105,6 +109,9 @@ class FakeRos:
 
     def served(self):
         return list(self.services)
+
+    def subscribed(self):
+        return list(self.subscriptions)
 
     def withdraw(self, name):
         if name in self.subscriptions:
@@ -137,6 +144,11 @@ class FakeRos:
 
     def _counting(self, topic):
         return lambda error: self.faults.note(topic, error, "the message is dropped")
+
+
+def _check(name):
+    """Tests may leave out the leading slash."""
+    checked_name(name if name.startswith("/") else "/" + name)
 
 
 class _Sent:

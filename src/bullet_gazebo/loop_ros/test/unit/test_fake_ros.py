@@ -25,6 +25,7 @@ from loop_ros import protocol, ros_objects
 from loop_ros.action_server import ActionServer
 from loop_ros.faults import Faults
 from loop_ros.log import LoopLog
+from loop_ros.names import IllegalName, checked_name
 from loop_ros.node_handle import NodeHandle
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.reconfigure import Setting, SettingsServer
@@ -113,7 +114,8 @@ class Real:
     def _subscriber(self, topic, msg_class, callback, tcp_nodelay=False):
         callbacks = self._subscribed.setdefault(topic, [])
         callbacks.append(callback)
-        return SimpleNamespace(impl=SimpleNamespace(add_connection=None), unregister=lambda: callbacks.remove(callback))
+        return SimpleNamespace(impl=SimpleNamespace(add_connection=None), get_num_connections=lambda: 0,
+                               unregister=lambda: callbacks.remove(callback))
 
     def _service(self, name, srv_class, answer):
         self._served[name] = answer
@@ -330,16 +332,33 @@ def test_what_came_in_is_told_once_and_counts_on_after_the_end(side):
     assert side.ros.deliveries() == {TOPIC: 0, "/other": 2}
 
 
+@pytest.mark.parametrize("name", ["/a\x01b", "/a\0", "/a b", "/a-b", "/w\u00fcrfel", "/", "/a\n", "/a:b"])
+def test_a_name_that_is_none_in_ros_is_refused_where_it_is_opened(side, name):
+    context = NodeHandle(side.ros, "/ns")
+    for make in (lambda: context.publisher(name, String), lambda: context.subscription(name, String),
+                 lambda: context.service(name, SetBool, None), lambda: context.service_in_thread(name, SetBool, None)):
+        with pytest.raises(IllegalName) as found:
+            make()
+        assert ascii(name)[1:-1] in str(found.value) and str(found.value).isprintable()
+    assert side.context.served() == [] and not side.has_service(name)
+
+
+def test_slashes_that_are_too_many_are_none(side):
+    assert checked_name("//a///1b/") == "/a/1b"
+    side.context.publisher("//a//b", String)
+    side.ros.flush()
+
+
 def test_what_is_withdrawn_is_its_withdrawers_alone(side):
     side.context.service(SERVICE, SetBool, lambda request: SetBoolResponse(request.data, "served"))
     queue = side.context.subscription(TOPIC, String, 3)
     side.send(TOPIC, String("unread"))
-    assert side.context.served() == [SERVICE]
+    assert side.context.served() == [SERVICE] and side.context.subscribed() == [TOPIC]
     handler = side.context.withdraw(SERVICE)
     assert handler(SetBoolRequest(True)) == SetBoolResponse(True, "served")
     assert not side.has_service(SERVICE) and side.context.served() == []
     assert side.context.withdraw(TOPIC) is None and side.context.withdraw("/nothing") is None
-    assert queue.drain() == [] and side.ros.deliveries() == {}
+    assert queue.drain() == [] and side.ros.deliveries() == {} and side.context.subscribed() == []
 
 
 def test_an_action_is_served(side):
