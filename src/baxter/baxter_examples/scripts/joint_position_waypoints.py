@@ -6,7 +6,7 @@ import sys
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_interface import JOINT_ANGLE_TOLERANCE, Limb, Navigator
 from baxter_interface.programs import EnabledRobot, run
-from lab_environment.options import number
+from lab_environment.options import counted, number
 
 RATE_HZ = 20.0
 PROMPT = "press the wheel to record a waypoint (%d so far), the button below it to play them; Ctrl-C: quit"
@@ -32,7 +32,7 @@ class Waypoints:
                 break
         self._limb.set_joint_position_speed(self._speed)
         while self._playing:
-            print("playing %d waypoints" % len(self._waypoints), flush=True)
+            print("playing %s" % counted(len(self._waypoints), "waypoint"), flush=True)
             for waypoint in self._waypoints:
                 # A failed move has logged why; the beat detects a lost robot.
                 self._limb.move_to_joint_positions(waypoint, threshold=self._accuracy_rad)

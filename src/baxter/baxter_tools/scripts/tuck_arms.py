@@ -36,7 +36,7 @@ def fold(pose):
     with own_collision_avoidance() as too_near, EnabledRobot() as robot:
         look_ahead()
         way = folding.way(arms.angles(), pose)
-        rospy.loginfo("moving the arms: %d stretches to the pose %r", len(way) - 1, pose)
+        rospy.loginfo("moving the arms to the pose %r (stretches of the way: %d)", pose, len(way) - 1)
         arms.follow(way, robot.is_enabled)
         rospy.loginfo("the arms are %s", pose)
         if too_near():

@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from lab_environment.options import MOST_WORKERS, did_you_mean, number, seconds
+from lab_environment.options import MOST_WORKERS, counted, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
@@ -206,7 +206,8 @@ def run(options):
         known = {seed for seed, one in records.outcomes.items() if one.is_done or not options.retry_failed}
         left = [seed for seed in options.seeds if seed not in known]
         if len(left) < len(options.seeds):
-            print("%d of %d seeds have results in %s" % (len(options.seeds) - len(left), len(options.seeds), path))
+            print("results in %s: of %d of %s" % (
+                path, len(options.seeds) - len(left), counted(len(options.seeds), "seed")))
         for earlier in records.header.get("earlier versions", ()):
             print("batch: some of them are of other versions: %s" % changes(earlier, records.header["versions"]),
                   file=sys.stderr)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Words on command lines: types for argparse that refuse numbers with which a program cannot compute, and the name
-that a slip may have meant. Free of ROS."""
+"""Words on command lines: types for argparse that refuse numbers with which a program cannot compute, the name that a
+slip may have meant, and numbers of things in answers. Free of ROS."""
 from __future__ import annotations
 
 import argparse
@@ -41,3 +41,8 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     """Return a question for the name that is most like ``word``, to be put behind an error; "" if none is."""
     near = difflib.get_close_matches(word, list(names), 1)
     return "; did you mean %s?" % near[0] if near else ""
+
+
+def counted(count: int, noun: str, plural: str = "") -> str:
+    """Return "1 row" or "2 rows"; ``plural``: where it is not the noun with an s, as in 2 stretches."""
+    return "%d %s" % (count, noun if count == 1 else plural or noun + "s")

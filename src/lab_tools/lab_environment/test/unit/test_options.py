@@ -3,7 +3,7 @@ import argparse
 
 import pytest
 
-from lab_environment.options import did_you_mean, number, seconds
+from lab_environment.options import counted, did_you_mean, number, seconds
 
 
 @pytest.mark.parametrize("text", ["1", "10", " 7"])
@@ -30,3 +30,8 @@ def test_a_bound_may_be_left_out():
 def test_a_slip_is_answered_with_the_nearest_name():
     assert "notebook" in did_you_mean("notebok", ("check", "notebook", "web"))
     assert did_you_mean("xyz", ("check", "notebook")) == ""
+
+
+def test_singular_and_plural_agree():
+    assert [counted(count, "row") for count in (0, 1, 2)] == ["0 rows", "1 row", "2 rows"]
+    assert counted(1, "stretch", "stretches") == "1 stretch" and counted(3, "stretch", "stretches") == "3 stretches"

@@ -9,7 +9,7 @@ import time
 import rosgraph
 import rospy
 
-from lab_environment.options import seconds
+from lab_environment.options import counted, seconds
 from live_plot import fields
 from live_plot.recording import Recording
 from live_plot.subscriptions import Subscriptions, topic_types
@@ -97,8 +97,8 @@ def save_picture(options):
     if not graph.grab().save(options.png, "PNG"):
         raise fields.PlotError("%s cannot be written" % options.png)
     for label, (times, values) in recording.samples()[0].items():
-        print("%s: %d samples in %.2f s, %.6g to %.6g" % (
-            label, times.size, times[-1] - times[0], values.min(), values.max()))
+        print("%s: %s in %.2f s, %.6g to %.6g" % (
+            label, counted(times.size, "sample"), times[-1] - times[0], values.min(), values.max()))
     print("written: %s" % options.png)
 
 
