@@ -290,7 +290,8 @@ class Spawner:
                                % (filename, ", ".join(self._library.plugins.known)))
                 continue
             own = ""
-            if spawn_namespace is None and plugin_class.named_after_model and re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+            is_a_name = re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name)
+            if spawn_namespace is None and plugin_class.named_after_model and is_a_name:
                 own = name
             namespace = urdf_extras.namespace_of(element, spawn_namespace or own)
             if issubclass(plugin_class, DrawnSensor):
