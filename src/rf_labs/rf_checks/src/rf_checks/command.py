@@ -14,9 +14,10 @@ import rospkg
 
 from lab_environment import isolation, page_files
 from lab_environment.isolation import NotIsolated
+from lab_environment.options import did_you_mean
 from lab_environment.work_folder import work_folder
 from rf_checks import report, submission
-from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
+from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose, meant_instead
 from rf_checks.graph import LabFailed
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import WhichRobot
@@ -91,6 +92,11 @@ def _program_and_exercise(parser, options):
                      % " ".join([options.lab, *words]))
     name, program = ("", words[0]) if len(words) == 1 else words
     path = Path(program)
+    try:
+        if name or options.lab not in LABS:
+            choose(options.lab, name, path.name, "")
+    except UnknownExercise as error:
+        parser.error(str(error))
     if not path.is_file():
         where = "is a folder" if path.is_dir() else "is not there"
         parser.error("%s %s; give the path of your Python file" % (program, where))
@@ -107,7 +113,9 @@ def _program_and_exercise(parser, options):
     if options.serial < 0:
         parser.error("the serial number is %d, expected 0 or more" % options.serial)
     try:
-        return path, choose(options.lab, name, path.name, submission.texts(path)[path.name])
+        text = submission.texts(path)[path.name]
+        exercise = choose(options.lab, name, path.name, text)
+        return path, exercise, meant_instead(exercise, path.name, text)
     except (UnknownExercise, submission.BadSubmission) as error:
         parser.error(str(error))
 
@@ -122,7 +130,8 @@ def start(name):
     folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
     source, target = folder / (name + ".py"), Path(name + ".py")
     if name not in [exercise.name for exercise in EXERCISES]:
-        print("there is no exercise '%s'; there are: %s" % (name, ", ".join(exercise.name for exercise in EXERCISES)),
+        names = [exercise.name for exercise in EXERCISES]
+        print("there is no exercise '%s'; there are: %s%s" % (name, ", ".join(names), did_you_mean(name, names)),
               file=sys.stderr)
         return WRONG_WORDS
     if os.path.lexists(target):
@@ -166,10 +175,13 @@ def main(argv=None):
         return PASSED
     if options.start:
         return start(options.start)
-    program, exercise = _program_and_exercise(parser, options)
+    program, exercise, other = _program_and_exercise(parser, options)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
+    if other:
+        print("It looks like a program for another exercise: ./baxter.sh check %s %s %s" % (
+            other.lab, other.name, program), flush=True)
     try:
         which = WhichRobot(options.profile, options.serial)
         # In the lab of a class no second sandbox can be made; what the program may do there, its author may do, too.

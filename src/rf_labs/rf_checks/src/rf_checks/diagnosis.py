@@ -23,6 +23,7 @@ PYTHON2 = ("print statement", "Missing parentheses in call to 'print'",
 _THREAD = re.compile(r"^(?:Current thread|Thread) 0x", re.MULTILINE)
 #: A resting arm moves by less than this during a run [rad].
 STRAY_RAD = 0.05
+_CODING = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", re.MULTILINE | re.ASCII)
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
@@ -31,9 +32,13 @@ def check_syntax(source, name):
     try:
         encoding = tokenize.detect_encoding(io.BytesIO(source).readline)[0]
         text = source.decode(encoding)
-    except (SyntaxError, UnicodeDecodeError, LookupError):
-        return Fault("syntax", "Python cannot read the file, which is not in UTF-8: choose UTF-8 where your editor "
-                     "saves it", 0.0)
+    # UnicodeError, and no kind of it, is what the encoding `undefined` raises.
+    except (SyntaxError, UnicodeError, LookupError):
+        named = _CODING.search(b"\n".join(source.splitlines()[:2]))
+        which = "in the encoding `%s` that its first lines name" % named[1].decode() if named else (
+            "which is not in UTF-8")
+        return Fault("syntax", "Python cannot read the file, %s: choose UTF-8 where your editor saves it%s"
+                     % (which, ", and take the line with `coding` out" if named else ""), 0.0)
     try:
         compile(text, name, "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -265,6 +270,13 @@ def diagnose(run, exercise, call, robot, share):
         fault = Fault("survivors", "%d process%s of the program went on after it had ended, and had to be killed: end "
                       "what you start" % (run.survivors, "" if run.survivors == 1 else "es"), 0.9)
     return fault
+
+
+def of_another(fault: Fault | None, exercise, other, file_name: str) -> Fault:
+    """A Fault for a program that does little of `exercise` and is for the Exercise `other`. fault: of its run."""
+    sentence = ("this looks like a program for the exercise %s: ./baxter.sh check %s %s %s. It was checked as %s"
+                % (other.name, other.lab, other.name, file_name, exercise.name))
+    return Fault("other_exercise", sentence + (": " + fault.sentence if fault else ""), fault.cap if fault else 1.0)
 
 
 def behaviour_that_hides(run, sides, limit_s):

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from baxter_model import SIDES
+from lab_environment.options import did_you_mean
 from rf_checks import tasks, tasks_planning, tasks_printed
 
 #: Points of 100 from which an exercise counts as done.
@@ -51,6 +52,15 @@ _TELLS = tuple((name, re.compile(pattern, re.IGNORECASE)) for name, pattern in (
 _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
 
 
+def meant_instead(exercise: Exercise, file_name: str, text: str) -> Exercise | None:
+    """The other Exercise that a program is for by its line `# exercise: NAME`, or else by its file's name; or None."""
+    mark = _MARK.search(text)
+    stem = file_name.removesuffix(".py").lower()
+    named = [mark.group(1)] if mark else sorted((one.name for one in EXERCISES if one.name in stem), key=len)
+    # The longest: joint_command is no command.
+    return next((one for one in EXERCISES if named and one.name == named[-1] and one is not exercise), None)
+
+
 def choose(lab, name, file_name, text):
     """The Exercise for a lab, the name of an exercise or "", and the program. Raises UnknownExercise.
 
@@ -58,15 +68,19 @@ def choose(lab, name, file_name, text):
     exercise's programs contain.
     """
     if lab not in LABS:
-        raise UnknownExercise("there is no lab '%s'; labs are %s" % (lab, ", ".join(LABS)))
+        raise UnknownExercise("there is no lab '%s'; labs are %s%s" % (lab, ", ".join(LABS), did_you_mean(lab, LABS)))
     of_lab = {exercise.name: exercise for exercise in EXERCISES if exercise.lab == lab}
     mark = _MARK.search(text)
     for asked, source in ((name, "on the command line"),
                           (mark and mark.group(1), "in the program's `# exercise:` line")):
         if asked:
+            elsewhere = next((one for one in EXERCISES if one.name == asked), None)
+            if asked not in of_lab and elsewhere:
+                raise UnknownExercise("%s is an exercise of %s, not of %s (%s): ./baxter.sh check %s %s %s" % (
+                    asked, elsewhere.lab, lab, source, elsewhere.lab, asked, file_name))
             if asked not in of_lab:
-                raise UnknownExercise("%s has no exercise '%s' (%s); its exercises are %s"
-                                      % (lab, asked, source, ", ".join(of_lab)))
+                raise UnknownExercise("%s has no exercise '%s' (%s); its exercises are %s%s"
+                                      % (lab, asked, source, ", ".join(of_lab), did_you_mean(asked, of_lab)))
             return of_lab[asked]
     if len(of_lab) == 1:
         return next(iter(of_lab.values()))

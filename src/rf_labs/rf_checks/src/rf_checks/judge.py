@@ -9,6 +9,7 @@ import numpy as np
 
 from lab_environment import isolation
 from rf_checks import diagnosis, submission
+from rf_checks.exercises import meant_instead
 from rf_checks.graph import LabFailed, MasterSilent
 from rf_checks.lab import Lab, TooSlow, WhichRobot, robot_description, student_folder
 from rf_checks.observing import Observer
@@ -123,6 +124,7 @@ class Judge:
         calls = exercise.task.calls(np.random.default_rng(seed))
         texts = submission.texts(program)
         fault = diagnosis.check_syntax(submission.read(program), program.name)
+        other = meant_instead(exercise, program.name, texts[program.name])
         results, not_graded = [], ""
         not_run = (Criterion("not run", 0.0, 100.0, "because of the fault"),)
         for call in calls:
@@ -138,9 +140,12 @@ class Judge:
             criteria = tuple(exercise.task.criteria(call, run, self.robot))
             share = sum(one.share * one.weight for one in criteria) / 100.0
             found = diagnosis.diagnose(run, exercise, call, self.robot, share)
+            is_final = found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5))
+            if other and share < 0.5:
+                found = diagnosis.of_another(found, exercise, other, program.name)
             results.append(RunResult(call.arguments, criteria, found, how_it_ended(run), run))
             # Such a fault repeats and costs time: the other runs count as this one.
-            if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
+            if is_final:
                 fault = found
                 not_run = (Criterion("as the run before", share, 100.0, "not run, because of the fault"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"

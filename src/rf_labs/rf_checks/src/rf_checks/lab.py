@@ -29,7 +29,7 @@ from lab_environment.ports import free_port
 from rf_checks import hidden
 from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch
-from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SILENCED, SOCKETS_VARIABLE
+from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, changes_the_world
 
 #: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
@@ -43,6 +43,7 @@ _SHORTEST_RECORD_S = 0.0025
 #: too.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver", "move_group",
            "joint_trajectory_action_server")
+SIMULATOR = "/gazebo"
 #: The nodes that spawn the robot and an obstacle, and then end.
 SPAWNER, OBSTACLE_SPAWNER = "/urdf_spawner", "/obstacle_spawner"
 #: What move_group serves, once it can plan.
@@ -177,7 +178,8 @@ class Lab:
         self._own_time.restart()
         while not self._is_closed_world:
             # Closed services disappear from the master's lists a moment later.
-            open_ways = {name for kind, name, _ in self.graph.state() if _changes_the_world(kind, name)}
+            open_ways = {name for kind, name, node in self.graph.state()
+                         if changes_the_world(kind, name) and (kind == "service" or node == SIMULATOR)}
             if open_ways and self._own_time.passed_s() > RESET_TIMEOUT_S:
                 self.go_on()
                 raise LabFailed("the check's own lab serves what it must not: %s" % ", ".join(sorted(open_ways)))
@@ -370,14 +372,6 @@ class Lab:
             pass  # the simulator has ended; is_alive reports it
         finally:
             ended.set()
-
-
-def _changes_the_world(kind, name):
-    """Whether a registration would let a checked program change the world."""
-    if kind == "service":
-        return (name.startswith("/gazebo/") and name not in SERVED
-                and not name.endswith(("logger_level", "loggers")))
-    return kind == "subscriber" and name in SILENCED
 
 
 def _accept(listener):

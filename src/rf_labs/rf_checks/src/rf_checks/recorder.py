@@ -8,7 +8,8 @@ ticks one line of JSON goes out (`Recording` in recording.py reads them), and th
 empty, or an order to reset the robot. This happens at the beginning of a tick, before any other plugin reads its
 messages: the program's reaction to the last tick's time and joint states has arrived by then.
 
-The first order withdraws all services that change the world: from then on the simulator only serves those that read.
+The first order withdraws all services and topics that change the world: from then on the simulator only serves those
+that read, and nothing but the robot's own interface moves the robot.
 """
 import json
 import os
@@ -20,7 +21,7 @@ from std_srvs.srv import EmptyRequest
 
 from baxter_model import SIDES
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
-from rf_checks.recorder_names import RECORDS, REQUESTS, SERVED, SILENCED, SOCKETS_VARIABLE
+from rf_checks.recorder_names import RECORDS, REQUESTS, SOCKETS_VARIABLE, changes_the_world
 
 RECORD_TICKS = 5  # 10 ms of simulation
 #: Commands listed in one record; further ones are only counted.
@@ -163,12 +164,13 @@ class Recorder(ModelPlugin):
         return "" if answer.success else answer.status_message
 
     def _close_world(self):
-        """Withdraw the services that a checked program must not use; keep their handlers."""
+        """Withdraw the services and topics that a checked program must not use; keep the services' handlers."""
         for name in self.context.served():
-            if name.startswith("/gazebo/") and name not in SERVED:
+            if changes_the_world("service", name):
                 self._handlers[name] = self.context.withdraw(name)
-        for topic in SILENCED:
-            self.context.withdraw(topic)
+        for topic in self.context.subscribed():
+            if changes_the_world("subscriber", topic):
+                self.context.withdraw(topic)
 
 
 def _link(own, model, link):

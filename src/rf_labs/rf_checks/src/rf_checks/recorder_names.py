@@ -10,5 +10,12 @@ PLUGIN_ELEMENT = '<gazebo><plugin name="lab_recorder" filename="liblab_recorder.
 SERVED = frozenset("/gazebo/" + name for name in (
     "get_joint_properties", "get_light_properties", "get_link_properties", "get_link_state", "get_model_properties",
     "get_model_state", "get_physics_properties", "get_world_properties"))
-#: Topics that move models in the simulator directly.
-SILENCED = ("/gazebo/set_link_state", "/gazebo/set_model_state")
+
+
+def changes_the_world(kind: str, name: str) -> bool:
+    """Whether a "service" or a "subscriber" of the simulator's node could move or change anything past the robot's own
+    interface: all in the simulator's namespace that does not only read, also what is added to it later."""
+    if not name.startswith("/gazebo/"):
+        return False
+    return kind == "subscriber" or (kind == "service" and name not in SERVED
+                                    and not name.endswith(("logger_level", "loggers")))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The report of a check: as text, as JSON, as JUnit XML. Free of ROS."""
 import json
+from pathlib import Path
 from xml.etree import ElementTree
 
 from rf_checks.exercises import PASS_MARK
@@ -15,7 +16,7 @@ def text(result):
     exercise = result.exercise
     lines = ["%s %s: %s" % (exercise.lab, exercise.name, exercise.title)]
     for run in result.runs:
-        lines.append("  %s %s" % (exercise.usage.split()[0], " ".join(run.arguments)))
+        lines.append("  " + " ".join((Path(result.program).name, *run.arguments)))
         for one in run.criteria:
             lines.append("    %-22s %5.1f of %4.1f   %s" % (one.name, one.share * one.weight, one.weight, one.found))
         if run.fault and run.fault.cap * 100.0 < sum(one.share * one.weight for one in run.criteria):

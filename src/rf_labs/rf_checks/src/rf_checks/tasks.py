@@ -18,6 +18,8 @@ from rf_checks.recording import Criterion, Fault
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
+# Up to the first a gripper's place, or its orientation, gets all points, from the second on none [m], [rad].
+OFF_M, OFF_RAD = (0.01, 0.1), (math.radians(2), math.radians(30))
 # A wave must have 5 cm and three periods; the window of the sine fit loses a part of both.
 AMPLITUDE_M, PERIODS = 0.045, 2.5
 
@@ -59,17 +61,28 @@ def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
     touched = recording.contacts()
     lasted = _duration(recording)
     text = "; ".join("%s - %s" % pair for pair in touched[:3])
+    in_part = "counts as far as the exercise is done"
     if done_share == 0.0:
-        return [Criterion(name, 0.0, weight, "counts as far as the exercise is done")
+        return [Criterion(name, 0.0, weight, in_part)
                 for name, weight in (("smoothness", smooth), ("collisions", clear), ("time", quick))]
+
+    def criterion(name, share, weight, found):
+        return Criterion(name, done_share * share, weight,
+                         "%s; %s" % (found, in_part) if share == 1.0 > done_share else found)
+
     return [
-        Criterion("smoothness", done_share * ramp(stops, halts_allowed, halts_allowed + 12), smooth,
-                  "the arm stood still %d times on its way" % stops),
-        Criterion("collisions", done_share * (0.0 if touched else 1.0), clear,
-                  "touched: " + text if touched else "none"),
-        Criterion("time", done_share * ramp(lasted, call.lasts_s, 2.0 * call.lasts_s), quick,
+        criterion("smoothness", ramp(stops, halts_allowed, halts_allowed + 12), smooth,
+                  "the arm went smoothly" if stops <= halts_allowed else "the arm stood still %s on its way; %s "
+                  "part of it" % (counted(stops, "time"), "1 is" if halts_allowed == 1 else "%d are" % halts_allowed)),
+        criterion("collisions", 0.0 if touched else 1.0, clear, "touched: " + text if touched else "none"),
+        criterion("time", ramp(lasted, call.lasts_s, 2.0 * call.lasts_s), quick,
                   "%.1f s of %.0f s" % (lasted, call.lasts_s)),
     ]
+
+
+def counted(number, word):
+    """A number with its noun: "1 time", "2 times"."""
+    return "%s %s%s" % (number, word, "" if str(number) == "1" else "s")
 
 
 def _duration(recording):
@@ -101,10 +114,13 @@ class RotateGripper:
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("left")) > 0.1:
             distance, angle = measures.pose_error(robot.gripper("left", recording), self._target(call)[1])
-            position = ramp(distance, 0.01, 0.1)
-            orientation = position * ramp(angle, math.radians(2), math.radians(30))
-        reached = "%.1f cm off" % (100 * distance) if position or math.isfinite(distance) else "the arm did not move"
-        turned = "%.0f degrees off" % math.degrees(angle) if math.isfinite(angle) else "the arm did not move"
+            position = ramp(distance, *OFF_M)
+            orientation = position * ramp(angle, *OFF_RAD)
+        reached = turned = "the arm did not move"
+        if math.isfinite(distance):
+            reached = "%.1f cm off" % (100 * distance) if position < 1.0 else "within %g cm" % (100 * OFF_M[0])
+            turned = ("%s off" % counted("%.0f" % math.degrees(angle), "degree") if angle > OFF_RAD[0] else
+                      "within %g degrees" % round(math.degrees(OFF_RAD[0])))
         return [Criterion("position", position, 20.0, reached), Criterion("orientation", orientation, 40.0, turned),
                 *motion_criteria(run, ("left",), min(position, orientation), call, (10.0, 15.0, 15.0), 4)]
 

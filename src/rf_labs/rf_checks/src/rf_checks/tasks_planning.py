@@ -21,6 +21,8 @@ _PLACE_M, _SPREAD_M = (0.842, 0.53), 0.02
 _BEGIN_RAD, _SPREAD_RAD = -0.9, 0.08
 # A box in the scene is right if it reaches so far within the pillar and so far beyond it on each side [m].
 WITHIN_M, BEYOND_M = 0.005, 0.06
+#: Different boxes that a program may tell move_group of; with more of them it has not said where the pillar stands.
+MOST_BOXES = 10
 # Edges that are all this share of the true ones are half sizes.
 _HALF, _HALF_TOLERANCE = 0.5, 0.05
 
@@ -82,11 +84,15 @@ class PlanAround:
         if _has_moved(recording):
             share, off, found = measures.distance_from_goal(joint_names(ARM), recording.arm(ARM)[-1], call.expected)
             share = share if off < measures.OFF_GOAL_RAD else 0.0
-        known = any(call.obstacle.is_covered(pose, edges) for _, pose, edges in _told(recording))
+        known = self._knows(call.obstacle, _told(recording))
         return [Criterion(STATE, share, 40.0, found),
                 Criterion("the pillar in the scene", 1.0 if known else 0.0, 20.0,
                           "move_group knew it" if known else "move_group did not know it as it stands"),
                 *motion_criteria(run, (ARM,), share, call, (10.0, 20.0, 10.0), 3)]
+
+    @staticmethod
+    def _knows(pillar, told):
+        return len(told) <= MOST_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
 
     def foremost(self, call, run):
         return self._about_scene(call, run) if _touched(run.recording) else None
@@ -109,9 +115,12 @@ class PlanAround:
     def _about_scene(call, run):
         """A Fault for what move_group was told of the pillar, or None."""
         pillar, told = call.obstacle, _told(run.recording)
-        if any(pillar.is_covered(pose, edges) for _, pose, edges in told):
+        if PlanAround._knows(pillar, told):
             return None
         end = "; the arm ran into it" if _touched(run.recording) else ""
+        if len(told) > MOST_BOXES:
+            return Fault("too_many_boxes", "move_group was told of %d boxes%s: one stands there, with the numbers on "
+                         "the command line" % (len(told), end))
         if not told:
             return Fault("no_box", "move_group was told of no box, so it plans as if nothing stood there%s: "
                          "PlanningSceneInterface().add_box(NAME, POSE, SIZE) before you plan" % end)
@@ -138,10 +147,14 @@ def _touched(recording):
 
 
 def _told(recording):
-    """The boxes in move_group's scene until the arm came to rest: list of (name, pose, edges)."""
+    """The different boxes in move_group's scene until the arm came to rest: list of (name, pose, edges)."""
     rows = measures.moving_rows(recording.times, recording.arm(ARM)) if _has_moved(recording) else None
     last = rows[1] if rows else len(recording.records)
-    return [box for row, boxes in recording.scenes() if row <= last for box in boxes]
+    found = {}
+    for row, boxes in recording.scenes():
+        if row <= last:
+            found.update(((name, pose.tobytes(), edges.tobytes()), (name, pose, edges)) for name, pose, edges in boxes)
+    return list(found.values())
 
 
 def _words(numbers):

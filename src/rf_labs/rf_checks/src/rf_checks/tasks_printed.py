@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Exercises whose answer is printed. The truth comes from the simulated robot itself, not from topics. Free of ROS.
 
-The methods of a task are described in tasks.py.
+Each answer has a form that holds one: the last matrices, as many as are asked for; the line with the verdict; one name.
+A program that prints all it could be has not answered. The methods of a task are described in tasks.py.
 """
+import math
 import re
 
 import numpy as np
@@ -17,7 +19,13 @@ SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera
 # Frames that a wrong answer is compared with first.
 FRAMES = ("base", "head", "head_camera", "left_hand", "right_hand", "left_gripper", "right_gripper",
           "left_gripper_base", "right_gripper_base", "torso", "left_wrist", "right_wrist")
+# Up to the first a matrix gets all points, from the second on none [m], [rad].
+OFF_M, OFF_RAD = (0.003, 0.02), (0.01, 0.05)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_METRES = re.compile(r"(%s)\s*m(?:et(?:er|re)s?)?\b" % _NUMBER.pattern)
+_JOINT = re.compile(r"\b(?:left|right)_[sew][0-2]\b")
+#: Numbers of a line that may be the distance: beside it a program prints the angle, and perhaps the verdict's number.
+MOST_NUMBERS = 3
 _NOT_ROW = re.compile(r"[^\s\d.,;\[\]()eE+-]")
 
 
@@ -30,7 +38,7 @@ def matrices(text):
         if "]]" in line:
             line = line[:line.rindex("]]")]
         numbers = [float(word) for word in _NUMBER.findall(line)]
-        if _NOT_ROW.search(line) or len(numbers) not in (4, 16):
+        if _NOT_ROW.search(line) or len(numbers) not in (4, 16) or not all(map(math.isfinite, numbers)):
             rows = []
             continue
         rows += [numbers[k:k + 4] for k in range(0, len(numbers), 4)]
@@ -40,8 +48,20 @@ def matrices(text):
     return found
 
 
+def last_matrices(text, count):
+    """The last `count` different matrices in a text, in their order: list of (4, 4). A program in a loop prints each
+    again and again."""
+    found = []
+    for matrix in reversed(matrices(text)):
+        if not any(_near(matrix, other) for other in found):
+            found.append(matrix)
+        if len(found) == count:
+            break
+    return found[::-1]
+
+
 class TfListener:
-    """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three."""
+    """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three, and no other last."""
 
     def calls(self, rng):
         pairs = [(a, b) for a, b in (("head", "right_hand"), ("right_hand", "head_camera"), ("left_gripper", "torso"))]
@@ -52,7 +72,7 @@ class TfListener:
         return len(matrices(run.output)) >= len(call.expected)
 
     def criteria(self, call, run, robot):
-        found = matrices(run.output)
+        found = last_matrices(run.output, len(call.expected))
         result = []
         for target, source in call.expected:
             distance, angle = np.inf, np.inf
@@ -60,14 +80,16 @@ class TfListener:
                 true = robot.between(target, source, run.recording.joints_at(-1))
                 distance, angle = min((measures.pose_error(matrix, true) for matrix in found), key=sum,
                                       default=(np.inf, np.inf))
-            share = min(ramp(distance, 0.003, 0.02), ramp(angle, 0.01, 0.05))
-            none = "none of those printed is this" if found else "none printed"
-            text = none if share == 0.0 else "%.1f mm off" % (1000 * distance)
+            share = min(ramp(distance, *OFF_M), ramp(angle, *OFF_RAD))
+            none = ("the last matrix printed is not this" if len(call.expected) == 1 else
+                    "none of the last %d matrices printed is this" % len(call.expected)) if found else "none printed"
+            text = none if share == 0.0 else (
+                "as it is" if share == 1.0 else "%.1f mm and %.3f rad off" % (1000 * distance, angle))
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
         return result
 
     def slip(self, call, run, robot):
-        found = matrices(run.output)
+        found = last_matrices(run.output, len(call.expected))
         if not run.recording.records:
             return None
         joints = run.recording.joints_at(-1)
@@ -75,6 +97,9 @@ class TfListener:
                   if not any(_near(matrix, robot.between(*pair, joints)) for pair in call.expected)]
         missing = [pair for pair in call.expected
                    if not any(_near(matrix, robot.between(*pair, joints)) for matrix in found)]
+        if missing and any(_near(matrix, robot.between(*missing[0], joints)) for matrix in matrices(run.output)):
+            return Fault("too_many", "the matrix of %s -> %s was printed, but others after it: the last %d that are "
+                         "printed count, one for each pair; print no others" % (*missing[0], len(call.expected)))
         for matrix in unused if missing else ():
             slip = slips.matrix_slip(matrix, robot, joints, missing, FRAMES)
             if slip:
@@ -125,21 +150,27 @@ class Unreachable:
         said = sorted(set(_VERDICT.findall(lines[-1]))) if lines else []
         is_right = said == [verdict]
         asked = any(np.allclose(request[2], call.expected[:3], atol=1e-3) for request in run.recording.ik_requests())
-        reason = is_right and asked and self._says_why(failure, run.output)
+        reason = is_right and asked and self._says_why(failure, lines[-1])
+        missing = ("the line with %s does not say how far short" if failure and not failure.joints else
+                   "the line with %s does not name the joint, or names others")
         return [Criterion("verdict", float(is_right and asked), 70.0,
                           "said %s, it is %s" % (" and ".join(said) or "nothing", verdict) if asked else
                           "the IK service was not asked for this pose"),
-                Criterion("reason", float(reason), 30.0,
-                          "given" if reason else "the joint, or how far short, is missing")]
+                Criterion("reason", float(reason), 30.0, "given" if reason else missing % verdict if is_right else
+                          "counts with the right verdict")]
 
     @staticmethod
-    def _says_why(failure, text):
+    def _says_why(failure, line):
+        """Whether a line of the output gives the reason, and no other."""
         if failure is None:
             return True
+        said = line[_VERDICT.search(line).start():]
         if failure.joints:
-            return any(joint in text for joint in failure.joints)
-        numbers = [float(word) for word in _NUMBER.findall(text)]
-        return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m) for number in numbers)
+            named = set(_JOINT.findall(line))
+            return bool(named) and named <= set(failure.joints)
+        numbers = [float(word) for word in _METRES.findall(said) or _NUMBER.findall(said)]
+        return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m)
+                   for number in numbers[:MOST_NUMBERS])
 
     def slip(self, call, run, robot):
         requests = run.recording.ik_requests()
@@ -174,11 +205,11 @@ class IkFrame:
 
     @staticmethod
     def answers(text):
-        """(reference frame, commanded frame) as printed last, "" where not printed."""
+        """(reference frame, commanded frame) as printed: "" where there is none, all names where there are several."""
         found = []
         for name in ("reference frame", "commanded frame"):
-            said = re.findall(name + r"\s*[:=]\s*/?([A-Za-z]\w*)", text, re.IGNORECASE)
-            found.append(said[-1] if said else "")
+            said = dict.fromkeys(re.findall(name + r"\s*[:=]\s*/?([A-Za-z]\w*)", text, re.IGNORECASE))
+            found.append(" and ".join([*said][:3]) + (" and others" if len(said) > 3 else ""))
         return tuple(found)
 
     def criteria(self, call, run, robot):
@@ -207,8 +238,10 @@ class IkFrame:
             rows = [*range(0, len(recording.times), 10), -1]
             poses = [robot.gripper(side, recording, row) for row in rows]
             distance = min(measures.pose_error(pose, target)[0] for pose in poses)
-            found = "%.1f cm from the pose that was asked for" % (100 * distance)
-            best = max(best, (ramp(distance, 0.01, 0.05), found))
+            share = ramp(distance, 0.01, 0.05)
+            found = ("at the pose that was asked for" if share == 1.0 else
+                     "%.1f cm from the pose that was asked for" % (100 * distance))
+            best = max(best, (share, found))
         return bool(solved), *best
 
     def slip(self, call, run, robot):
@@ -216,6 +249,10 @@ class IkFrame:
         if not reference or not commanded:
             return Fault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "
                          "`commanded frame: NAME`")
+        for name, said in (("reference", reference), ("commanded", commanded)):
+            if " " in said:
+                return Fault("several_answers", "several %s frames were printed, %s: print the one that you have found"
+                             % (name, said))
         if reference not in ("base", "world"):
             return Fault("wrong_frame", "the reference frame is not `%s`: it is the one that a pose's numbers are "
                          "measured from; ask for one pose with two values of header.frame_id and compare" % reference)

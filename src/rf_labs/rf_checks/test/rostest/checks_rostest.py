@@ -57,6 +57,7 @@ ADVERSARIES = {
     "tf_of_the_sheet": ("quaternion_order", "that of base -> head"),
     "crashes": ("crashed", "line 7"),
     "prints_made_up_matrices": ("wrong_numbers", "elsewhere"),
+    "drags_the_hand": ("early_exit", "before any arm moved"),
     "teleports": ("crashed", "set_model_configuration] unavailable"),
     "fakes_clock": ("intruder", "/clock"),
     "pauses": ("crashed", "pause_physics] unavailable"),

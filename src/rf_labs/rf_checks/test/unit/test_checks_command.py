@@ -56,7 +56,8 @@ def test_a_skeleton_is_copied_once_and_knows_its_exercise(name, capsys):
     (["lab2", "wave", "my_node.py", "--serial", "-1"], "the serial number is -1"),
     (["lab2", "wave", "my_node.py", "--profile", "fast"], "--profile"),
     (["lab2", "wave", "my_node.py", "--json", "nowhere/x.json"], "there is no folder"),
-    (["--start", "waves"], "no exercise 'waves'; there are: tf_listener,"),
+    (["--start", "waves"], "did you mean wave?"),
+    (["lob2", "gone.py"], "did you mean lab2?"), (["lab2", "wav", "gone.py"], "did you mean wave?"),
 ])
 def test_wrong_words_are_answered_in_a_sentence(words, expected, capsys):
     try:

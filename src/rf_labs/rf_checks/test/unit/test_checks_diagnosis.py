@@ -11,7 +11,7 @@ import pytest
 
 from baxter_model import joint_names
 from rf_checks import diagnosis, report
-from rf_checks.exercises import EXERCISES, UnknownExercise, choose
+from rf_checks.exercises import EXERCISES, UnknownExercise, choose, meant_instead
 from rf_checks.judge import Result, RunResult, how_it_ended
 from rf_checks.lab import WhichRobot
 from rf_checks.recording import Changes, Criterion, Fault, Recording, Run
@@ -136,7 +136,9 @@ def test_an_arm_left_on_its_way_is_told():
     ("# für Anna\n".encode("latin-1"), ["UTF-8", "editor"]),
     ("import rospy\n\n\nname = 'für'\n".encode("latin-1"), ["UTF-8", "editor"]),
     ("print(1)\n".encode("utf-16"), ["UTF-8", "editor"]),
-    ("# coding: nothing\nprint(1)\n", ["UTF-8"]),
+    ("# coding: nothing\nprint(1)\n", ["`nothing`", "UTF-8"]),
+    ("# -*- coding: undefined -*-\nprint(1)\n", ["`undefined`", "UTF-8"]),
+    ("#!/usr/bin/python3\n# coding: rot13\nprint(1)\n", ["`rot13`", "UTF-8"]),
     ("x = " + "-" * 100_000 + "1", ["nested too deeply"]),
     ("x" + "()" * 100_000, ["nested too deeply"]),
 ])
@@ -229,12 +231,26 @@ def test_the_exercise_is_found(name, file_name, text, expected):
 @pytest.mark.parametrize(("lab", "name", "file_name", "words"), [
     ("lab9", "", "x.py", ["lab9", "lab2", "cwru"]),
     ("lab2", "", "my_node.py", ["./baxter.sh check lab2 wave my_node.py"]),
-    ("lab2", "waves", "x.py", ["waves", "wave"]), ("lab2", "", "wave_tf.py", ["which exercise"]),
+    ("lab2", "waves", "x.py", ["waves", "wave"]),
+    ("cwru", "wave", "x.py", ["./baxter.sh check lab2 wave x.py"]), ("lab2", "", "wave_tf.py", ["which exercise"]),
 ])
 def test_an_unknown_exercise_says_what_to_type(lab, name, file_name, words):
     with pytest.raises(UnknownExercise) as error:
         choose(lab, name, file_name, "")
     assert all(word in str(error.value) for word in words)
+
+
+@pytest.mark.parametrize(("file_name", "text", "other"), [
+    ("my.py", "# exercise: wave\n", "wave"), ("rotate_gripper.py", "# exercise: wave\n", "wave"),
+    ("li_joint_command.py", "", "joint_command"), ("rotate_gripper.py", "", None), ("my.py", "math.sin(1)", None),
+    ("wave.py", "# exercise: rotate_gripper\n", None),
+])
+def test_a_program_for_another_exercise_is_told_so(file_name, text, other):
+    found = meant_instead(ROTATE, file_name, text)
+    assert (found.name if found else None) == other
+    if found:
+        fault = diagnosis.of_another(Fault("not_enabled", "it was not enabled", 0.9), ROTATE, found, file_name)
+        assert "./baxter.sh check %s %s %s" % (found.lab, other, file_name) in fault.sentence and fault.cap == 0.9
 
 
 def result(share, fault=None, which=WhichRobot()):  # noqa: B008 (a tuple)
@@ -254,6 +270,8 @@ def test_reports_say_the_same_in_three_ways():
     text = report.text(bad)
     assert "not passed: 70 of 100" in text
     assert text.splitlines()[-1] == "Hint: too fast."
+    # Under the name that the student gave it.
+    assert "  me.py z 90" in text.splitlines()
     data = json.loads(report.as_json(bad))
     assert (data["points"], data["passed"], data["fault"], data["hint"]) == (70.0, False, "flood", "too fast")
     suite = ElementTree.fromstring(report.as_junit(bad))

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The judge's own lab, without a simulator: messages of a failed start."""
+import socket
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 from rf_checks.lab import Lab, LabFailed, TooSlow
+from rf_checks.recorder import Recorder
+from rf_checks.recorder_names import RECORDS, SOCKETS_VARIABLE
 
 
 @pytest.fixture
@@ -51,3 +55,20 @@ def test_a_lab_ends_with_its_judge(tmp_path):
         wait_until(lambda: (tmp_path / "output.txt").read_text(), "the lab to have started")
         judge.kill()
     wait_until(lambda: not is_alive(pid), "the end of the lab")
+
+
+def test_the_recorder_closes_all_that_changes_the_world(tmp_path, monkeypatch):
+    monkeypatch.setenv(SOCKETS_VARIABLE, str(tmp_path))
+    closed = []
+    open_ways = {
+        "served": ["/gazebo/apply_body_wrench", "/gazebo/get_model_state", "/gazebo/something_new", "/robot/sim/press"],
+        "subscribed": ["/gazebo/drag", "/gazebo/set_link_state", "/gazebo/later", "/robot/limb/left/joint_command"]}
+    context = SimpleNamespace(model=SimpleNamespace(joint_names=["head_pan"], name="baxter"), withdraw=closed.append,
+                              **{name: (lambda names=names: names) for name, names in open_ways.items()})
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / RECORDS))
+        listener.listen(1)
+        recorder = Recorder(context)
+        recorder._close_world()
+        recorder.close()
+    assert closed == ["/gazebo/apply_body_wrench", "/gazebo/something_new", *open_ways["subscribed"][:3]]

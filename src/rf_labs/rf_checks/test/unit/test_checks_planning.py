@@ -50,6 +50,13 @@ def graded(call, run):
     return sum(one.share * one.weight for one in criteria), fault.key if fault else None
 
 
+def test_a_scene_full_of_boxes_knows_no_pillar(call):
+    boxes = [box_of(call.obstacle, offset=(0.05 * k, 0.0, 0.0)) for k in range(-10, 11)]
+    run = run_of(call, boxes)
+    shares = {one.name: one.share for one in TASK.criteria(call, run, None)}
+    assert shares["the pillar in the scene"] == 0.0 and TASK.slip(call, run, None).key == "too_many_boxes"
+
+
 @pytest.mark.parametrize("margin", [0.0, 0.03, 0.05])
 def test_past_the_pillar_gets_all_points(call, margin):
     assert graded(call, run_of(call, [box_of(call.obstacle, margin=margin)])) == (pytest.approx(100.0), None)

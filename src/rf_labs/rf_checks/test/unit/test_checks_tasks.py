@@ -8,6 +8,7 @@ import pytest
 
 from baxter_model import SIDES, joint_names, poses
 from rf_checks import slips, tasks, tasks_printed
+from rf_checks.exercises import EXERCISES
 from rf_checks.lab import robot_description
 from rf_checks.recording import Recording, Run
 from rf_checks.robot import Robot
@@ -186,6 +187,7 @@ def test_the_poses_of_the_unreachable_are_what_they_are_for(robot, seed):
     ("JOINT_LIMIT: left_e1 by 0.1 rad", True, 100.0, None), ("JOINT_LIMIT", True, 70.0, None),
     ("JOINT_LIMIT: left_e1", False, 0.0, "made_up"), ("", False, 0.0, "not_asked"), ("no", True, 0.0, "no_verdict"),
     ("SOLVED OUT_OF_REACH JOINT_LIMIT left_e1", True, 0.0, None),
+    ("JOINT_LIMIT: left_e1 or left_w1", True, 70.0, None), ("left_e1\nJOINT_LIMIT", True, 70.0, None),
 ])
 def test_verdicts_are_graded(robot, output, asked, points, key):
     task = tasks_printed.Unreachable()
@@ -208,3 +210,75 @@ def test_answers_about_frames_need_their_experiment(robot, output, moves, points
     left = (NEUTRAL, there) if moves else (NEUTRAL,)
     run = Run([], trace(left=left, ik=[["left", "base", list(POINT), list(QUATERNION), 0]]), output=output)
     assert graded(task, calls(task)[0], run, robot) == (pytest.approx(points, abs=1.0), key)
+
+
+@pytest.mark.parametrize(("line", "points"), [
+    ("OUT_OF_REACH: %.4f m and 0.0000 rad short", 100.0), ("OUT_OF_REACH %.3f 0.0", 100.0), ("%.3f OUT_OF_REACH", 70.0),
+    ("OUT_OF_REACH: (1.5 0.6 0.2) is at least %.2f m beyond the arm", 100.0),
+    ("OUT_OF_REACH 0.1 0.2 0.3 %.3f 0.5 0.6", 70.0), ("OUT_OF_REACH 1e999 %.3f", 100.0),
+])
+def test_how_far_short_a_pose_is_is_one_number(robot, line, points):
+    task = tasks_printed.Unreachable()
+    call = calls(task)[1]
+    failure = robot.solve("left", call.expected[:3], call.expected[3:])
+    ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 1]]
+    run = Run([], trace(ik=ik), output=line % failure.residual_m)
+    assert graded(task, call, run, robot)[0] == pytest.approx(points)
+
+
+def everything(robot, joints):
+    """All that a program could print without an idea of its exercise."""
+    frames = [name for name in tasks_printed.FRAMES if name in robot.frame_names]
+    lines = ["%s -> %s\n%s" % (*pair, robot.between(*pair, joints).tolist())
+             for pair in itertools.permutations(frames, 2)]
+    lines += ["reference frame: %s\ncommanded frame: %s" % (frame, frame) for frame in frames]
+    numbers = ["%.2f" % (0.01 * k) for k in range(300)]
+    words = " ".join([*joints, *numbers, *("%s m" % number for number in numbers)])
+    lines += [words, *tasks_printed.VERDICTS, *("%s: %s" % (one, words) for one in tasks_printed.VERDICTS[:3])]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("exercise", EXERCISES, ids=lambda one: one.name)
+def test_a_program_that_prints_everything_answers_nothing(robot, exercise):
+    recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
+    output = everything(robot, recording.joints_at(-1))
+    for call in calls(exercise.task):
+        if isinstance(exercise.task, tasks_printed.Unreachable):
+            ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 1]]
+            recording = trace(ik=ik)
+        criteria = exercise.task.criteria(call, Run(list(call.arguments), recording, output=output), robot)
+        points = {one.name: one.share * one.weight for one in criteria}
+        # One verdict of three is right by chance, without its reason.
+        assert all(value == 0.0 for name, value in points.items() if name != "verdict"), (call.arguments, points)
+        assert points.get("reason", 0.0) == 0.0
+
+
+def test_what_is_printed_again_and_again_is_one_answer(robot):
+    recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
+    found = [str(robot.between(*pair, recording.joints_at(-1)).tolist()) for pair in tasks_printed.SHEET_PAIRS]
+    call, one = calls(tasks_printed.TfListener())
+    run = Run([], recording, output="\n".join([*found, *found, *found[:2]]))
+    assert graded(tasks_printed.TfListener(), call, run, robot) == (pytest.approx(100.0), None)
+    # The others came first, the asked one last; then the other way round.
+    right = str(robot.between(*one.expected[0], recording.joints_at(-1)).tolist())
+    for output, expected in (([*found, right], (pytest.approx(100.0), None)), ([right, *found], (0.0, "too_many"))):
+        run = Run([], recording, output="\n".join(output))
+        assert graded(tasks_printed.TfListener(), one, run, robot) == expected
+
+
+@pytest.mark.parametrize("number", ["1e999", "-1e400", "9" * 5000])
+def test_numbers_beyond_all_bounds_are_no_matrix(number):
+    assert tasks_printed.matrices("[[%s, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]" % number) == []
+
+
+@pytest.mark.parametrize(("halts", "words"), [(0, "smoothly"), (1, "smoothly"), (2, "2 times")])
+def test_full_points_for_smoothness_come_without_a_reproach(robot, halts, words):
+    task = tasks.JointCommand()
+    call = calls(task)[0]
+    path = [NEUTRAL]
+    for part in np.linspace(0.0, 1.0, halts + 2)[1:]:
+        step = np.array(NEUTRAL) + part * (np.array(call.expected) - NEUTRAL)
+        path += [step, step]
+    smooth = next(one for one in task.criteria(call, Run([], trace(right=path, seconds=6.0), exit_code=0), robot)
+                  if one.name == "smoothness")
+    assert words in smooth.found and (smooth.share == 1.0) == (halts < 2), smooth
