@@ -80,12 +80,16 @@ class NoPositions(TrajectoryError):
         self.point = point
 
 
+_ONE = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration"}
+
+
 class WrongSize(TrajectoryError):
     """The length of a point's field is not the number of joints."""
 
     def __init__(self, point, field, found, expected):
         optional = "" if field == "positions" else " or none"
-        super().__init__("point %d has %d %s, expected %d%s" % (point, found, field, expected, optional))
+        noun = _ONE.get(field, field) if found == 1 else field
+        super().__init__("point %d has %d %s, expected %d%s" % (point, found, noun, expected, optional))
         self.point, self.field, self.found, self.expected = point, field, found, expected
 
 
@@ -110,9 +114,9 @@ class AllPointsInPast(TrajectoryError):
 
     def __init__(self, dropped, late_s):
         if late_s > 0.0:
-            text = "all %d points are in the past, the last one by %.6f s; check header.stamp" % (dropped, late_s)
+            text = "all points (%d) are in the past, the last one by %.6f s; check header.stamp" % (dropped, late_s)
         else:
-            text = "the last of %d points is due at once; give it a time_from_start above 0" % dropped
+            text = "the last point (of %d) is due at once; give it a time_from_start above 0" % dropped
         super().__init__(text)
         self.dropped, self.late_s = dropped, late_s
 

@@ -60,7 +60,7 @@ P, BAD = [0.0, 0.0, 0.0], [0.0, math.nan, 0.0]
 @pytest.mark.parametrize("points, error, text", [
     ([(1.0, [], P, P)], "NoPositions", "point 0 has no positions"),
     ([(1.0, P, [], []), (2.0, P[:2], [], [])], "WrongSize", "point 1 has 2 positions, expected 3$"),
-    ([(1.0, P, [0.0], [])], "WrongSize", "point 0 has 1 velocities, expected 3 or none"),
+    ([(1.0, P, [0.0], [])], "WrongSize", "point 0 has 1 velocity, expected 3 or none"),
     ([(1.0, P, P, [0.0] * 4)], "WrongSize", "point 0 has 4 accelerations, expected 3 or none"),
     ([(1.0, P, [], []), (1.0, P, [], [])], "TimesNotIncreasing", "point 1 has 1 s after 1 s"),
     ([(1.0, P, [], []), (2.0, P, [], []), (1.5, P, [], [])], "TimesNotIncreasing", "point 2 has 1.5 s after 2 s"),
@@ -137,7 +137,7 @@ def test_first_point_at_once_gives_way_to_the_present_state():
 
 
 def test_command_that_lies_in_the_past_is_refused():
-    with pytest.raises(joint_trajectory.AllPointsInPast, match="all 2 points .* the last one by 1.500000 s"):
+    with pytest.raises(joint_trajectory.AllPointsInPast, match=r"all points \(2\) .* the last one by 1.500000 s"):
         replace(moving(), linear((1.0, P), (2.0, P), start_time=1.0), 4.5, NAMES, NO_TURNS)
 
 

@@ -36,7 +36,7 @@ class ForwardController(Controller):
     def _accept(self, message):
         values = np.atleast_1d(np.array(message.data, dtype=float))
         if values.shape != self._command.shape:
-            self.log.error_throttle(1.0, "%s: command with %d values ignored, expected one for each of %s"
+            self.log.error_throttle(1.0, "%s: command of length %d ignored, expected a value for each of %s"
                                     % (self.context.resolve("command"), values.size, ", ".join(self.joints)))
         elif not np.isfinite(values).all():
             self.log.error_throttle(1.0, "%s: command %s ignored, expected finite numbers"

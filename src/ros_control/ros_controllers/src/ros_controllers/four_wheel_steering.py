@@ -77,7 +77,7 @@ class FourWheelSteeringController(VehicleController):
     def _pair(self, name):
         joints = self._joints(name, "the left and the right joint")
         if len(joints) != 2:
-            raise ControllerError("parameter %s has %d joints, expected a left and a right one"
+            raise ControllerError("the number of joints in parameter %s is %d, expected a left and a right one"
                                   % (self.context.resolve(name), len(joints)))
         return joints
 

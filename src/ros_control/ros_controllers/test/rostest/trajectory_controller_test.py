@@ -156,7 +156,7 @@ class TrajectoryControllerTest(subtests.TestCase):
                 (goal((0.1, [0.1, 0.1]), names=["elbow", "x"]), R.INVALID_JOINTS, "unknown joint x"),
                 (goal((0.1, []), names=[]), R.INVALID_JOINTS, "empty"),
                 (goal((0.2, [0.1, 0.1]), (0.1, [0.1, 0.1])), R.INVALID_GOAL, "must increase"),
-                (goal((0.2, [0.1])), R.INVALID_GOAL, "1 positions, expected 2"),
+                (goal((0.2, [0.1])), R.INVALID_GOAL, "1 position, expected 2"),
                 (goal((0.2, [0.1, float("nan")])), R.INVALID_GOAL, "finite"),
                 (goal((0.2, [0.1, 0.1]), start=past), R.INVALID_GOAL, "in the past")):
             with self.subTest(text):

@@ -145,11 +145,11 @@ def test_effort_is_the_pid_of_the_error():
     (trajectory((1.0, []), names=[]), R.INVALID_JOINTS, "joint_names is empty"),
     (trajectory(names=[]), R.INVALID_JOINTS, "joint_names is empty"),
     (trajectory((1.0, [0.0, 0.0]), (1.0, [0.0, 0.0])), R.INVALID_GOAL, "time_from_start must increase"),
-    (trajectory((1.0, [0.0])), R.INVALID_GOAL, "point 0 has 1 positions, expected 2"),
-    (trajectory((1.0, [0.0, 0.0], [0.0])), R.INVALID_GOAL, "point 0 has 1 velocities"),
+    (trajectory((1.0, [0.0])), R.INVALID_GOAL, "point 0 has 1 position, expected 2"),
+    (trajectory((1.0, [0.0, 0.0], [0.0])), R.INVALID_GOAL, "point 0 has 1 velocity"),
     (trajectory((1.0, [])), R.INVALID_GOAL, "has no positions"),
     (trajectory((1.0, [0.0, math.nan])), R.INVALID_GOAL, "not finite"),
-    (trajectory((1.0, [0.0, 0.0]), stamp_s=90.0), R.INVALID_GOAL, "all 1 points are in the past"),
+    (trajectory((1.0, [0.0, 0.0]), stamp_s=90.0), R.INVALID_GOAL, "all points (1) are in the past"),
     (trajectory((0.0, [0.0, 0.0])), R.INVALID_GOAL, "time_from_start above 0"),
 ])
 def test_goals_that_cannot_be_followed_are_rejected_and_change_nothing(message, code, text):

@@ -339,7 +339,7 @@ def test_four_wheels_within_limits_and_after_the_time_out():
 
 
 def test_four_wheels_want_two_joints_of_each_kind():
-    with pytest.raises(ControllerError, match="front_steering has 1 joints, expected a left and a right one"):
+    with pytest.raises(ControllerError, match="front_steering is 1, expected a left and a right one"):
         four_wheels(front_steering=["steer_front_left"])
 
 

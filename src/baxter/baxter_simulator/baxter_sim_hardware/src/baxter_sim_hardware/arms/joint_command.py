@@ -13,6 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
+from lab_environment.options import counted
 from numba_cache import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
@@ -120,7 +121,8 @@ class CommandParser:
             raise self._refusal("unknown mode %d; modes are %s" % (
                 mode, ", ".join("%d %s" % (known, known.name) for known in Mode)))
         if len(names) != len(values):
-            raise self._refusal("%d names but %d values, and each name needs one value" % (len(names), len(values)))
+            raise self._refusal("%s but %s, and each name needs one value" % (
+                counted(len(names), "name"), counted(len(values), "value")))
         if not names:
             raise self._refusal("no joints named")
         names = list(names)
