@@ -117,6 +117,11 @@ def _triangles(parts):
     return ["o mesh", *vertices, *faces]
 
 
+def corners(path):
+    """The corners (3 m, 3) of the triangles in a Wavefront file of ours. Raises OSError, ValueError."""
+    return np.concatenate([points[triangles.ravel()] for points, triangles in _objects(path)])
+
+
 def _objects(path):
     """Return (points (n, 3), triangles (m, 3) from 0) of each object of a Wavefront file of ours."""
     found, first = [], 1

@@ -15,7 +15,7 @@ from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, check_file, read_file
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import LOG, BulletSimError
-from .gathered import Part, gathered, without_margin
+from .gathered import Part, corners, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
@@ -59,14 +59,25 @@ class MeshCache:
             status = os.stat(path)
             key = (str(path), status.st_size, status.st_mtime_ns, planes, part)
             if key not in self._known or not self._known[key].exists():
-                asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
-                content = read_file(path, MOST_BYTES) + asked.encode() + _VERSION
-                target = self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
+                target = self._target(path, planes, part)
                 self._known[key] = target if target.exists() else self._convert(path, target.name, planes, part)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
         hull = self._known[key].with_suffix(".hull.obj")
         return str(hull if not hollow and hull.exists() else self._known[key])
+
+    def corners(self, path, planes=(), part=WHOLE):
+        """The corners (3 m, 3) of the triangles of a copy as :meth:`wavefront` has made it for any world of this user;
+        None if there is none yet."""
+        try:
+            return corners(self._target(path, planes, part))
+        except (OSError, ValueError):
+            return None
+
+    def _target(self, path, planes, part):
+        asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
+        content = read_file(path, MOST_BYTES) + asked.encode() + _VERSION
+        return self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
 
     def keep(self, key, lines):
         """Return the path of a file that holds the result of ``lines()``, cached under ``key`` (bytes)."""

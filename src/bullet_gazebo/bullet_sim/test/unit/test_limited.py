@@ -72,3 +72,16 @@ def test_it_leaves_nothing_behind(process):
     pid = process.call(os.getpid)
     process.close()
     assert not os.path.exists("/proc/%d" % pid)
+
+
+def niceness():
+    return os.nice(0)
+
+
+def test_it_gives_way_to_physics_but_not_more_than_that():
+    """Also where the program that asks has a lower priority: a user waits for both."""
+    process = LimitedProcess()
+    try:
+        assert process.call(niceness) == max(5, os.nice(0))
+    finally:
+        process.close()

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bullet_sim import MeshCache
 from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Box, Finish, Mesh, merge_fixed, parse_urdf
@@ -209,8 +210,10 @@ class Mirror:
 
     def __init__(self, drawings, find_mesh, warn):
         """``drawings``: a ``world_picture.drawing.DrawingCache``, or a ``world_picture.background.BackgroundDrawings``,
-        with which large meshes appear later; ``find_mesh(uri)`` -> path or None; ``warn(text)``."""
+        with which meshes may appear later, and collision shapes stand in for them; ``find_mesh(uri)`` -> path or None;
+        ``warn(text)``."""
         self._drawings = drawings
+        self._collisions = MeshCache()
         self._find_mesh = find_mesh
         self._warn = warn
         self._warned = set()  # names of pictures
@@ -219,6 +222,8 @@ class Mirror:
         self._not_ready = set()  # keys, while a body is being built
         #: Names of the models whose meshes are not ready.
         self.waiting = []
+        #: How many meshes and pictures are not.
+        self.left = 0
         #: Bodies by name, in the scene's order.
         self.bodies = {}
         #: The light: :class:`sensor_renderer.light.Light`.
@@ -232,6 +237,7 @@ class Mirror:
         self._world_light = light or {}
         known = self._bodies
         self._bodies = {}
+        self._drawings.begin_scene()
         for entry in listed:
             name = entry["name"]
             key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")),
@@ -252,6 +258,7 @@ class Mirror:
     def _show_bodies(self):
         self.bodies = {name: built.body for name, built in self._bodies.items()}
         self.waiting = [name for name, built in self._bodies.items() if built.waits_for]
+        self.left = len(set().union(*(built.waits_for for built in self._bodies.values())))
         self._light_up()
         self.version += 1
 
@@ -292,8 +299,7 @@ class Mirror:
         merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]))
         joints = list(merged.joints.values())
         order = [merged.root, *(joint.child for joint in joints)]
-        links = [(name, [part for shape in merged.links[name].visuals for part in self._parts_of(shape)])
-                 for name in order]
+        links = [(name, self._parts_of_link(merged.links[name])) for name in order]
         screens = [screen for screen in map(self._screen, entry.get("screens", ())) if screen]
         return Body(links, joints, screens, bool(entry.get("static")), entry.get("lights", ()))
 
@@ -306,7 +312,36 @@ class Mirror:
         return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture,
                       bool(listed.get("glows")), float(listed.get("radius", 0.0)))
 
+    def _parts_of_link(self, link):
+        """The parts of a link; with its collision shapes as long as meshes of it are not ready."""
+        parts, missing = [], None
+        for shape in link.visuals:
+            try:
+                parts += self._parts_of(shape)
+            except NotReady as error:
+                self._not_ready.add(error.key)
+                missing = missing or shape
+        if missing is not None:
+            for shape in link.collisions:
+                parts += self._stand_ins(shape, missing.colour or DEFAULT_COLOUR)
+        return parts
+
+    def _stand_ins(self, shape, colour):
+        """A list of the :class:`Part` of a collision shape, in ``colour``; empty where it is a mesh that no world has
+        converted yet."""
+        geometry = shape.geometry
+        if not isinstance(geometry, Mesh):
+            return [self._placed((geometry,), lambda: _at(shape.origin, triangles.of_primitive(geometry)), shape.origin,
+                                 colour=colour)]
+        path = self._find_mesh(geometry.filename)
+        corners = None if path is None else self._collisions.corners(path, part=(geometry.submesh, geometry.centred))
+        if corners is None or not len(corners):
+            return []
+        origin = shape.origin @ np.diag([*geometry.scale, 1.0])
+        return [self._placed(("collision", path), lambda: _at(origin, triangles.flat(corners)), origin, colour=colour)]
+
     def _parts_of(self, shape):
+        """The list of :class:`Part` of a visual shape. Raises NotReady."""
         if shape.colour is not None and shape.colour[3] <= 0.0:
             return []  # nobody sees it
         geometry, colour, finish = shape.geometry, shape.colour or DEFAULT_COLOUR, shape.finish or Finish()
@@ -322,9 +357,6 @@ class Mirror:
             return []  # /gazebo has logged it
         try:
             found = self._drawings.parts(path, texture is not None, (geometry.submesh, geometry.centred))
-        except NotReady as error:
-            self._not_ready.add(error.key)
-            return []
         except DrawingError as error:
             self._warn(str(error))
             return []
@@ -361,6 +393,9 @@ class Mirror:
             if path is None:
                 raise DrawingError("picture %s does not exist; what it should be on is shown in one colour" % name)
             return self._drawings.texture(path)
+        except NotReady as error:
+            self._not_ready.add(error.key)
+            return None
         except DrawingError as error:
             if name not in self._warned:
                 self._warned.add(name)

@@ -12,6 +12,7 @@ import rospkg
 import rospy
 import yaml
 
+from lab_environment.priority import give_way
 from model_files.resources import ResourceFinder
 from rospy_limits.node import limit_ports
 from sensor_renderer.best import best_renderer
@@ -20,7 +21,7 @@ from sensor_renderer.labels import Labels, classes_of_parameter
 from sensor_renderer.memory import keep_freed_memory
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
-from sensor_renderer.priority import DRAWING, give_way
+from sensor_renderer.priority import DRAWING
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError, SnapshotReader
@@ -36,7 +37,10 @@ FAILURES, FAILURES_WITHIN_S = 3, 10.0
 LEAVES_WITHIN_S = 5.0
 
 # A scene that takes longer to read is announced [s].
-READS_WITHIN_S = 5.0
+READS_WITHIN_S = 3.0
+
+# How often the number of meshes that are still to be simplified is logged [s].
+LEFT_TOLD_S = 15.0
 
 # Parameter that groups models into classes for masks.
 CLASSES = "/sensor_renderer/semantic_classes"
@@ -58,6 +62,7 @@ class SensorRenderer:
         self._revision = None
         self._resets = None
         self._drawn_s = None
+        self._left_told_at = 0.0
 
     def run(self, stop):
         """Serve until ``stop()``, across restarts of the simulator."""
@@ -91,15 +96,21 @@ class SensorRenderer:
             if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
             self._finder.forget_missing()
-            with _told(READS_WITHIN_S, "cameras wait while meshes of new models are simplified; this is done once"):
+            # First: their topics are there while meshes are read.
+            self._set_sensors(scene.bodies)
+            with _told(READS_WITHIN_S, "cameras wait while meshes of new models are read"):
                 self._mirror.set_scene(scene.bodies, scene.light)
             if self._mirror.waiting:
-                rospy.loginfo("large meshes are being simplified, which is done once; cameras see all of %s after that"
-                              % ", ".join(self._mirror.waiting))
+                self._left_told_at = time.monotonic()
+                rospy.loginfo("meshes are being simplified, which is done once; until then cameras see the collision "
+                              "shapes of %s" % ", ".join(self._mirror.waiting))
             self._world.forget()
-            self._set_sensors(scene.bodies)
             self._revision = scene.revision
         self._mirror.complete()
+        if self._mirror.waiting and time.monotonic() - self._left_told_at >= LEFT_TOLD_S:
+            self._left_told_at = time.monotonic()
+            rospy.loginfo("meshes that are still to be simplified: %d, of %s"
+                          % (self._mirror.left, ", ".join(self._mirror.waiting)))
         if snapshot.resets != self._resets:
             self._resets, self._drawn_s = snapshot.resets, None
             self._world.forget()

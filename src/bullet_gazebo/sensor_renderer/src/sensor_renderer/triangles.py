@@ -31,6 +31,14 @@ def of_primitive(geometry, corners=CIRCLES[-1]):
     raise TypeError("no primitive: %r" % (geometry,))
 
 
+def flat(corners):
+    """Triangles of the corners (3 m, 3), with the normals of their planes."""
+    corners = np.asarray(corners, dtype=float).reshape(-1, 3, 3)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-30)[:, None]
+    return np.concatenate([corners, np.repeat(across[:, None], 3, axis=1)], axis=2).reshape(-1, 6).astype(np.float32)
+
+
 def circle_error(radius, corners):
     """How far a polygon with so many ``corners`` is from its circle, in the unit of ``radius``: its corners are as far
     outside as the middles of its sides are inside."""

@@ -7,6 +7,7 @@ import types
 import numpy as np
 import pytest
 
+from bullet_sim import MeshCache
 from lab_testing.waiting import wait_until
 from sensor_renderer import node
 from sensor_renderer.node import SensorRenderer, leave_anyway
@@ -78,6 +79,8 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
         simulator.write_scene([with_sensor(urdf)])
         simulator.write(1, 0.0, [AT_ORIGIN])
         renderer._turn(reader)
+        renderer._mirror._drawings.wait(60.0)
+        renderer._turn(reader)
         return sum(len(part.triangles) for parts in renderer._mirror.bodies["stand"].parts for part in parts)
 
     box = STAND.split("<geometry>")[1].split("</geometry>")[0]
@@ -123,9 +126,13 @@ def test_cameras_go_on_while_a_mesh_is_simplified(simulator, tmp_path, monkeypat
     monkeypatch.setattr(node.rospy, "loginfo", texts.append)
     renderer, reader = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), SnapshotReader(simulator.folder)
     mesh = tmp_path / "part.obj"
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="ascii")
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n", encoding="ascii")
     box = STAND.split("<geometry>")[1].split("</geometry>")[0]
-    large = STAND.replace(box, '<mesh filename="file://%s"/>' % mesh)
+    large = STAND.replace(box, '<mesh filename="file://%s"/>' % mesh).replace(
+        "</link>", '<collision><geometry><box size="1 1 1"/></geometry></collision><collision><geometry>%s</geometry>'
+        '</collision></link>' % ('<mesh filename="file://%s"/>' % mesh))
+    assert MeshCache().corners(mesh) is None
+    MeshCache().wavefront(str(mesh))  # as the simulator does for the collision
     simulator.write_scene([with_sensor(STAND), {"name": "large", "urdf": large, "joints": []}])
     place = np.array([3.0, 0, 0, 0, 0, 0, 1])
 
@@ -135,16 +142,28 @@ def test_cameras_go_on_while_a_mesh_is_simplified(simulator, tmp_path, monkeypat
         renderer._world.show(0.2 * number)
         body = renderer._mirror.bodies["large"]
         assert body.link_matrix("eye")[0, 3] == 3.0
-        return len(body.parts[0])
+        return [len(part.triangles) // 3 for part in body.parts[0]]
 
     try:
-        assert [turn(1), turn(2)] == [0, 0] and Eye.made.taken == [0.2, 0.4]
+        assert turn(1) == [12, 4]
         assert len(texts) == 1 and "large" in texts[0] and "stand" not in texts[0]
+        renderer._left_told_at -= node.LEFT_TOLD_S
+        assert turn(2) == [12, 4] and Eye.made.taken == [0.2, 0.4]
+        assert len(texts) == 2 and "large" in texts[1]
     finally:
         go_on.set()
     renderer._mirror._drawings.wait(30.0)
-    assert turn(3) == 1 and len(Eye.made.taken) == 3 and not renderer._mirror.waiting
-    assert len(texts) == 1
+    assert turn(3) == [4] and len(Eye.made.taken) == 3 and not renderer._mirror.waiting
+    assert len(texts) == 2
+
+
+def test_topics_are_there_before_meshes_are_read(simulator, monkeypatch):
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
+    renderer, there = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), []
+    monkeypatch.setattr(renderer._mirror, "set_scene", lambda *_: there.extend(renderer._sensors))
+    simulator.write(1, 0.0, [AT_ORIGIN])
+    renderer._turn(SnapshotReader(simulator.folder))
+    assert len(there) == 1
 
 
 def test_a_sensor_that_fails_restarts_and_is_left_out_at_the_third_time_until_a_reset(simulator, monkeypatch):

@@ -87,6 +87,9 @@ class DrawingCache:
         self._process = process
         self._folder = Path(folder or cache_folder(_FOLDER))
 
+    def begin_scene(self):
+        """A viewer begins to ask for the meshes of a scene."""
+
     def parts(self, path, textured=False, part=WHOLE):
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`. ``textured``: for a
         picture that is not the file's own; all levels have ``uv``, if the file has. ``part``: as for

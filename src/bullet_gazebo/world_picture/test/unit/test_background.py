@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from bullet_sim.limited import LimitError
+from bullet_sim.limited import LimitedProcess, LimitError
 from lab_testing.meshes import sphere
 from lab_testing.waiting import wait_until
 from world_picture import background, drawing
@@ -60,13 +60,30 @@ def test_the_caller_goes_on_while_a_mesh_is_simplified(tmp_path, process):
 
 
 def test_a_smaller_mesh_is_waited_for_and_does_not_wait_for_a_large_one(tmp_path, process, monkeypatch):
-    cache, large, small = BackgroundDrawings(tmp_path / "cache"), tmp_path / "large.obj", tmp_path / "small.obj"
+    made = []  # the helper for smaller ones comes first
+    monkeypatch.setattr(background, "LimitedProcess", lambda **limits: made.append(process) or (
+        process if len(made) > 1 else LimitedProcess(**limits)))
+    cache, large, small = BackgroundDrawings(tmp_path / "cache", 60.0), tmp_path / "large.obj", tmp_path / "small.obj"
     ball(large, 1).write_text(large.read_text(encoding="ascii") + 1000 * "#\n", encoding="ascii")
     monkeypatch.setattr(background, "LARGE_BYTES", large.stat().st_size)
     with pytest.raises(NotReady) as caught:
         cache.parts(large)
     assert cache.parts(ball(small, 2)) and cache.is_making([caught.value.key])
     assert process.calls in ([], [str(large)])
+
+
+def test_smaller_meshes_of_a_scene_are_waited_for_no_longer_than_the_patience(tmp_path, process, monkeypatch):
+    """On a busy machine the helper gets no processor for minutes; viewers go on, and find the meshes later."""
+    monkeypatch.setattr(background, "LARGE_BYTES", 1_000_000)
+    now = [0.0]
+    cache = BackgroundDrawings(tmp_path / "cache", 10.0, lambda: now[0])
+    now[0] = 10.0
+    for number in (1, 2):
+        with pytest.raises(NotReady):
+            cache.parts(ball(tmp_path / ("%d.obj" % number), number))
+    process.go_on.set()
+    cache.begin_scene()
+    assert cache.parts(tmp_path / "1.obj") and cache.parts(tmp_path / "2.obj")
 
 
 def test_waiting_has_an_end(tmp_path, process):

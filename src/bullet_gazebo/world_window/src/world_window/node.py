@@ -11,8 +11,9 @@ import rosgraph
 import rosnode
 import rospy
 
+from lab_environment.priority import give_way
 from rospy_limits.node import limit_ports
-from sensor_renderer.priority import DRAWING, give_way
+from sensor_renderer.priority import DRAWING
 
 _NAME = "gazebo_gui"
 _PROBE = "from PyQt5.QtWidgets import QApplication; QApplication(['gazebo'])"

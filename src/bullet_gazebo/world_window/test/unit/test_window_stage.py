@@ -5,6 +5,7 @@ import pytest
 from window_worlds import BLOCK_AT, FLOOR, SCENE, values
 
 from sensor_renderer.mirror import Mirror
+from world_picture.drawing import DrawingCache
 from world_window import overlay, picking
 from world_window.eye import NEAREST_M
 from world_window.stage import FIRST_EYE, LEFT, MIDDLE, RIGHT, Stage
@@ -14,7 +15,7 @@ BLOCK = "block", "body"
 
 @pytest.fixture
 def mirror():
-    mirror = Mirror(None, lambda uri: None, pytest.fail)
+    mirror = Mirror(DrawingCache(), lambda uri: None, pytest.fail)
     mirror.set_scene(SCENE)
     mirror.set_state(values())
     return mirror
@@ -78,7 +79,7 @@ def test_a_ray_meets_a_plane_ahead_only():
 
 
 def test_an_empty_world_is_seen_as_by_gazebo_and_the_first_model_is_looked_at(mirror):
-    stage, empty = Stage(800, 600), Mirror(None, lambda uri: None, pytest.fail)
+    stage, empty = Stage(800, 600), Mirror(DrawingCache(), lambda uri: None, pytest.fail)
     empty.set_scene([FLOOR])
     stage.take(empty, True)
     assert stage.eye == FIRST_EYE
