@@ -15,10 +15,12 @@ from baxter_dataflow import wait_for
 from baxter_dataflow.waiting import is_unlimited
 from baxter_model.readiness import held_by_avoidance, why_not_ready
 
+from . import startup
 from .joint_motion import DISABLED_GRACE_S, MAKING_ROOM_S, NO_HINDRANCE, STILL_S, Hindrance, Standstill
 
 # Longest wait for one state of a robot [s, wall]; one that is present sends 100 a second.
 STATE_TIMEOUT_S = 1.0
+COLLIDES = "it feels a collision: something is in its way"
 # The robot is asked why nothing happens after so long [s, ROS time].
 ASK_AFTER_S = 1.0
 
@@ -29,6 +31,29 @@ def robot_refusal() -> str:
         return why_not_ready(rospy.wait_for_message("robot/state", AssemblyState, STATE_TIMEOUT_S))
     except rospy.ROSException:
         return ""
+
+
+def ask_what_holds(side: str, is_kept_away: bool) -> str:
+    """Ask the robot once what holds back the arm "left" or "right"; "" for nothing that it tells.
+
+    `is_kept_away`: whether its commands were of a mode in which collision avoidance acts.
+    """
+    prefix = "robot/limb/%s/" % side
+    avoidance = _newest(prefix + "collision_avoidance_state", CollisionAvoidanceState) if is_kept_away else None
+    if avoidance is not None and avoidance.collision_object:
+        return held_by_avoidance(avoidance.collision_object)
+    detection = _newest(prefix + "collision_detection_state", CollisionDetectionState)
+    return COLLIDES if detection is not None and detection.collision_state else ""
+
+
+def _newest(topic, kind):
+    """The next message of a topic, None where nobody publishes it."""
+    if not startup.topic_published(rospy.resolve_name(topic)).is_met():
+        return None
+    try:
+        return rospy.wait_for_message(topic, kind, STATE_TIMEOUT_S)
+    except rospy.ROSException:
+        return None
 
 
 def wait_for_motion(test: Callable[[], bool], timeout: float, body: Callable[[], object], text: str) -> None:
@@ -106,7 +131,7 @@ class ArmHindrance:
                 return Hindrance(held_by_avoidance(self._near), not self._by_other_arm or still_s >= MAKING_ROOM_S)
             if self._cuff:
                 return Hindrance("its cuff is squeezed: let go of it")
-            return Hindrance("it feels a collision: something is in its way" if self._collides else "")
+            return Hindrance(COLLIDES if self._collides else "")
 
     def close(self) -> None:
         """Listen no longer."""

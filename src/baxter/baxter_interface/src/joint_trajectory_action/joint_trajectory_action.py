@@ -20,6 +20,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import LoopStopwatch, Ticker
 from baxter_interface import Limb
 from baxter_interface.goal_loop import SHORTEST_GOAL_S, start
+from baxter_interface.hindrance import ask_what_holds
 from baxter_interface.joint_limits import read_joint_limits
 from joint_trajectory import (
     ErrorCode,
@@ -254,7 +255,13 @@ class JointTrajectoryActionServer:
         if verdict.outcome is Outcome.SUCCEEDED:
             handle.set_succeeded(FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), ""))
         else:
-            self._abort(handle, code_of_outcome(verdict.outcome), verdict.text)
+            # The loop has no time to wait for the robot's answer.
+            threading.Thread(target=self._abort_with_reason, daemon=True,
+                             args=(handle, code_of_outcome(verdict.outcome), verdict.text)).start()
+
+    def _abort_with_reason(self, handle, code, text):
+        why = ask_what_holds(self._limb.name, is_kept_away=self._mode is not Mode.POSITION_WITH_DYNAMICS)
+        self._abort(handle, code, "; ".join(filter(None, (text, why))))
 
     def _give_up(self, why):
         """End the goal or the hold, and stop the arm, if it can still be commanded.

@@ -8,7 +8,13 @@ import threading
 import time
 
 import rospy
-from baxter_core_msgs.msg import AssemblyState, CollisionAvoidanceState, EndpointState, JointCommand
+from baxter_core_msgs.msg import (
+    AssemblyState,
+    CollisionAvoidanceState,
+    CollisionDetectionState,
+    EndpointState,
+    JointCommand,
+)
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, Float64
@@ -27,6 +33,7 @@ KNOBS = {
     "stuck": [],               # joints that never move
     "near": [],                # what collision avoidance finds too near to the left arm ...
     "other_arm": False,        # ... and whether it is part of the other one
+    "collides": False,         # whether the left arm feels a collision
     "enabled": False,          # at the start
     "refuse_enable": False,    # enable requests change nothing
     "stop_button": False,      # pressed: stopped, and no reset helps
@@ -55,6 +62,8 @@ class FakeRobot:
             rospy.Publisher("/robot/limb/%s/endpoint_state" % side, EndpointState, queue_size=1) for side in SIDES]
         self._avoidance_publisher = rospy.Publisher("/robot/limb/left/collision_avoidance_state",
                                                     CollisionAvoidanceState, queue_size=1)
+        self._detection_publisher = rospy.Publisher("/robot/limb/left/collision_detection_state",
+                                                    CollisionDetectionState, queue_size=1)
         self._clock_publisher = None
         if self._knobs["clock_start_s"] >= 0.0:
             self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=1)
@@ -107,6 +116,7 @@ class FakeRobot:
             message.wrench.force.x = 3.0
             publisher.publish(message)
         self._avoidance_publisher.publish(other_arm=self._knobs["other_arm"], collision_object=self._knobs["near"])
+        self._detection_publisher.publish(collision_state=self._knobs["collides"])
         if self._clock_publisher:
             self._clock_publisher.publish(rospy.Time.from_sec(self._knobs["clock_start_s"] + time_s))
 

@@ -212,7 +212,7 @@ class TrajectoryServerTest(unittest.TestCase):
         cases = [
             (invalid, "no points", {"points": []}),
             (invalid, "point 0 has 2 positions, expected 7", {"points": [(1.0, [0.0, 0.0])]}),
-            (invalid, "point 0 has 1 velocities", {"points": [(1.0, HOME, [0.0])]}),
+            (invalid, "point 0 has 1 velocity", {"points": [(1.0, HOME, [0.0])]}),
             (invalid, "not finite", {"points": [(1.0, [*HOME[:6], float("nan")])]}),
             (invalid, "not finite", {"points": [(1.0, HOME, [float("inf")] * 7)]}),
             (invalid, "time_from_start must increase", {"points": [(1.0, HOME), (1.0, HOME)]}),
@@ -245,6 +245,12 @@ class TrajectoryServerTest(unittest.TestCase):
                            FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, "left_e1 path error 0.",
                            "(position, tolerance 0.35) at ")
         self.assert_commanded()
+
+    def test_collision_that_the_robot_feels_is_in_the_result(self):
+        self.knobs(stuck=["left_e1"], collides=True)
+        self.addCleanup(self.knobs, collides=False)
+        self.assert_aborts(self.client.go([(3.0, [*HOME[:3], HOME[3] + 1.0, *HOME[4:]])]),
+                           FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, "left_e1 path error", "a collision")
 
     def test_tolerances_of_the_goal(self):
         self.knobs(stuck=["left_e1"])
