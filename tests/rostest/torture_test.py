@@ -50,6 +50,12 @@ class All(Torture):
     def test_garbage(self):
         self.torture("garbage", SEED, "--messages", 2000, "--minutes", 5)
 
+    def test_handshakes(self):
+        self.torture("handshakes", SEED, "--messages", 100_000)
+
+    def test_names(self):
+        self.torture("names", SEED, "--messages", 100_000)
+
     def test_machine(self):
         self.torture("machine", SEED, "--minutes", 10)
 
