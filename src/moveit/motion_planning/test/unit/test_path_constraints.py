@@ -14,16 +14,19 @@ from motion_planning.constraints import (
     JointTarget,
     OrientationTarget,
     PositionTarget,
+    regions,
     sampler,
 )
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.exact import ExactChecker
 from motion_planning.kinematics import ik
+from motion_planning.model import PlanningModel
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools, plan
 from motion_planning.planners import NoPath, Search, plan_path
 from motion_planning.scene import AttachedBody, Scene, WorldObject
+from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Sphere
-from urdf_model.transforms import axis_rotation, rigid
+from urdf_model.transforms import axis_rotation, inverse, rigid
 
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 120.0
@@ -212,9 +215,9 @@ def test_residuals_change_as_their_derivatives_say(desk, name):
     manifold = Manifold(desk.scene, desk.scene.model.groups[desk.group], constraint_set(TARGETS[name]), np.zeros(6))
     part, tiny, looked = manifold._parts[0], 1e-6, 0
     for q in np.random.default_rng(2).uniform(-1.0, 1.0, (20, 6)):
-        residual, derivatives = part.residual(q, 1.0)
-        numbers = np.column_stack([(part.residual(q + step, 1.0)[0] - part.residual(q - step, 1.0)[0]) / (2.0 * tiny)
-                                   for step in tiny * np.eye(6)])
+        residual, derivatives = part.residual(q, margin=False)
+        numbers = np.column_stack([(part.residual(q + step, margin=False)[0] - part.residual(q - step, margin=False)[0])
+                                   / (2.0 * tiny) for step in tiny * np.eye(6)])
         beyond = residual != 0.0
         if name.startswith("turn") and np.abs(numbers).max() < 10.0:
             assert np.allclose(derivatives[beyond], numbers[beyond], atol=1e-4)
@@ -248,3 +251,83 @@ def test_links_that_the_group_does_not_move_are_not_brought_anywhere(mix):
     manifold = Manifold(scene, mix.groups["arm"], still, np.zeros(2))
     inside = manifold.bounds.mean(axis=1)
     assert manifold.keeps(inside) and np.array_equal(manifold.project(inside), inside)
+
+
+REACHER = """<robot name="reacher"><link name="base"/>%s</robot>""" % "".join(
+    """<link name="l%d"/><joint name="j%d" type="revolute"><origin xyz="0 0 0.25"/><parent link="%s"/>
+    <child link="l%d"/><axis xyz="%s"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>""" % (
+        k, k, "l%d" % (k - 1) if k else "base", k, "1 0 0" if k % 2 else "0 1 0" if k % 4 else "0 0 1")
+    for k in range(6))
+
+
+@pytest.fixture(scope="module")
+def reacher():
+    """Six joints and nothing to touch."""
+    model = PlanningModel.from_xml(REACHER, "<robot name='reacher'><group name='arm'><chain base_link='base' "
+                                            "tip_link='l5'/></group></robot>")
+    return Scene(model), ExactChecker(model, None)
+
+
+def region_around(points, kind, size, choose):
+    """(shape, pose) of about ``size`` [m] that just contains ``points`` (n, 3); None if it is too small."""
+    turn = np.linalg.qr(choose.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    shape = {"box": Box((size, 2.0 * size, size)), "sphere": Sphere(size), "cylinder": Cylinder(size, 2.0 * size),
+             "cone": Cone(2.0 * size, 4.0 * size), "mesh": TriangleMesh(size * CORNERS, TETRAHEDRON)}[kind]
+    middle = points.mean(axis=0)
+    away = choose.normal(size=3)
+    away /= np.linalg.norm(away)
+
+    def holds(shift):
+        pose = inverse(rigid(turn, middle + shift * away))
+        return all(regions.holds(shape, pose[:3] @ np.append(point, 1.0)) for point in points)
+
+    low, high = 0.0, 10.0 * size
+    if not holds(low):
+        return None
+    while high - low > 1e-4:  # as far as the region goes
+        low, high = (0.5 * (low + high), high) if holds(0.5 * (low + high)) else (low, 0.5 * (low + high))
+    return shape, rigid(turn, middle + max(0.0, low - 2e-3) * away)
+
+
+CORNERS = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0)])
+TETRAHEDRON = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
+
+
+def straight(reacher, constraints, start, goal):
+    """Whether the constraints are planned as the straight motion, with 2 mrad to spare."""
+    scene, exact = reacher
+    search = Search(exact, 1, PATIENCE_S, time.monotonic, constraints=constraints)
+    path = plan_path(scene.with_state(scene.state.with_q(start)), "arm", start, [goal], search)
+    return path.length <= float(np.linalg.norm(goal - start)) + 2e-3
+
+
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "cone", "mesh"])
+def test_a_region_of_any_size_may_be_used_up_to_its_edge(reacher, kind):
+    """A hand just above the bottom of a large box: the straight motion keeps to it, so nothing else is planned."""
+    model, choose, looked = reacher[0].model, np.random.default_rng(5), 0
+    for number in range(60):
+        start = choose.uniform(-1.5, 1.5, 6)
+        goal = start + choose.uniform(-0.6, 0.6, 6)
+        points = np.array([model.frame_of(q, "l5")[:3, 3] for q in np.linspace(start, goal, 60)])
+        region = region_around(points, kind, (0.3, 0.6, 1.0, 2.0, 4.0, 20.0)[number % 6], choose)
+        if region is not None:
+            looked += 1
+            assert straight(reacher, ConstraintSet(positions=[PositionTarget("l5", [region])]), start, goal), number
+    assert looked > 20
+
+
+def test_a_wide_tolerance_may_be_used_up_to_its_edge(reacher):
+    model, choose, looked = reacher[0].model, np.random.default_rng(6), 0
+    for number in range(60):
+        start = choose.uniform(-1.0, 1.0, 6)
+        goal = start + choose.uniform(-0.3, 0.3, 6)
+        turns = [model.frame_of(q, "l5")[:3, :3] for q in np.linspace(start, goal, 60)]
+        wanted = turns[0] @ axis_rotation((1.0, 0.0, 0.0), choose.uniform(-1.2, 1.2))
+        free = OrientationTarget("l5", wanted, (math.pi,) * 3)
+        angles = np.abs([free.angles(wanted.T @ turn) for turn in turns]).max(axis=0)
+        if angles[1] < 1.2 and angles.max() < 2.5:
+            looked += 1
+            target = OrientationTarget("l5", wanted, tuple(angles + 2e-3))
+            assert straight(reacher, ConstraintSet(orientations=[target]), start, goal), number
+    assert looked > 15

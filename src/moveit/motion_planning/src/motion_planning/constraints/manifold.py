@@ -9,8 +9,9 @@ from motion_planning.kinematics import KinematicsFailure, limbs_of
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse
 
-# Postures are projected to within this share of a tolerance; the rest is a margin for the motion between two of them.
-_SHARE = 0.8
+# Postures are projected to where they keep a margin for the motion between two of them: this share of a tolerance or
+# half size, at most so much [m; rad], so that a large region may be used up to its edge.
+_SHARE, _MARGIN_M, _MARGIN_RAD = 0.2, 0.005, 0.01
 _STEPS = 25
 # Damping of Newton's steps, and greatest motion of a joint in one step [rad or m].
 _DAMPING, _LONGEST = 1e-4, 0.5
@@ -45,7 +46,7 @@ class Manifold:
     def keeps(self, q):
         """Whether the posture ``q`` (k,) satisfies the constraints, with their full tolerances."""
         return bool((q >= self.bounds[:, 0] - _NONE).all() and (q <= self.bounds[:, 1] + _NONE).all()
-                    and not any(np.any(part.residual(q, 1.0)[0]) for part in self._parts))
+                    and not any(np.any(part.residual(q, margin=False)[0]) for part in self._parts))
 
     def project(self, q):
         """Return a posture (k,) near ``q`` that satisfies the constraints with some margin, None if none is found."""
@@ -73,7 +74,7 @@ class Manifold:
         return None
 
     def _residual(self, q):
-        parts = [part.residual(q, _SHARE) for part in self._parts]
+        parts = [part.residual(q, margin=True) for part in self._parts]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
@@ -83,38 +84,38 @@ class _Part:
     def __init__(self, target, chain, columns, root):
         self._target, self._chain, self._columns, self._root = target, chain, columns, root
 
-    def residual(self, q, share):
-        """Return (residual (3,), its derivatives (3, k)); 0 within ``share`` of the tolerance."""
+    def residual(self, q, margin):
+        """Return (residual (3,), its derivatives (3, k)); 0 within the tolerance, less a margin if ``margin``."""
         pose, jacobian = self._chain.fk_and_jacobian(q[self._columns])
         turn = self._root[:3, :3]
         whole = np.zeros((6, len(q)))
         whole[:3, self._columns], whole[3:, self._columns] = turn @ jacobian[:3], turn @ jacobian[3:]
-        residual, derivatives = self._beyond(self._root @ pose, whole, share)
+        residual, derivatives = self._beyond(self._root @ pose, whole, margin)
         # Errors within the tolerance count as zero.
         derivatives[residual == 0.0] = 0.0
         return residual, derivatives
 
-    def _beyond(self, pose, jacobian, share):
+    def _beyond(self, pose, jacobian, margin):
         raise NotImplementedError
 
 
 class _Turn(_Part):
-    def _beyond(self, pose, jacobian, share):
+    def _beyond(self, pose, jacobian, margin):
         wanted = self._target.rotation
         angles = np.asarray(self._target.angles(wanted.T @ pose[:3, :3] @ self._target.axes))
         tolerances = np.array(self._target.tolerances)
-        tolerances = np.where(tolerances >= math.pi, np.inf, share * tolerances)
+        tolerances = np.where(tolerances >= math.pi, np.inf, _inner(tolerances, _MARGIN_RAD * margin))
         rates = _of_rotation_vector(angles) if self._target.rotation_vector else _of_angles(angles)
         return angles - np.clip(angles, -tolerances, tolerances), rates @ wanted.T @ jacobian[3:]
 
 
 class _Place(_Part):
-    def _beyond(self, pose, jacobian, share):
+    def _beyond(self, pose, jacobian, margin):
         lever = pose[:3, :3] @ self._target.offset
         point = pose[:3, 3] + lever
         found = []
         for shape, place in self._target.regions:
-            beyond = _beyond_shape(shape, inverse(place)[:3] @ np.append(point, 1.0), share)
+            beyond = _beyond_shape(shape, inverse(place)[:3] @ np.append(point, 1.0), _MARGIN_M * margin)
             found.append((float(np.linalg.norm(beyond)), beyond, place))
         _, beyond, place = min(found, key=lambda one: one[0])
         x, y, z = lever
@@ -122,21 +123,33 @@ class _Place(_Part):
         return beyond, place[:3, :3].T @ (jacobian[:3] - cross @ jacobian[3:])
 
 
-def _beyond_shape(shape, point, share):
-    """The vector (3,) from a shape, shrunk to a share of its size, to a point (3,) in its frame; 0 within."""
+def _inner(size, margin):
+    """A half size or tolerance without its margin."""
+    return size - _margin(size, margin)
+
+
+def _margin(size, most):
+    return np.minimum(_SHARE * size, most)
+
+
+def _beyond_shape(shape, point, margin):
+    """The vector (3,) from a shape, smaller by ``margin`` [m] all round, to a point (3,) in its frame; 0 within."""
     if isinstance(shape, Box):
-        half = 0.5 * share * np.asarray(shape.size)
+        half = _inner(0.5 * np.asarray(shape.size), margin)
         return point - np.clip(point, -half, half)
     if isinstance(shape, Sphere):
         length = float(np.linalg.norm(point))
-        return point * max(0.0, 1.0 - share * shape.radius / length) if length > 0.0 else np.zeros(3)
+        return point * max(0.0, 1.0 - _inner(shape.radius, margin) / length) if length > 0.0 else np.zeros(3)
     if isinstance(shape, Cylinder):
         out = math.hypot(point[0], point[1])
-        half = 0.5 * share * shape.length
-        sideways = point[:2] * (max(0.0, 1.0 - share * shape.radius / out) if out > 0.0 else 0.0)
+        half = _inner(0.5 * shape.length, margin)
+        sideways = point[:2] * (max(0.0, 1.0 - _inner(shape.radius, margin) / out) if out > 0.0 else 0.0)
         return np.array([*sideways, point[2] - min(max(point[2], -half), half)])
-    middle = regions.middle_of(shape)
-    return np.zeros(3) if regions.holds(shape, middle + (point - middle) / share) else point - middle
+    # Cones and hulls of meshes: out of the plane that the point is farthest beyond.
+    normals, offsets, depths = regions.planes_of(shape, point)
+    beyond = normals @ point - offsets + _margin(depths, margin)
+    worst = int(beyond.argmax())
+    return normals[worst] * max(0.0, float(beyond[worst]))
 
 
 def _of_angles(angles):

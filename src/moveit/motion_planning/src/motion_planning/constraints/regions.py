@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Regions of points and rotations: tests whether one is inside, and random samples."""
 import math
+import weakref
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from urdf_model.transforms import axis_rotation, rpy_matrix
 
 # Tolerance of comparisons with an edge [m], for rounding errors.
 _EDGE = 1e-9
+# The planes of meshes, made once for each.
+_planes = weakref.WeakKeyDictionary()
 
 
 def has_inside(shape):
@@ -25,15 +28,35 @@ def holds(shape, point):
     if isinstance(shape, Box):
         return all(abs(value) <= 0.5 * side + _EDGE for value, side in zip((x, y, z), shape.size, strict=True))
     if isinstance(shape, TriangleMesh):
-        corners = shape.vertices[shape.triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        outwards = np.einsum("na,na->n", normals, corners[:, 0] - shape.vertices.mean(axis=0))
-        normals *= np.sign(outwards)[:, None] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
-        return bool((np.einsum("na,na->n", normals, np.array((x, y, z)) - corners[:, 0]) <= _EDGE).all())
+        normals, offsets, _ = planes_of(shape, point)
+        return bool((normals @ (x, y, z) <= offsets + _EDGE).all())
     radius = shape.radius
     if isinstance(shape, Cone):
         radius *= max(0.0, 0.5 - z / shape.length)
     return abs(z) <= 0.5 * shape.length + _EDGE and math.hypot(x, y) <= radius + _EDGE
+
+
+def planes_of(shape, point):
+    """Return (normals (n, 3) outwards, offsets (n,) along them, depths (n,) of the shape's middle behind them) of the
+    planes that bound a mesh, or a cone next to ``point`` (3,)."""
+    if isinstance(shape, TriangleMesh):
+        if shape not in _planes:
+            _planes[shape] = _planes_of_mesh(shape)
+        return _planes[shape]
+    slant = math.hypot(shape.length, shape.radius)
+    away = np.array((*point[:2], 0.0)) / max(1e-12, math.hypot(*point[:2]))
+    side = (shape.length * away + np.array((0.0, 0.0, shape.radius))) / slant
+    offsets = np.array((0.5 * shape.length, 0.5 * shape.radius * shape.length / slant))
+    return np.array(((0.0, 0.0, -1.0), side)), offsets, offsets
+
+
+def _planes_of_mesh(mesh):
+    corners, middle = mesh.vertices[mesh.triangles], mesh.vertices.mean(axis=0)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outwards = np.einsum("na,na->n", normals, corners[:, 0] - middle)
+    normals *= np.sign(outwards)[:, None] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    offsets = np.einsum("na,na->n", normals, corners[:, 0])
+    return normals, offsets, offsets - normals @ middle
 
 
 def point_in(shape, generator):

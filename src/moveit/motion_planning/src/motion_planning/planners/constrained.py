@@ -92,7 +92,7 @@ class ConstrainedPlanning:
             left = float(np.linalg.norm(rest))
             if left == 0.0:
                 return
-            new = target if left <= _STEP else self._manifold.project(q + rest * (_STEP / left))
+            new = target if left <= _STEP else self._kept(q + rest * (_STEP / left))
             if new is None or np.linalg.norm(target - new) > left - min(_GAIN, 0.5 * left) \
                     or np.linalg.norm(new - q) > _STRETCH * _STEP:
                 return
@@ -106,12 +106,17 @@ class ConstrainedPlanning:
         """Points after ``a`` up to ``b`` whose lines satisfy the constraints; None if there are none."""
         if all(self._manifold.keeps(a + share * (b - a)) for share in _LOOKS):
             return [b]
-        middle = self._manifold.project(0.5 * (a + b)) if halvings else None
+        middle = self._kept(0.5 * (a + b)) if halvings else None
         if middle is None or max(np.linalg.norm(middle - a), np.linalg.norm(b - middle)) > np.linalg.norm(b - a):
             return None
         first = self._line(a, middle, halvings - 1)
         second = self._line(middle, b, halvings - 1) if first is not None else None
         return None if second is None else first + second
+
+    def _kept(self, q):
+        """``q`` (k,) itself if it satisfies the constraints, else a posture near it that does, None if none is
+        found."""
+        return q if self._manifold.keeps(q) else self._manifold.project(q)
 
     def _shortened(self, points):
         run = self._run
