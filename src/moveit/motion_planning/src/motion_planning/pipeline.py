@@ -12,6 +12,7 @@ import numpy as np
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.errors import PlanningError
 from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
+from motion_planning.planners.planning import LEAST_FOR_SCENE_S, SHARE_OF_SEARCH
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
 
@@ -103,12 +104,14 @@ class Tools:
 
 
 class Plan(NamedTuple):
-    """start: State of the whole robot; path (m, k) of the group's joints; timed: timing.Timed; planning_time [s]."""
+    """start: State of the whole robot; path (m, k) of the group's joints; timed: timing.Timed; planning_time [s];
+    remarks: sentences on what was planned more coarsely than usual."""
 
     start: Any
     path: np.ndarray
     timed: Timed
     planning_time: float
+    remarks: tuple[str, ...] = ()
 
 
 def plan(query, tools):
@@ -126,7 +129,8 @@ class _Planning:
     def __init__(self, query, tools):
         self.query, self.tools = query, tools
         self.model = query.scene.model
-        self.begin = self.tables_made = tools.clock()
+        self.begin = tools.clock()
+        self.spared, self.remarks = 0.0, ()
         if query.group not in self.model.groups:
             raise PlanningFailure(Code.INVALID_GROUP_NAME, "robot '%s' has no group '%s'; its groups are %s" % (
                 self.model.name, query.group, ", ".join(self.model.groups) or "none"))
@@ -175,9 +179,9 @@ class _Planning:
         scene = self._within_limits(self.query.scene)
         q = self.query.scene.state.q[self.indices]
         lead = np.empty((0, len(q))) if scene is self.query.scene else q[None]
+        self.tools.exact.prepare(scene, self.query.group, self._look_up_shapes)
+        self.spared = max(0.0, self._elapsed() - (1.0 - SHARE_OF_SEARCH) * self.query.allowed_time)
         contacts = self.tools.exact.contacts(scene, scene.state, self.query.group)
-        # The first question about a scene makes its tables; with 10,000 objects that must not use up the time.
-        self.tables_made = self.tools.clock()
         if contacts:
             free = self._free_near(scene)
             if free is None:
@@ -322,6 +326,7 @@ class _Planning:
             self._look_up()
             late = self._used() >= 0.98 * self.query.allowed_time
             raise PlanningFailure(Code.TIMED_OUT if late else Code.PLANNING_FAILED, str(error)) from None
+        self.remarks = getattr(path, "remarks", ())
         return np.asarray(getattr(path, "points", path), dtype=float)
 
     def _timed(self, scene, lead, path):
@@ -340,7 +345,7 @@ class _Planning:
             timed = time_path(points, velocity, acceleration, timing, tolerance=tolerance)
             hit = self._first_hit(scene, timed, len(lead) > 0)
             if hit is None:
-                return Plan(self.query.scene.state, whole, timed, self._elapsed())
+                return Plan(self.query.scene.state, whole, timed, self._elapsed(), self.remarks)
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "a path was found, but the timed trajectory is not valid: %s"
                               % hit[0], hit[1])
 
@@ -395,11 +400,18 @@ class _Planning:
 
     def _used(self):
         """The used part of the allowed time [s]."""
-        return self.tools.clock() - self.tables_made
+        return self._elapsed() - self.spared
 
     def _is_over(self, share=1.0):
         """Whether to stop: requested, or this share of the time is over."""
         return self.tools.stop() or self._used() > share * self.query.allowed_time
+
+    def _look_up_shapes(self):
+        self._look_up()
+        if self._elapsed() > max(self.query.allowed_time, LEAST_FOR_SCENE_S):
+            raise PlanningFailure(Code.TIMED_OUT, "time was over after %.2f s, while the shapes of %d objects were "
+                                  "prepared; those that are done are kept, so that another request gets further"
+                                  % (self._elapsed(), len(self.query.scene.objects)))
 
     def _look_up(self):
         if self.tools.stop():

@@ -10,7 +10,7 @@ from motion_planning.constraints import ConstraintSet, JointTarget
 from motion_planning.exact import ExactChecker
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools, plan
 from motion_planning.planners import NoPath, plan_path, warm_up
-from motion_planning.scene import Scene, WorldObject
+from motion_planning.scene import Scene, TriangleMesh, WorldObject
 from urdf_model import Box
 from urdf_model.transforms import rigid
 
@@ -77,7 +77,10 @@ class Lab:
         return self.run(self.query(*goals, **options))
 
     def run(self, query):
-        return plan(query, Tools(self.exact, self.plan_path, sampler, time.monotonic, 1, self.stop))
+        return plan(query, self.tools())
+
+    def tools(self):
+        return Tools(self.exact, self.plan_path, sampler, time.monotonic, 1, self.stop)
 
     def refused(self, *goals, **options):
         with pytest.raises(PlanningFailure) as failure:
@@ -273,3 +276,41 @@ def test_the_shortest_of_several_attempts_counts(lab):
 
     lab.plan_path = by_way
     assert lab.plan(ASIDE, attempts=3).path[1, 0] == pytest.approx(-0.1)
+
+
+def with_objects(lab, count):
+    shapes = [Box((0.1 + 1e-6 * k, 0.1, 0.1)) for k in range(count)]
+    return replace(lab, scene=lab.scene.with_objects([
+        WorldObject("far_%d" % k, rigid(np.eye(3), (5.0 + k, 0.0, 0.0)), ((shape, np.eye(4)),))
+        for k, shape in enumerate(shapes)]))
+
+
+def test_preparing_a_scene_counts_against_the_time_and_what_is_made_is_kept(lab):
+    """By a clock that goes on at each look."""
+    many = with_objects(lab, 400)
+    ticks = iter(range(10**9))
+    tools = replace(many.tools(), clock=lambda: 4.0 * next(ticks))
+    with pytest.raises(PlanningFailure, match="400 objects") as caught:
+        plan(many.query(ASIDE, allowed_time=5.0), tools)
+    assert caught.value.code == Code.TIMED_OUT
+    # Most of the time is left for the search of another request.
+    ticks = iter(range(10**9))
+    found = plan(many.query(ASIDE, allowed_time=5.0), replace(many.tools(), clock=lambda: 1e-6 * next(ticks)))
+    assert np.allclose(found.path[-1], ASIDE)
+
+
+def test_preparing_a_scene_ends_when_the_request_is_cancelled(lab):
+    many, looks = with_objects(lab, 400), iter([False] * 3)
+    with pytest.raises(PlanningFailure) as caught:
+        plan(many.query(ASIDE), replace(many.tools(), stop=lambda: next(looks, True)))
+    assert caught.value.code == Code.PREEMPTED
+
+
+def test_what_was_planned_around_more_coarsely_is_told(lab):
+    rng = np.random.default_rng(1)
+    soup = TriangleMesh(rng.random((300, 3)), rng.integers(300, size=(2000, 3)))
+    messy = replace(lab, scene=lab.scene.with_object(WorldObject("soup", rigid(np.eye(3), (3.0, 0.0, 0.0)),
+                                                                 ((soup, np.eye(4)),))))
+    found = plan(messy.query(ASIDE, allowed_time=60.0), messy.tools())
+    assert len(found.remarks) == 1 and "'soup'" in found.remarks[0]
+    assert plan(lab.query(ASIDE), lab.tools()).remarks == ()

@@ -196,6 +196,14 @@ def test_an_entry_comes_before_defaults_and_a_forbidding_default_before_an_allow
     assert allowed.allowed("a", "x") and not allowed.allowed("a", "c") and not allowed.allowed("x", "y")
 
 
+def test_many_names_are_asked_about_at_once():
+    rng, names = np.random.default_rng(1), ["a", "b", "c", "d", "e", "b"]
+    for _ in range(50):
+        entries = {tuple(sorted(rng.choice(list("abcdef"), 2, replace=False))): bool(rng.integers(2)) for _ in range(4)}
+        allowed = AllowedCollisions(entries, {name: bool(rng.integers(2)) for name in rng.choice(list("abcdef"), 2)})
+        assert (allowed.among(names) == [[allowed.allowed(a, b) for b in names] for a in names]).all()
+
+
 def test_matrices_go_there_and_back():
     allowed = AllowedCollisions({("a", "b"): True, ("b", "c"): False}, {"d": True})
     names, matrix, *defaults = allowed.as_matrix()

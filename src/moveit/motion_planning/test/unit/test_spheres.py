@@ -9,9 +9,10 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.shapes import Cone, Octree, TriangleMesh
-from motion_planning.spheres import CoverError, SphereChecker, SphereModel
+from motion_planning.spheres import CoverError, Patience, SphereChecker, SphereModel, sphere_model
+from motion_planning.spheres import cover as covers
 from motion_planning.spheres.cover import ball, boxes_of_cells, cover, voxels
-from motion_planning.spheres.world_tables import forest, solids_of, tree_of
+from motion_planning.spheres.world_tables import forest, pyramid, solids_of, tree_of
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import pose_matrix as pose
 
@@ -109,8 +110,61 @@ def test_voxels_fill_what_is_closed_and_leave_a_bowl_open():
     one = np.ones_like(u)
     walls = [np.column_stack(w) for w in ((u, v, -one), (u, -one, v), (u, one, v), (-one, u, v), (one, u, v))]
     lid = np.column_stack((u, v, one))
-    assert voxels(np.concatenate([*walls, lid]), 0.1)[0][12, 12, 12]
-    assert not voxels(np.concatenate(walls), 0.1)[0][12, 12, 12]
+    assert voxels([np.concatenate([*walls, lid])], 0.1)[0][12, 12, 12]
+    assert not voxels([np.concatenate(walls)], 0.1)[0][12, 12, 12]
+
+
+def soup(count, size=1.0):
+    """Triangles with corners anywhere in a cube."""
+    rng = np.random.default_rng(1)
+    return TriangleMesh(size * rng.random((300, 3)), rng.integers(300, size=(count, 3)))
+
+
+@pytest.mark.parametrize("mesh", [soup(2000), soup(50, 1e5), TriangleMesh(np.zeros((1, 3)), [(0, 0, 0)] * 500),
+                                  TriangleMesh([(0, 0, 0), (1e5, 0, 0), (0, 1e-9, 0)], [(0, 1, 2)])],
+                         ids=["large triangles", "huge", "a point", "a hair"])
+def test_a_mesh_costs_no_more_than_its_bound(mesh, monkeypatch):
+    """2,000 triangles of a metre are 250 million samples at the usual distance."""
+    monkeypatch.setattr(sphere_model, "_MOST_POINTS", 50_000)
+    monkeypatch.setattr(covers, "OF_OBJECTS", covers.Bound(50_000, 100_000, 2_000_000))
+    made = []
+    points_on = covers.points_on
+
+    def counted(*arguments):
+        for points in points_on(*arguments):
+            made.append(len(points))
+            yield points
+
+    monkeypatch.setattr(covers, "points_on", counted)
+    monkeypatch.setattr(sphere_model, "points_on", counted)
+    boxes = sphere_model.mesh_boxes([(mesh, np.eye(4))], sphere_model.MESH_CELL_M)[1:]
+    assert sum(made) <= 50_000 + len(mesh.vertices)
+    made.clear()
+    spheres = covers.cover_object([(mesh, np.eye(4))], TOLERANCE)[1:]
+    assert sum(made) <= 60 * 50_000 and max(made) <= 50_000
+    corners = mesh.vertices[mesh.triangles]
+    weights = np.random.default_rng(2).dirichlet((1.0, 1.0, 1.0), len(corners))
+    inside = np.einsum("nk,nka->na", weights, corners)[:200]
+    low, high = boxes[:, 0], boxes[:, 1]
+    assert ((inside[:, None] >= low) & (inside[:, None] <= high)).all(axis=2).any(axis=1).all()
+    far = np.linalg.norm(inside[:, None] - spheres[:, :3], axis=2) - spheres[:, 3]
+    assert far.min(axis=1).max() <= 1e-6 * max(1.0, np.abs(mesh.vertices).max())
+
+
+@pytest.mark.parametrize("solid", [Box((1e5, 0.0, 0.0)), Box((1e4, 1e-9, 1e-3)), Box((1e3, 1e3, 0.0)),
+                                   Cylinder(1e-9, 1e4), Cylinder(1e4, 0.0), Box((0.0, 0.0, 0.0)),
+                                   Cone(1e3, 1e-9), Box((0.3, 0.2, 0.1))],
+                         ids=str)
+@pytest.mark.parametrize("late", [False, True])
+def test_a_held_object_of_any_size_gets_few_spheres_that_contain_it(solid, late):
+    geometry = pyramid(solid) if isinstance(solid, Cone) else solid
+    where = pose((0.1, -0.2, 0.3), (0.3, -0.5, 1.0))
+    spheres, beyond = sphere_model.object_spheres([(geometry, where)], TOLERANCE, late)
+    assert 0 < len(spheres) < 5000 and (beyond is not None or not late and max(getattr(solid, "size", (9.0,))) <= 0.3)
+    points = geometry.vertices if isinstance(solid, Cone) else points_in(solid, np.random.default_rng(1), 400)
+    points = points @ where[:3, :3].T + where[:3, 3]
+    far = np.linalg.norm(points[:, None] - spheres[:, :3], axis=2) - spheres[:, 3]
+    assert far.min(axis=1).max() <= 1e-9 * np.abs(points).max()
 
 
 # -- the checker ----------------------------------------------------------------------------------------------------
@@ -273,3 +327,24 @@ def test_a_tree_leads_past_everything_to_each_of_its_objects():
             assert (nodes[list(below), :3] >= nodes[node, :3]).all()
             assert (nodes[list(below), 3:] <= nodes[node, 3:]).all()
     assert sorted(links[links[:, 1] >= 0, 1]) == list(range(23))
+
+
+def test_a_scene_without_time_is_coarse_and_gets_better_with_the_next_request():
+    """What was made in a hurry is not kept."""
+    model = PlanningModel.from_xml(ROD, "<robot name='rod'><group name='g'><chain base_link='base' tip_link='ball'/>"
+                                        "</group></robot>")
+    spheres, group = SphereModel.of(model, None), model.groups["g"]
+    ring = TriangleMesh([(x, y, z) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)) for z in (-0.1, 0.1)],
+                        [(k % 8, (k + 1) % 8, (k + 2) % 8) for k in range(8)])
+    scene = Scene(model).with_object(WorldObject("ring", np.eye(4), ((ring, np.eye(4)),)))
+    hurried = SphereChecker(spheres, group, scene, patience=Patience(late=lambda: True))
+    assert "ring" in hurried.remarks[0]
+    patient = SphereChecker(spheres, group, scene)
+    assert patient.remarks == () and len(patient.tables[1][0]) > len(hurried.tables[1][0])
+
+    def ended():
+        raise KeyError("stopped")
+
+    other = scene.with_object(WorldObject("ring", pose((0.1, 0.0, 0.0)), ((ring, np.eye(4)),)))
+    with pytest.raises(KeyError):
+        SphereChecker(spheres, group, other, patience=Patience(check=ended))

@@ -16,11 +16,13 @@ from motion_planning.exact import kernels
 from motion_planning.exact.geometry import grown, plane_overlap
 from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part
 from motion_planning.model import ModelError
-from motion_planning.shapes import Octree, TriangleMesh
+from motion_planning.shapes import TriangleMesh
 from urdf_model import Mesh, Plane
 
 #: Number of cached tables of scenes: a scene and its few successors are checked many times.
 _KEPT = 12
+# Number of shapes that are made between two looks at the clock.
+_AT_ONCE = 16
 _ANY = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 _ALL = fcl.CollisionRequest(num_max_contacts=50, enable_contact=True)
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True)
@@ -169,6 +171,22 @@ class ExactChecker:
                         break
         return best
 
+    def prepare(self, scene, group=None, check=lambda: None):
+        """Make what the first question about a scene would make. ``check()`` is called between shapes; what it raises
+        ends the preparation, and what is made by then is kept. Raises PlanningError for objects in hand that cannot be
+        checked against each other."""
+        held = [shape for body in scene.state.attached.values() for shape, _ in body.object.shapes]
+        of_things = [shape for thing in _things(scene) for shape, _ in thing.shapes]
+        for (key, _), shapes in ((self._movers_key(scene, scene.state), held), (self._fixed_key(scene), of_things)):
+            for begin in range(0, 0 if key in self._tables else len(shapes), _AT_ONCE):
+                check()
+                with self._lock:
+                    for shape in shapes[begin : begin + _AT_ONCE]:
+                        self._geometries.of(shape)
+        check()
+        with self._lock:
+            self._query(scene, None, group)
+
     # -- a question about a state -------------------------------------------------------------------------------
 
     def _query(self, scene, state, group):
@@ -261,9 +279,13 @@ class ExactChecker:
             self._tables.move_to_end(key)
         return entry[1]
 
-    def _movers(self, scene, state):
+    @staticmethod
+    def _movers_key(scene, state):
         held = tuple(table for table in (state.attached, scene.link_padding, scene.link_scale) if table)
-        return self._kept(("movers", *map(id, held)), held, lambda: self._make_movers(scene, state))
+        return ("movers", *map(id, held)), held
+
+    def _movers(self, scene, state):
+        return self._kept(*self._movers_key(scene, state), lambda: self._make_movers(scene, state))
 
     def _make_movers(self, scene, state):
         parts = self._robot
@@ -285,17 +307,27 @@ class ExactChecker:
         if group is not None:
             moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
         active = np.array([moving is None or link in moving for link in movers.arrays[0].tolist()], dtype=bool)
-        return movers.pairs(self.model, allowed, moving), active, {}
+        return movers.pairs(allowed, moving), active, {}
+
+    @staticmethod
+    def _fixed_key(scene):
+        held = scene.objects, scene.octomap
+        return ("fixed", *map(id, held)), held
 
     def _fixed(self, scene):
-        held = scene.objects, scene.octomap
-        return self._kept(("fixed", *map(id, held)), held, lambda: self._make_fixed(scene))
+        return self._kept(*self._fixed_key(scene), lambda: self._make_fixed(scene))
 
     def _make_fixed(self, scene):
-        things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else ())]
-        return Fixed([Part(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in things
-                      for shape, pose in thing.shapes if not isinstance(shape, Octree) or len(shape.boxes)],
-                     self._geometries)
+        return Fixed([Part(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in _things(scene)
+                      for shape, pose in thing.shapes], self._geometries)
+
+
+def _things(scene):
+    """The objects of a scene and its octomap that have shapes to check."""
+    octomap = scene.octomap
+    if octomap is not None and any(len(shape.boxes) for shape, _ in octomap.shapes):
+        return [*scene.objects.values(), octomap]
+    return list(scene.objects.values())
 
 
 class _Query:

@@ -6,11 +6,14 @@ from weakref import WeakKeyDictionary
 import fcl
 import numpy as np
 
+from motion_planning.errors import PlanningError
 from motion_planning.exact.geometry import bounds_of, fcl_geometry
 
 ROBOT, OBJECT, ATTACHED = "robot", "object", "attached"
 #: Fixed shapes of one chunk: all of them are passed over when the chunk's ball is far away.
 _CHUNK = 32
+# Greatest number of pairs of shapes that move with the robot.
+_MOST_PAIRS = 5_000_000
 
 
 class Part(NamedTuple):
@@ -55,31 +58,45 @@ class Movers:
             np.array([bounds.half for _, bounds in found], dtype=float).reshape(count, 3),
             np.array([bounds.radius for _, bounds in found], dtype=float))
 
-    def pairs(self, model, allowed, moving):
+    def pairs(self, allowed, moving):
         """Return (p, 2) indices of movers that are checked against each other, of two things each.
 
         ``moving``: set of link indices of which at least one is in each pair, None for all.
         """
-        links = self.arrays[0]
-        may, found = {}, []
-        for i, a in enumerate(self.parts):
-            for j, b in enumerate(self.parts[:i]):
-                if moving is not None and links[i] not in moving and links[j] not in moving:
-                    continue
-                key = a.name, b.name
-                if key not in may:
-                    may[key] = self._may_touch(model, allowed, a, b)
-                if not may[key]:
-                    found.append((j, i))
-        return np.array(found, dtype=np.int64).reshape(-1, 2)
+        of = {}
+        for number, part in enumerate(self.parts):
+            of.setdefault((part.name, part.kind), []).append(number)
+        # One part of each thing: the others move with it.
+        ones = [self.parts[numbers[0]] for numbers in of.values()]
+        may = self._may_touch(allowed, ones)
+        if moving is not None:
+            still = np.array([one.link not in moving for one in ones], dtype=bool)
+            may |= still[:, None] & still
+        numbers = [np.array(some) for some in of.values()]
+        apart = np.argwhere(np.triu(~may, 1))
+        count = sum(len(numbers[a]) * len(numbers[b]) for a, b in apart)
+        if count > _MOST_PAIRS:
+            raise PlanningError("the robot holds objects of %d shapes, %d pairs of which would have to be checked; at "
+                                "most %d are. Join shapes to a mesh, or allow what is held to touch"
+                                % (len(self.parts), count, _MOST_PAIRS))
+        found = [np.stack(np.meshgrid(numbers[a], numbers[b], indexing="ij"), axis=-1).reshape(-1, 2) for a, b in apart]
+        if not found:
+            return np.empty((0, 2), dtype=np.int64)
+        return np.sort(np.concatenate(found), axis=1)
 
-    def _may_touch(self, model, allowed, a, b):
-        if (a.name, a.kind) == (b.name, b.kind) or allowed.allowed(a.name, b.name):
-            return True
-        if a.kind == b.kind == ATTACHED:
-            return a.link == b.link
-        return any(held.kind == ATTACHED and other.kind == ROBOT and other.name in self.touch[held.name]
-                   for held, other in ((a, b), (b, a)))
+    def _may_touch(self, allowed, ones):
+        """(n, n) bool: whether two of ``ones`` (n Parts), one of each thing, may touch."""
+        may = allowed.among([one.name for one in ones])
+        links = np.array([one.link for one in ones])
+        held = np.array([one.kind == ATTACHED for one in ones], dtype=bool)
+        may |= (links[:, None] == links) & held[:, None] & held
+        index = {one.name: k for k, one in enumerate(ones) if one.kind == ROBOT}
+        for k in np.flatnonzero(held):
+            for link in self.touch[ones[k].name]:
+                if link in index:
+                    may[k, index[link]] = may[index[link], k] = True
+        np.fill_diagonal(may, True)
+        return may
 
 
 class Fixed:

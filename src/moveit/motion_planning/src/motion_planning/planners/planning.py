@@ -2,6 +2,7 @@
 """A path from a start to one of some goals: found with spheres, and always checked by exact geometry."""
 import math
 import threading
+import time
 import weakref
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -14,10 +15,14 @@ from motion_planning.planners.parts import TOGETHER, two_parts
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 from motion_planning.scene import Scene
-from motion_planning.spheres import SphereChecker, SphereModel
+from motion_planning.spheres import Patience, SphereChecker, SphereModel, make_links
 
 # The share of the time for spheres; after that, a search by exact geometry alone begins.
 _SHARE_OF_SPHERES = 0.7
+# The share of the time after which what is not yet prepared of a scene is made as coarse as possible, and the same in
+# s for requests without a limit. The preparation ends after all of the time, or this time [s] if that is longer, since
+# scenes of thousands of objects must be planned for on slow machines too; the search has at least this share.
+_SHARE_OF_TABLES, _TABLES_S, LEAST_FOR_SCENE_S, SHARE_OF_SEARCH = 0.4, 5.0, 20.0, 0.3
 # After exact geometry has refused a path, the search is repeated with states on its edges closer by this factor each
 # time.
 _FINER = 0.5
@@ -30,7 +35,7 @@ _EXACT_REACH = 0.25
 # Exact geometry checks one in this many states of a path even if spheres prove them free; number of states per call.
 _SEEN, _AT_ONCE = 8, 64
 
-_sphere_models, _checkers = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
+_sphere_models, _checkers, _made_links = (weakref.WeakKeyDictionary() for _ in range(3))
 _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
 
@@ -57,14 +62,27 @@ def sphere_model_of(exact):
         return _sphere_models[exact]
 
 
-def checker_of(exact, scene, group):
-    """Return the SphereChecker of a Group in a scene, made once for each scene and group."""
-    model = sphere_model_of(exact)
+def checker_of(exact, scene, group, patience=None):
+    """Return the SphereChecker of a Group in a scene, made once for each scene and group. patience: spheres.Patience
+    with that; None: it gets coarse after some seconds."""
     with _checkers_lock:
         known = _checkers.setdefault(scene, {})
-        if group.name not in known:
-            known[group.name] = SphereChecker(model, group, scene)
-        return known[group.name]
+    # Nobody waits for another's scene.
+    if group.name not in known:
+        end = time.monotonic() + _TABLES_S
+        made = SphereChecker(sphere_model_of(exact), group, scene,
+                             patience=patience or Patience(late=lambda: time.monotonic() > end))
+        known.setdefault(group.name, made)
+    return known[group.name]
+
+
+def _make_links(exact, scene, group):
+    """Make what of a robot does not depend on the scene. Most callers have done so before, by ``prepare``."""
+    with _sphere_models_lock:
+        made = _made_links.setdefault(exact, set())
+    if group.name not in made:
+        make_links(sphere_model_of(exact), group, scene.allowed)
+        made.add(group.name)
 
 
 def first_touching(exact, scene, group, states):
@@ -95,22 +113,32 @@ def plan_path(scene, group, start, goals, search):
     It is found and shortened with spheres that contain the robot. Then ``search.exact`` checks states between those of
     the search, at the same distance: each corner, every eighth, and all states that spheres do not prove free. If the
     start is free by exact geometry but not by spheres, the path leads out of there by exact geometry. With
-    ``search.constraints``, start and goals must satisfy them, and the points of the path are as dense as needed. Raises
-    NoPath.
+    ``search.constraints``, start and goals must satisfy them, and the points of the path are as dense as needed. The
+    scene's preparation counts against the time; what of it takes too long is made coarser, which the path's remarks
+    tell. Raises NoPath, whose text has the remarks as well.
     """
-    return _Planning(scene, group, search).path(start, goals)
+    planning = _Planning(scene, group, search)
+    try:
+        return planning.path(start, goals)._replace(remarks=planning.checker.remarks)
+    except NoPath as error:
+        raise NoPath("; ".join([str(error), *planning.checker.remarks]), error.late, error.stopped) from None
 
 
 class _Planning:
     def __init__(self, scene, group, search):
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
-        self.last, self.times = search.clock(), {}
-        self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
-        self.checker = checker_of(search.exact, scene, self.group)
-        self._note("tables")
         # The first plan of a robot may have to make its spheres: that must not use up its time.
-        self.begin = self.last
+        _make_links(search.exact, scene, self.group)
+        self.begin = self.last = search.clock()
+        self.times = {}
+        self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
+        end = self.begin + max(search.allowed_time, LEAST_FOR_SCENE_S)
+        preparing = Run(search.seed, end, search.clock, search.stop)
+        self.checker = checker_of(search.exact, scene, self.group, Patience(
+            lambda: not self._left(_SHARE_OF_TABLES), lambda: preparing.check("the scene was prepared for planning")))
+        self._note("tables")
+        self.begin += max(0.0, self.times["tables"] - (1.0 - SHARE_OF_SEARCH) * search.allowed_time)
         self.bounds = np.array(self.model.bounds[self.group.indices])
 
     def path(self, start, goals):

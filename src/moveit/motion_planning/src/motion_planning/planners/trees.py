@@ -21,11 +21,12 @@ _TRIES, _MISSES = 200, 30
 
 class Path(NamedTuple):
     """points (m, k): corners of a path of straight lines, the first is the start. samples: number of drawn ones. times:
-    {part of the work: s}, if measured."""
+    {part of the work: s}, if measured. remarks: sentences on what was coarser than usual."""
 
     points: np.ndarray
     samples: int = 0
     times: Mapping = MappingProxyType({})
+    remarks: tuple[str, ...] = ()
 
     @property
     def length(self):

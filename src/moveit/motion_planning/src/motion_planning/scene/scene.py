@@ -113,7 +113,7 @@ class Scene:
         """
         if link not in self.model.link_index:
             raise SceneError("object cannot be attached to '%s': the robot has no such link%s"
-                             % (link, _like(link, self.model.links)))
+                             % (link, like(link, self.model.links)))
         if isinstance(what, WorldObject):
             _check_name(what.id)
             if not what.shapes:
@@ -183,7 +183,7 @@ class Scene:
             for link, value in table.items():
                 if link not in self.model.link_index:
                     raise SceneError("%s of link '%s': the robot has no such link%s"
-                                     % (what, link, _like(link, self.model.links)))
+                                     % (what, link, like(link, self.model.links)))
                 if not (np.isfinite(value) and value >= least):
                     raise SceneError("%s of link '%s' is %s; expected %s" % (
                         what, link, value, "0 or more" if what == "padding" else "more than 0"))
@@ -202,7 +202,7 @@ class Scene:
         pose = self._known_pose(name)
         if pose is None:
             raise SceneError("'%s' is not a frame: neither a link, nor an object of the scene or a subframe of one%s"
-                             % (name, _like(name, self.frame_names())))
+                             % (name, like(name, self.frame_names())))
         return np.array(pose)
 
     def has_frame(self, name):
@@ -243,7 +243,7 @@ class Scene:
             body = self.state.attached[name]
             return body.object.at(inverse(self.frame(link)) @ self.attached_pose(body))
         raise SceneError("object '%s' cannot be attached to '%s': it comes without geometry, and the world has no such "
-                         "object%s" % (name, link, _like(name, self.objects)))
+                         "object%s" % (name, link, like(name, self.objects)))
 
     def _without(self, names):
         gone = set(names)
@@ -253,12 +253,12 @@ class Scene:
 
     def _object(self, name):
         if name not in self.objects:
-            raise SceneError("the world has no object '%s'%s" % (name, _like(name, self.objects)))
+            raise SceneError("the world has no object '%s'%s" % (name, like(name, self.objects)))
         return self.objects[name]
 
     def _attached(self, name):
         if name not in self.state.attached:
-            raise SceneError("the robot holds no object '%s'%s" % (name, _like(name, self.state.attached)))
+            raise SceneError("the robot holds no object '%s'%s" % (name, like(name, self.state.attached)))
         return self.state.attached[name]
 
 
@@ -276,7 +276,7 @@ def _check_name(name):
         raise SceneError("an object has no name; give it an id")
 
 
-def _like(name, known):
+def like(name, known):
     """The end of a sentence: the most similar of the ``known`` names, if any. Only the first ones are compared, because
     a message may have thousands of wrong names."""
     near = difflib.get_close_matches(name, list(itertools.islice(known, _COMPARED)), 1)

@@ -6,6 +6,7 @@ import functools
 import numpy as np
 
 from motion_planning.spheres import kernel
+from motion_planning.spheres.sphere_model import Patience
 from motion_planning.spheres.tables import bake, between, split
 
 #: States on an edge are at most this far apart [rad, the Euclidean distance of joint values].
@@ -15,14 +16,14 @@ RESOLUTION = 1.0 / 64.0
 class SphereChecker:
     """A scene prepared for one group. It is immutable, so threads can share it.
 
-    tables: (robot, world), see ``kernel``. resolution [rad]: distance of the checked states on an edge.
+    tables: (robot, world), see ``kernel``. resolution [rad]: distance of the checked states on an edge. remarks:
+    sentences on what is coarser than usual, because it is large or there was no time.
     """
 
-    def __init__(self, sphere_model, group, scene, state=None, resolution=RESOLUTION):
-        """``state``: for the joints that the group does not move and for attached objects; None: the scene's.
-        """
+    def __init__(self, sphere_model, group, scene, resolution=RESOLUTION, patience=None):
+        """patience: Patience with the preparation; None: no end."""
         self.group, self.resolution = group, resolution
-        self.tables = bake(sphere_model, group, scene, scene.state if state is None else state)
+        self.tables, self.remarks = bake(sphere_model, group, scene, scene.state, patience or Patience())
 
     def valid(self, states):
         """Return (m,) bool: whether each of ``states`` (m, k) is free of collisions."""

@@ -5,6 +5,9 @@ A sphere whose centre is at depth d in the solid and whose radius is d + toleran
 A greedy choice takes the sphere that contains the most samples not yet contained. Samples are on the surface and
 inside; each must be contained with a margin, so that the points between the samples are contained, too.
 """
+import itertools
+from typing import NamedTuple
+
 import numpy as np
 
 from motion_planning.spheres import covering
@@ -13,9 +16,9 @@ from urdf_model import Box, Cylinder, Sphere
 # Distance of samples [tolerances]; points between them are at most half a diagonal of their squares away.
 _SPACING = 0.5
 _BETWEEN = 0.75 * _SPACING
-# Greatest number of samples times centres, of boxes and cylinders and of meshes: larger ones get a larger tolerance.
-# The links of most arms are meshes of half a metre, covered in a second or two and then kept on disk.
-_MOST, _MOST_OF_MESH = 40_000_000, 1_000_000_000
+# Greatest number of samples times centres of a box or cylinder, estimated by its area and volume: larger ones get a
+# larger tolerance. Long and thin ones have more samples than that, at most by this factor.
+_MOST, _MOST_IF_THIN = 40_000_000, 8
 # Samples of a mesh are at most this far from each of its points, and voxels have this size [tolerances].
 _MESH_SPACING, _MESH_CELL = 0.3, 0.6
 # Half of the largest side [m].
@@ -23,8 +26,28 @@ _LARGEST = 1e4
 # Sides of the small triangles at whose corners a mesh is sampled, and of cubes with one sample each [distances of
 # samples]: 0.8 / sqrt(3) + 0.3 sqrt(3) < 1.
 _SIDES, _CUBES = 0.8, 0.3
+# Number of samples of a mesh that are made at a time, which bounds memory.
+_AT_ONCE = 500_000
+# The outside of a mesh is extended by at most so many sweeps; what they do not reach in a maze counts as inside.
+_MOST_SWEEPS = 24
 #: Added to each radius [m]: rounding error of single floats.
 ROUNDING = 2e-5
+
+
+class Bound(NamedTuple):
+    """Greatest work for a mesh, beyond which it gets a larger tolerance. samples: of its surface; voxels: of the box
+    around it; distances: samples times centres."""
+
+    samples: int
+    voxels: int
+    distances: int
+
+
+#: For links of a robot, which are covered once and kept on disk: most are meshes of half a metre, and take a second or
+# two.
+OF_LINKS = Bound(8_000_000, 20_000_000, 1_000_000_000)
+#: For objects of a scene, while a plan waits: a few tenths of a second.
+OF_OBJECTS = Bound(2_000_000, 4_000_000, 200_000_000)
 
 
 class CoverError(ValueError):
@@ -38,21 +61,36 @@ def cover(parts, tolerance):
     (n, 3) and ``triangles`` (m, 3). A mesh counts as solid if its surface is closed up to gaps of ``tolerance``. Large
     geometry gets a larger tolerance. Raises CoverError.
     """
+    return _cover(parts, tolerance, OF_LINKS)[0]
+
+
+def cover_object(parts, tolerance):
+    """``cover`` with the bounds of OF_OBJECTS: (1 + n, 4), the tolerance that was used [m] in the first row's first
+    place, then the spheres. Raises CoverError."""
+    spheres, used = _cover(parts, tolerance, OF_OBJECTS)
+    return np.concatenate([[[used, 0.0, 0.0, 0.0]], spheres])
+
+
+def _cover(parts, tolerance, bound):
+    """The spheres (n, 4), and the tolerance [m] that was used."""
     alone = [(geometry, pose) for geometry, pose in parts if isinstance(geometry, Sphere)]
     found = [np.append(pose[:3, 3], geometry.radius + ROUNDING) for geometry, pose in alone]
-    solids = [_solid(geometry, pose, tolerance) for geometry, pose in parts if not isinstance(geometry, Sphere)]
+    solids = [_solid(geometry, pose, tolerance, bound) for geometry, pose in parts if not isinstance(geometry, Sphere)]
     if not solids:
-        return np.array(found).reshape(-1, 4)
+        return np.array(found).reshape(-1, 4), tolerance
     wanted = np.concatenate([solid.samples for solid in solids])
     between = max(solid.between for solid in solids)
     for sphere in found:
         wanted = wanted[np.linalg.norm(wanted - sphere[:3], axis=1) > sphere[3] - between]
     centres = np.concatenate([solid.inside for solid in solids])
-    depth = np.max([solid.depth(centres) for solid in solids], axis=0)
-    radii = np.maximum(depth, 0.0) + max(solid.tolerance for solid in solids)
+    depth = np.zeros(len(centres))
+    for solid in solids:
+        np.maximum(depth, solid.depth(centres), out=depth)
+    used = max(solid.tolerance for solid in solids)
+    radii = depth + used
     chosen = _greedy(wanted, centres, radii - between)
     spheres = np.column_stack([centres[chosen], radii[chosen] + ROUNDING])
-    return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)])
+    return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)]), used
 
 
 def ball(spheres, steps=100):
@@ -114,7 +152,8 @@ class _solid_box:
             raise CoverError("a solid has sizes %s m; expected from 0 to %g" % (2.0 * half, 2.0 * _LARGEST))
         # Estimated number of samples and centres; a large solid is sampled more coarsely.
         area, volume = 8.0 * (half * np.roll(half, 1)).sum(), 8.0 * half.prod()
-        while (area / (tolerance * _SPACING) ** 2) * (volume / tolerance**3 + area / tolerance**2) > _MOST:
+        while (area / (tolerance * _SPACING) ** 2) * (volume / tolerance**3 + area / tolerance**2) > _MOST or \
+                _distances(half, tolerance) > _MOST_IF_THIN * _MOST:
             tolerance *= 1.25
         spacing, self.tolerance = tolerance * _SPACING, tolerance
         self.between = spacing * _BETWEEN / _SPACING
@@ -138,27 +177,29 @@ class _solid_box:
 class _solid_mesh:
     """A mesh as voxels: those of its surface and those that it encloses."""
 
-    def __init__(self, mesh, pose, tolerance):
-        vertices = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
-        triangles = np.asarray(mesh.triangles).reshape(-1, 3)
-        if not len(triangles) or not np.isfinite(vertices).all():
-            raise CoverError("a mesh has %d triangles and %s corners; expected at least one, and finite corners"
-                             % (len(triangles), "finite" if np.isfinite(vertices).all() else "infinite"))
+    def __init__(self, mesh, pose, tolerance, bound):
+        vertices, triangles = used_corners(np.asarray(mesh.vertices, dtype=float).reshape(-1, 3),
+                                           np.asarray(mesh.triangles).reshape(-1, 3))
         # Surface voxels have no depth: the tolerance alone must extend a sphere to their corners.
         while True:
             cell, spacing = _MESH_CELL * tolerance, _MESH_SPACING * tolerance
-            samples = mesh_samples(vertices, triangles, spacing)
-            full, lowest = voxels(samples, cell)
-            cells = np.argwhere(full)
-            if len(samples) * len(cells) <= _MOST_OF_MESH:
-                break
+            if sample_count(vertices, triangles, spacing) <= bound.samples and \
+                    voxel_count(vertices, cell) <= bound.voxels:
+                samples = mesh_samples(vertices, triangles, spacing)
+                full, lowest = voxels([samples], cell)
+                cells = np.argwhere(full)
+                more = len(samples) * len(cells) / bound.distances
+                if more <= 1.0:
+                    break
+                # The product grows with the fifth power at most: these steps would all be too small.
+                tolerance *= 1.25 ** max(0, int(np.log(more) / (5.0 * np.log(1.25))) - 1)
             tolerance *= 1.25
         self.tolerance, self.between = tolerance, spacing
         self._surface = _moved(pose, samples)
         self.samples = self._surface
         self.inside = _moved(pose, lowest + (cells + 0.5) * cell)
         self._inside_depth = self._distance(self.inside) - self.between
-        surface, _ = voxels(samples, cell, fill=False)
+        surface, _ = voxels([samples], cell, fill=False)
         self._inside_depth[surface[tuple(cells.T)]] = 0.0
 
     def depth(self, points):
@@ -175,16 +216,23 @@ class _solid_mesh:
         return nearest.astype(float)
 
 
-def _solid(geometry, pose, tolerance):
+def _solid(geometry, pose, tolerance, bound):
     if isinstance(geometry, (Box, Cylinder)):
         return _solid_box(geometry, pose, tolerance)
     if hasattr(geometry, "triangles"):
-        return _solid_mesh(geometry, pose, tolerance)
+        return _solid_mesh(geometry, pose, tolerance, bound)
     raise CoverError("a %s cannot be covered; expected a box, a cylinder, a sphere or a mesh" % type(geometry).__name__)
 
 
 def _moved(pose, points):
     return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def _distances(half, tolerance):
+    """Number of samples times centres of a box with half sides (3,)."""
+    u, v, w = 2.0 * np.ceil(half / (tolerance * _SPACING)) + 1.0
+    centres = (2.0 * np.ceil(half / tolerance) + 1.0).prod()
+    return (2.0 * (u * v + v * w + w * u) + centres) * centres
 
 
 def _line(half, spacing):
@@ -242,40 +290,84 @@ def _stacked(disc, heights):
     return np.column_stack([np.tile(disc, (len(heights), 1)), np.repeat(heights, len(disc))])
 
 
-def mesh_samples(vertices, triangles, spacing):
-    """Return points (n, 3) on the triangles, none of whose points is further than ``spacing`` from one of them."""
-    corners = vertices[triangles]
+def used_corners(vertices, triangles):
+    """Return (vertices, triangles) without the vertices of no triangle. Raises CoverError for a mesh without triangles
+    or with corners that are not finite."""
+    if not len(triangles) or not np.isfinite(vertices[triangles]).all():
+        raise CoverError("a mesh has %d triangles and %s corners; expected at least one, and finite corners"
+                         % (len(triangles), "infinite" if len(triangles) else "no"))
+    used, renamed = np.unique(triangles, return_inverse=True)
+    return vertices[used], renamed.reshape(triangles.shape)
+
+
+def sample_count(vertices, triangles, spacing):
+    """Return the number of points that ``mesh_samples`` makes, as a float."""
+    parts = _parts_of_sides(vertices[triangles], spacing)
+    return len(vertices) + float((0.5 * (parts + 1.0) * (parts + 2.0))[parts > 1.0].sum())
+
+
+def _parts_of_sides(corners, spacing):
+    """Into how many parts each side of triangles (m, 3, 3) is divided, (m,) float."""
     longest = np.max([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=0)
     # A point of a triangle with no longer side than 1 is at most 1 / sqrt(3) from a corner.
-    parts = np.maximum(1, np.ceil(longest / (_SIDES * spacing))).astype(int)
-    points = [vertices]
-    for count in np.unique(parts):
-        some = corners[parts == count]
-        i, j = np.array([(i, j) for i in range(count + 1) for j in range(count + 1 - i)]).T / count
-        points.append((some[:, None, 0] * (1.0 - i - j)[:, None] + some[:, None, 1] * i[:, None]
-                       + some[:, None, 2] * j[:, None]).reshape(-1, 3))
-    points = np.concatenate(points)
+    return np.maximum(1.0, np.ceil(longest / (_SIDES * spacing)))
+
+
+def points_on(vertices, triangles, spacing):
+    """Yield points (n, 3), some at a time, on the triangles, none of whose points is further than ``spacing`` from
+    one."""
+    yield vertices
+    parts = _parts_of_sides(vertices[triangles], spacing)
+    for count in np.unique(parts[parts > 1.0]).astype(int):
+        some = vertices[triangles[parts == count]]
+        i, j = np.indices((count + 1, count + 1)).reshape(2, -1)
+        i, j = i[i + j <= count] / count, j[i + j <= count] / count
+        weights = np.column_stack([1.0 - i - j, i, j])
+        at_once = max(1, _AT_ONCE // len(weights))
+        for begin, first in itertools.product(range(0, len(some), at_once), range(0, len(weights), _AT_ONCE)):
+            yield np.matmul(weights[first : first + _AT_ONCE], some[begin : begin + at_once]).reshape(-1, 3)
+
+
+def mesh_samples(vertices, triangles, spacing):
+    """Return points (n, 3) on the triangles, none of whose points is further than ``spacing`` from one of them."""
     # One sample is enough for a cube with such sides; small triangles have many in one. The numbers of cubes have the
     # order of their rows, which take np.unique ten times as long.
-    cubes = np.floor(points / (_CUBES * spacing)).astype(np.int64)
-    cubes -= cubes.min(axis=0)
-    _, first = np.unique(np.ravel_multi_index(tuple(cubes.T), cubes.max(axis=0) + 1), return_index=True)
-    return points[first]
+    lowest = np.floor(vertices.min(axis=0) / (_CUBES * spacing)).astype(np.int64) - 1
+    shape = np.floor(vertices.max(axis=0) / (_CUBES * spacing)).astype(np.int64) - lowest + 2
+    kept = []
+    for points in points_on(vertices, triangles, spacing):
+        cubes = np.floor(points / (_CUBES * spacing)).astype(np.int64) - lowest
+        numbers, first = np.unique(np.ravel_multi_index(tuple(cubes.T), shape, mode="clip"), return_index=True)
+        kept.append((numbers, points[first]))
+    _, first = np.unique(np.concatenate([numbers for numbers, _ in kept]), return_index=True)
+    return np.concatenate([points for _, points in kept])[first]
+
+
+def voxel_count(vertices, pitch):
+    """Return the number of cells of size ``pitch`` that ``voxels`` looks at, as a float."""
+    return float((np.ptp(vertices, axis=0) / pitch + 4.0).prod())
 
 
 def voxels(samples, pitch, fill=True):
-    """Return (cells (a, b, c) bool, corner (3,)): those of size ``pitch`` that hold samples, or that these enclose."""
-    lowest = samples.min(axis=0) - 1.5 * pitch
-    index = np.floor((samples - lowest) / pitch).astype(int)
-    full = np.zeros(index.max(axis=0) + 2, dtype=bool)
-    full[tuple(index.T)] = True
+    """Return (cells (a, b, c) bool, corner (3,)): those of size ``pitch`` that hold samples, or that these enclose.
+
+    samples: iterable of arrays of points (n, 3); the first ones have all others between them.
+    """
+    samples = iter(samples)
+    first = next(samples)
+    lowest = first.min(axis=0) - 1.5 * pitch
+    full = np.zeros(np.floor((first.max(axis=0) - lowest) / pitch).astype(int) + 2, dtype=bool)
+    for points in itertools.chain([first], samples):
+        full[tuple(np.floor((points - lowest) / pitch).astype(int).T)] = True
     if not fill:
         return full, lowest
     outside = np.zeros_like(full)
     outside[0], outside[-1], outside[:, 0], outside[:, -1], outside[:, :, 0], outside[:, :, -1] = (True,) * 6
     outside &= ~full
     count = -1
-    while count != outside.sum():
+    for _ in range(_MOST_SWEEPS):
+        if count == outside.sum():
+            break
         count = outside.sum()
         # Sweeps extend the outside as far as possible along each axis, both ways.
         for axis in range(3):
@@ -286,14 +378,20 @@ def voxels(samples, pitch, fill=True):
     return ~outside, lowest
 
 
-def boxes_of_cells(full, lowest, pitch, beyond=0.0):
-    """Return boxes (n, 2, 3), least and greatest corner, that together are the cells, each larger by ``beyond``."""
+def boxes_of_cells(full, lowest, pitch, beyond=0.0, most=None):
+    """Return boxes (n, 2, 3), least and greatest corner, that together are the cells, each larger by ``beyond``. Raises
+    CoverError if they are more than ``most``."""
     left, found = full.copy(), []
-    for start in np.argwhere(full):
-        a, b, c = start
-        if not left[a, b, c]:
-            continue
-        end = [a + 1, b + 1, c + 1]
+    flat, place = left.reshape(-1), 0
+    while place < len(flat):
+        step = int(flat[place:].argmax())
+        place += step
+        if not flat[place]:
+            break
+        if most is not None and len(found) >= most:
+            raise CoverError("more than %d boxes" % most)
+        start = np.array(np.unravel_index(place, full.shape))
+        end = [int(k) + 1 for k in start]
         for axis in (2, 1, 0):
             while end[axis] < full.shape[axis]:
                 slab = [slice(s, e) for s, e in zip(start, end, strict=True)]
@@ -301,6 +399,6 @@ def boxes_of_cells(full, lowest, pitch, beyond=0.0):
                 if not left[tuple(slab)].all():
                     break
                 end[axis] += 1
-        left[a : end[0], b : end[1], c : end[2]] = False
+        left[tuple(slice(s, e) for s, e in zip(start, end, strict=True))] = False
         found.append((lowest + pitch * start - beyond, lowest + pitch * np.array(end) + beyond))
     return np.array(found).reshape(-1, 2, 3)

@@ -5,13 +5,26 @@ import os
 import tempfile
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from motion_planning.errors import PlanningError
+from motion_planning.exact.geometry import bounds_of
 from motion_planning.shapes import TriangleMesh
-from motion_planning.spheres.cover import boxes_of_cells, cover, mesh_samples, voxels
+from motion_planning.spheres.cover import (
+    ROUNDING,
+    CoverError,
+    boxes_of_cells,
+    cover,
+    cover_object,
+    points_on,
+    sample_count,
+    used_corners,
+    voxels,
+)
 from numba_cache import folder
 from urdf_model import Box, Cylinder, Mesh
 
@@ -24,10 +37,27 @@ _LEAST_SHARE = 0.4
 MESH_CELL_M = 0.006
 # ... or larger ones, so that the longest side of the mesh has at most this many.
 _MOST_CELLS = 150
+# Greatest number of boxes of a mesh and of samples on it, and the growth of the cells where one of the two is exceeded.
+_MOST_BOXES, _COARSER = 20_000, 1.6
+_MOST_POINTS, _LARGER = 8_000_000, 1.25
+# Boxes reach beyond the samples in their cells by this share of a cell, the distance of samples.
+_SHARE_BEYOND = 0.3
+# A shape without time for more is covered by balls around this many parts of its longest side.
+_PARTS = 4
+# Boxes and spheres that are coarser than usual by more than this factor are worth a remark.
+_REMARKABLE = 1.3
 # Tables of robots and of links that stand still; maps of pairs of links; tables of whole scenes, which are large.
 _MOST_KEPT, _MOST_MAPS, _MOST_SCENES = 400, 10_000, 4
 # What is kept on disk is made by these.
 _SOURCES = [Path(__file__).with_name(name) for name in ("cover.py", "covering.py", "pair_maps.py")]
+
+
+class Patience(NamedTuple):
+    """How long the preparation of a scene may take. late(): whether the rest is to be made as coarse as possible.
+    check(): called now and then; what it raises ends the preparation."""
+
+    late: Callable[[], bool] = lambda: False
+    check: Callable[[], None] = lambda: None
 
 
 class SphereModel:
@@ -102,6 +132,11 @@ class _Kept:
                 self._things.popitem(last=False)
         return made
 
+    def forget(self, key):
+        """Make it again when it is asked for next."""
+        with self._lock:
+            self._things.pop(key, None)
+
 
 def fitting(parts, tolerance):
     """Return the tolerance [m] for parts of these sizes: thin parts get a closer fit."""
@@ -111,26 +146,68 @@ def fitting(parts, tolerance):
 
 
 class Boxes:
-    """Boxes that replace a mesh or an octree. corners (n, 2, 3): least and greatest, in the frame of the shape."""
+    """Boxes that replace a mesh. corners (n, 2, 3): least and greatest, in the frame of the shape. coarse: size of the
+    mesh's cells [m] if it is larger than usual, else None."""
 
-    def __init__(self, corners):
-        self.corners = corners
+    def __init__(self, corners, coarse=None):
+        self.corners, self.coarse = corners, coarse
 
 
 def boxes_of(geometry):
     """Return ``geometry`` unchanged, or Boxes that contain it if it is a mesh; made once per mesh."""
-    return Boxes(cached(mesh_boxes, [(geometry, np.eye(4))], MESH_CELL_M)) if _is_mesh(geometry) else geometry
+    if not _is_mesh(geometry):
+        return geometry
+    made = cached(mesh_boxes, [(geometry, np.eye(4))], MESH_CELL_M)
+    cell, wanted = made[0, 0, :2]
+    return Boxes(made[1:], float(cell) if cell > _REMARKABLE * wanted else None)
+
+
+def box_around(geometry):
+    """Return the Boxes of a shape's bounding box."""
+    bounds = bounds_of(geometry)
+    return Boxes(np.array([[bounds.centre - bounds.half, bounds.centre + bounds.half]]))
 
 
 def mesh_boxes(parts, cell):
-    """Return boxes (n, 2, 3) that contain a mesh and its inside, and exceed it by at most two cells."""
+    """Return boxes (1 + n, 2, 3) that contain a mesh and its inside, and exceed it by at most two cells. The first row
+    begins with the size of these [m], larger than ``cell`` for a large mesh, and the size wanted for one of so many
+    metres."""
     (mesh, _), = parts
-    size = np.ptp(mesh.vertices, axis=0).max()
-    cell = max(cell, size / _MOST_CELLS)
-    spacing = 0.3 * cell
-    samples = mesh_samples(mesh.vertices, mesh.triangles, spacing)
-    full, lowest = voxels(samples, cell)
-    return boxes_of_cells(full, lowest, cell, beyond=spacing)
+    vertices, triangles = used_corners(mesh.vertices, mesh.triangles)
+    cell = wanted = max(cell, float(np.ptp(vertices, axis=0).max()) / _MOST_CELLS)
+    while True:
+        while sample_count(vertices, triangles, _SHARE_BEYOND * cell) > _MOST_POINTS:
+            cell *= _LARGER
+        full, lowest = voxels(points_on(vertices, triangles, _SHARE_BEYOND * cell), cell)
+        try:
+            boxes = boxes_of_cells(full, lowest, cell, beyond=_SHARE_BEYOND * cell, most=_MOST_BOXES)
+            return np.concatenate([[[[cell, wanted, 0.0], [0.0, 0.0, 0.0]]], boxes])
+        except CoverError:
+            cell *= _COARSER
+
+
+def object_spheres(parts, tolerance, late):
+    """Return (spheres (n, 4) that contain ``parts`` as in ``cover``, how far they reach beyond them [m] if that is
+    more than usual, else None). late: make few large ones."""
+    wanted = fitting(parts, tolerance)
+    if not late:
+        try:
+            made = cached(cover_object, parts, wanted)
+            return made[1:], float(made[0, 0]) if made[0, 0] > _REMARKABLE * wanted else None
+        except CoverError:
+            pass  # extreme sizes
+    spheres = np.concatenate([_balls_around(geometry, pose) for geometry, pose in parts])
+    return spheres, float(spheres[:, 3].max())
+
+
+def _balls_around(geometry, pose):
+    """Balls (n, 4) that together contain a shape's bounding box."""
+    bounds = bounds_of(geometry)
+    count = np.maximum(1, np.ceil(_PARTS * bounds.half / max(float(bounds.half.max()), 1e-9))).astype(int)
+    cells = np.indices(count).reshape(3, -1).T
+    centres = bounds.centre + bounds.half * ((2.0 * cells + 1.0) / count - 1.0)
+    radius = float(np.linalg.norm(bounds.half / count)) * (1.0 + 1e-6) + ROUNDING
+    return np.column_stack([centres @ pose[:3, :3].T + pose[:3, 3], np.full(len(centres), radius)])
 
 
 def cached(function, parts, size):

@@ -7,6 +7,7 @@ world. The robot's part does not depend on the scene and is cached in the Sphere
 import hashlib
 import itertools
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +16,15 @@ from motion_planning.shapes import Cone, Octree
 from motion_planning.spheres import kernel
 from motion_planning.spheres.cover import ball
 from motion_planning.spheres.pair_maps import pair_map
-from motion_planning.spheres.sphere_model import cached, cover, fitting
-from motion_planning.spheres.world_tables import Tree, forest, joined, pyramid, solids_of, tree_of
+from motion_planning.spheres.sphere_model import Patience, object_spheres
+from motion_planning.spheres.world_tables import Tree, forest, pyramid, solids_of, tree_of
 from urdf_model import Plane
 
 # Clusters on the same joint become one if the ball around both is at most this much larger than the larger one's.
 _MERGED = 1.25
 # Number of spheres that are checked one by one.
 _FEW_SPHERES = 4
+_ENDLESS = Patience()
 
 
 class _Mover(NamedTuple):
@@ -63,37 +65,62 @@ class _Robot(NamedTuple):
     world: tuple  # the table of ``still``, and their places in it
 
 
-def bake(sphere_model, group, scene, state):
-    """Return (robot, world), see ``kernel``: what of ``scene`` the joints of ``group`` can run into, elsewhere as in
-    ``state``. Scenes that differ in the values of these joints alone have the same tables, made once."""
+def bake(sphere_model, group, scene, state, patience=_ENDLESS):
+    """Return ((robot, world), see ``kernel``, sentences on what is coarser than usual): what of ``scene`` the joints of
+    ``group`` can run into, elsewhere as in ``state``. Scenes that differ in the values of these joints alone have the
+    same tables, made once, unless patience ended: the next request makes them better.
+    """
     others = np.delete(state.q, group.indices)
     key = (group.name, id(scene.allowed), others.tobytes(), state.base.tobytes(), tuple(scene.link_padding.items()),
            tuple(scene.link_scale.items()), tuple(map(id, state.attached.values())))
     # What a key names by identity is kept with what is found: no other object gets the same.
     named = scene.allowed, scene.objects, scene.octomap, tuple(state.attached.values())
-    tables, _ = sphere_model.scenes((*key, id(scene.objects), id(scene.octomap)),
-                                    lambda: (_baked(sphere_model, group, scene, state, key), named))
-    return tables
+    whole = *key, id(scene.objects), id(scene.octomap)
+    made, _ = sphere_model.scenes(whole, lambda: (_baked(sphere_model, group, scene, state, (key, patience)), named))
+    if patience.late():
+        sphere_model.scenes.forget(whole)
+    return made
 
 
-def _baked(sphere_model, group, scene, state, key):
+def make_links(sphere_model, group, allowed):
+    """Make what of a robot does not depend on the scene, which may take long the first time."""
+    moving = frozenset(group.moving_links)
+    for link in sphere_model.model.links:
+        (sphere_model.spheres if link in moving else sphere_model.fixed)(link)
+    _maps(sphere_model, group, allowed, [link for link in sphere_model.model.links if link in moving])
+
+
+def _baked(sphere_model, group, scene, state, how):
+    key, patience = how
     things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else [])]
     movers = _mover_names(sphere_model.model, group, state)
     # For each object the bodies that may touch it, mostly none.
     special = [(thing.id, frozenset(name for name, touch in movers
                                     if thing.id in touch or scene.allowed.allowed(name, thing.id))) for thing in things]
     special = {name: may for name, may in special if may}
-    robot, _ = sphere_model.kept((*key, tuple(special.values())),
-                                 lambda: (_robot(sphere_model, group, scene, state, special),
-                                          (scene.allowed, *state.attached.values())))
-    groups = {}
+    of_robot = *key, tuple(special.values())
+    (robot, remarks), _ = sphere_model.kept(of_robot, lambda: (_robot(sphere_model, group, scene, state,
+                                                                      (special, patience)),
+                                                               (scene.allowed, *state.attached.values())))
+    if patience.late():
+        sphere_model.kept.forget(of_robot)
+    groups, coarse = {}, {}
     for thing in things:
         may = special.get(thing.id, frozenset())
         allowed = tuple(bool(may) and all(mover.name in may for mover in cluster.movers) for cluster in robot.clusters)
-        groups.setdefault(allowed, []).append(solids_of([(shape, thing.pose @ pose) for shape, pose in thing.shapes]))
-    stills = [_Still(tree_of(joined(solids)), may) for may, solids in groups.items()]
+        parts, owners = groups.setdefault(allowed, ([], []))
+        parts += [(shape, thing.pose @ pose) for shape, pose in thing.shapes]
+        owners += [thing.id] * len(thing.shapes)
+
+    def remark(owners, number, how):
+        coarse["object '%s' is planned around as %s" % (owners[number], how)] = True
+
+    stills = [_Still(tree_of(solids_of(parts, 0.0, patience, partial(remark, owners))), may)
+              for may, (parts, owners) in groups.items()]
+    remarks = [*remarks, *coarse]
     world, places = forest([still.tree for still in stills], robot.world)
-    return _with_tests(robot, [*stills, *robot.still], [*places[len(robot.still):], *places[: len(robot.still)]]), world
+    return (_with_tests(robot, [*stills, *robot.still], [*places[len(robot.still):], *places[: len(robot.still)]]),
+            world), tuple(remarks)
 
 
 def _with_tests(robot, stills, places):
@@ -159,8 +186,10 @@ def _mover_names(model, group, state):
             + [(name, body.touch_links) for name, body in state.attached.items() if body.link in moving])
 
 
-def _robot(sphere_model, group, scene, state, special):
-    model = sphere_model.model
+def _robot(sphere_model, group, scene, state, about):
+    """Return (the _Robot, sentences on what is coarser than usual). about: ({object: bodies that may touch it},
+    Patience)."""
+    model, (special, patience), remarks = sphere_model.model, about, []
     joints, seats = _joints(model, group, state)
     movers, still = [], []
     frames = model.frames(state.q, state.base)
@@ -180,22 +209,29 @@ def _robot(sphere_model, group, scene, state, special):
               and scene.link_scale.get(mover.name, 1.0) == 1.0]
     for body in state.attached.values():
         joint, pose = seats[model.link_index[body.link]]
+        coarse = set()
         if joint >= 0:
-            spheres = _spheres_of(body.object, sphere_model.tolerance)
+            spheres = _spheres_of(body.object, sphere_model.tolerance, patience, coarse)
             if len(spheres):
                 movers.append(_Mover(body.id, body.touch_links, joint, _moved(spheres, pose @ body.object.pose, 0.0)))
         else:
             place = frames[model.link_index[body.link]] @ body.object.pose
-            still.append((body.id, body.touch_links, tree_of(solids_of(_placed(body.object.shapes, place)))))
+            solids = solids_of(_placed(body.object.shapes, place), 0.0, patience,
+                               lambda _, how, coarse=coarse: coarse.add(how))
+            still.append((body.id, body.touch_links, tree_of(solids)))
+        remarks += ["held object '%s' is planned around as %s" % (body.id, how) for how in sorted(coarse)]
 
     def may(a, b):
         return a[0] in b[1] or b[0] in a[1] or scene.allowed.allowed(a[0], b[0])
 
     mapped, maps = _maps(sphere_model, group, scene.allowed, moving)
-    rows = [tuple([may(mover, other) or frozenset((mover.name, other[0])) in mapped for other in [*movers, *still]]
-                  + [mover.name in names for names in special.values()]) for mover in movers]
+    rows = []
+    for mover in movers:
+        patience.check()
+        rows.append(tuple([may(mover, other) or frozenset((mover.name, other[0])) in mapped
+                           for other in [*movers, *still]] + [mover.name in names for names in special.values()]))
     depth, branch = _branches(joints)
-    clusters = sorted(_clusters(sphere_model, movers, rows),
+    clusters = sorted(_clusters(sphere_model, movers, rows, patience),
                       key=lambda cluster: (branch[cluster.joint], -depth[cluster.joint]))
     first = [movers.index(cluster.movers[0]) for cluster in clusters]
     pairs = [(a, b) for a in range(len(clusters)) for b in range(a + 1, len(clusters))
@@ -214,7 +250,8 @@ def _robot(sphere_model, group, scene, state, special):
     return _Robot(tuple(clusters), tuple(branch[cluster.joint] for cluster in clusters),
                   tuple(depth[cluster.joint] for cluster in clusters), arrays, np.array(pairs, np.int32).ravel(),
                   tuple(_Still(tree, tuple(rows[k][len(movers) + n] for k in first))
-                        for n, (_, _, tree) in enumerate(still)), maps, forest([tree for _, _, tree in still]))
+                        for n, (_, _, tree) in enumerate(still)), maps,
+                  forest([tree for _, _, tree in still])), tuple(remarks)
 
 
 def _maps(sphere_model, group, allowed, links):
@@ -309,10 +346,11 @@ def _balls_and_jumps(spheres):
     return balls, jumps
 
 
-def _clusters(sphere_model, movers, rows):
+def _clusters(sphere_model, movers, rows, patience):
     """Return the _Clusters of ``movers``, whose ``rows`` say what each may touch."""
     found = []
     for number, mover in enumerate(movers):
+        patience.check()
         alone = _Cluster(mover.joint, (mover,), mover.spheres, _made_once(sphere_model, ball, mover.spheres))
         for place, cluster in enumerate(found):
             # Two on one joint never collide; everything else must be equal for them.
@@ -348,18 +386,23 @@ def _sphere_tree(some, spheres, skips):
         skips[number] = len(spheres)
 
 
-def _spheres_of(item, tolerance):
-    """The spheres (n, 4) of an attached object, in its own frame."""
+def _spheres_of(item, tolerance, patience, coarse):
+    """The spheres (n, 4) of an attached object, in its own frame. ``coarse`` (set) gets a sentence for each shape whose
+    spheres are coarser than usual."""
     found = []
     for geometry, pose in item.shapes:
+        patience.check()
         if isinstance(geometry, Plane):
             continue  # an infinite plane cannot be attached
         if isinstance(geometry, Octree):
-            found += [np.array([[*(pose[:3, :3] @ box[:3] + pose[:3, 3]), 0.5 * math.sqrt(3.0) * box[3]]])
-                      for box in geometry.boxes]
-        else:
-            parts = [(pyramid(geometry) if isinstance(geometry, Cone) else geometry, pose)]
-            found.append(cached(cover, parts, fitting(parts, tolerance)))
+            reach = 0.5 * math.sqrt(3.0) * geometry.boxes[:, 3]
+            found.append(np.column_stack([geometry.boxes[:, :3] @ pose[:3, :3].T + pose[:3, 3], reach]))
+            continue
+        spheres, beyond = object_spheres([(pyramid(geometry) if isinstance(geometry, Cone) else geometry, pose)],
+                                         tolerance, patience.late())
+        found.append(spheres)
+        if beyond is not None:
+            coarse.add("spheres that reach up to %.3g m beyond it" % beyond)
     return np.concatenate(found) if found else np.empty((0, 4))
 
 

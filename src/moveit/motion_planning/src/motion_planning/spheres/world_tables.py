@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixed bodies as flat arrays for ``kernel``: objects, and trees of boxes around them."""
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from motion_planning.shapes import Cone, Octree, TriangleMesh
 from motion_planning.spheres import kernel
-from motion_planning.spheres.sphere_model import Boxes, boxes_of
+from motion_planning.spheres.sphere_model import Boxes, Patience, box_around, boxes_of
 from urdf_model import Box, Cylinder, Plane, Sphere
 
 # Corners of infinite shapes are this far away [m].
@@ -16,6 +17,9 @@ _FAR = 1e6
 _CONE_SIDES = 24
 # Margin of a tree's boxes around their content [m], for single floats.
 _ROUNDING = 1e-5
+# Number of boxes that are taken between two looks at the clock.
+_AT_ONCE = 1000
+_ENDLESS = Patience()
 
 
 class Solids(NamedTuple):
@@ -36,10 +40,49 @@ class Tree(NamedTuple):
     objects: np.ndarray
 
 
-def solids_of(parts, pad=0.0):
-    """Return the Solids of ``parts``, [(geometry, pose (4, 4) in the planning frame)], ``pad`` [m] larger all round."""
-    found = [_solids(geometry, pose, pad) for geometry, pose in parts]
+def solids_of(parts, pad=0.0, patience=_ENDLESS, remark=lambda number, how: None):
+    """Return the Solids of ``parts``, [(geometry, pose (4, 4) in the planning frame)], ``pad`` [m] larger all round.
+
+    remark(number, how): told how a part is replaced by something coarser than usual.
+    """
+    boxes, found = [], []
+    for number, (geometry, pose) in enumerate(parts):
+        if number % _AT_ONCE == 0 or not isinstance(geometry, Box):
+            patience.check()
+        if isinstance(geometry, Box):
+            boxes.append((geometry.size, pose))
+        else:
+            found.append(_solids(_of_boxes(geometry, patience, partial(remark, number)), pose, pad))
+    if boxes:
+        sizes, poses = (np.array(column, dtype=float) for column in zip(*boxes, strict=True))
+        found.append(_boxes(poses[:, :3, 3], poses[:, :3, :3].transpose(0, 2, 1), 0.5 * sizes + pad))
     return joined(found)
+
+
+def _boxes(centres, rotations, half):
+    """The Solids of boxes: centres, half sides (n, 3), rotations (n, 3, 3) from the planning frame."""
+    reach = np.einsum("ni,nij->nj", half, np.abs(rotations))
+    straight = (np.abs(np.abs(rotations) - 1.0) < 1e-9).sum(axis=(1, 2)) == 3
+    numbers = np.zeros((len(centres), kernel.OBJECT), np.float32)
+    numbers[:, :3], numbers[:, 3:12] = centres, rotations.reshape(-1, 9)
+    numbers[:, 12:15] = np.where(straight[:, None], reach, half)
+    return Solids(np.where(straight, kernel.AXIS_BOX, kernel.BOX).astype(np.int32), numbers, centres - reach,
+                  centres + reach)
+
+
+def _of_boxes(geometry, patience, remark):
+    """Meshes and cones as Boxes, other geometry unchanged."""
+    mesh = pyramid(geometry) if isinstance(geometry, Cone) else geometry
+    if not isinstance(mesh, TriangleMesh):
+        return geometry
+    if patience.late():
+        remark("its bounding box, because there was no time for more")
+        return box_around(mesh)
+    boxes = boxes_of(mesh)
+    if boxes.coarse is not None:
+        remark("boxes of %.3g m, because its %d triangles are too many or too large for finer ones"
+               % (boxes.coarse, len(mesh.triangles)))
+    return boxes
 
 
 def joined(found):
@@ -64,12 +107,7 @@ def _solids(geometry, pose, pad):
         return _one(kind, centre, rotation, (radius, 0.0, half), reach)
     corners = _corners(geometry)
     middle, half = 0.5 * (corners[:, 0] + corners[:, 1]), 0.5 * (corners[:, 1] - corners[:, 0]) + pad
-    centres, reach = middle @ rotation + centre, half @ np.abs(rotation)
-    straight = (np.abs(np.abs(rotation) - 1.0) < 1e-9).sum() == 3
-    numbers = np.zeros((len(corners), kernel.OBJECT), np.float32)
-    numbers[:, :3], numbers[:, 3:12], numbers[:, 12:15] = centres, rotation.ravel(), reach if straight else half
-    return Solids(np.full(len(corners), kernel.AXIS_BOX if straight else kernel.BOX, np.int32), numbers,
-                  centres - reach, centres + reach)
+    return _boxes(middle @ rotation + centre, np.broadcast_to(rotation, (len(corners), 3, 3)), half)
 
 
 def _one(kind, centre, rotation, sizes, reach):
@@ -81,13 +119,10 @@ def _corners(geometry):
     """(n, 2, 3) of shapes made of boxes."""
     if isinstance(geometry, Boxes):
         return geometry.corners
-    if isinstance(geometry, Box):
-        half = 0.5 * np.array(geometry.size)
-        return np.array([[-half, half]])
     if isinstance(geometry, Octree):
         half = 0.5 * geometry.boxes[:, 3:]
         return np.stack([geometry.boxes[:, :3] - half, geometry.boxes[:, :3] + half], axis=1)
-    return boxes_of(pyramid(geometry) if isinstance(geometry, Cone) else geometry).corners
+    raise TypeError("%r is not a shape that can collide" % (geometry,))
 
 
 def pyramid(cone):
