@@ -240,12 +240,14 @@ class MoveGroupCommander(Targeting):
         return requests.move_group_goal(self.construct_motion_plan_request(), self._settings, plan_only)
 
     def _ended(self, action, goal):
-        """The result of a goal; a failure's cause is logged."""
+        """The result of a goal; a failure's cause is logged, and what a success was told beside MoveIt's sentence."""
         result, text = self._connection.run(action, goal)
         code = result.error_code.val
         if code != MoveItErrorCodes.SUCCESS:
             rospy.logwarn("%s of group '%s' failed: %s (%s)", action, self._group.name, text or "no reason given",
                           code_name(code))
+        elif text.partition(". ")[2]:
+            rospy.logwarn("%s of group '%s': %s", action, self._group.name, text.partition(". ")[2])
         return result
 
     def compute_cartesian_path(self, waypoints, eef_step, jump_threshold=0.0, avoid_collisions=True,

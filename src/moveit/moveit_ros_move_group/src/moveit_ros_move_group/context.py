@@ -10,6 +10,7 @@ from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes
 
 from motion_planning.errors import PlanningError
 from moveit_ros_move_group.convert.scene_out import state_message
+from moveit_ros_move_group.texts import one_line
 
 
 class RequestError(PlanningError):
@@ -59,6 +60,11 @@ class Context:
         if errors:
             raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, errors[0])
         return scene
+
+    def remark(self, request, remarks, group=""):
+        """Log what was left out of a request or done otherwise than asked."""
+        for text in remarks:
+            rospy.logwarn("%s%s: %s", request, " of group '%s'" % group if group else "", one_line(text))
 
     def frame(self, scene, name):
         """Return the pose (4, 4) of a frame in the planning frame. Raises RequestError."""

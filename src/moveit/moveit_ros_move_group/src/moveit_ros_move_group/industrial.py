@@ -48,14 +48,17 @@ class IndustrialPlanner:
         planner = request.planner_id or pipe.default_planner(request.group_name)
         reader = self._context.monitor.reader
         auxiliary = path_constraints = None
+        remarks = []
         try:
             if planner == "CIRC":
                 auxiliary = self._auxiliary(request.path_constraints, scene)
             else:
-                path_constraints = constraint_set_of(_with_regions(request.path_constraints), scene, reader)
-            goals = [constraint_set_of(_with_regions(goal), scene, reader) for goal in request.goal_constraints]
+                path_constraints = constraint_set_of(_with_regions(request.path_constraints), scene, reader, remarks)
+            goals = [constraint_set_of(_with_regions(goal), scene, reader, remarks)
+                     for goal in request.goal_constraints]
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
+        self._context.remark(planner, remarks, request.group_name)
         query = pipeline.PlanQuery(
             scene, request.group_name, [goal for goal in goals if goal is not None], path_constraints,
             planner_id=planner, velocity_scaling=request.max_velocity_scaling_factor,

@@ -40,19 +40,28 @@ class Planner:
         pipe = self._pipeline(request.pipeline_id)
         if pipe.industrial:
             return self._limited(request, self._industrial.plan(request, scene, pipe, self._tools(stop)))
+        remarks, reader = [], context.monitor.reader
         try:
-            goals = [constraint_set_of(goal, scene, context.monitor.reader) for goal in request.goal_constraints]
-            path_constraints = constraint_set_of(request.path_constraints, scene, context.monitor.reader)
+            goals = [constraint_set_of(goal, scene, reader, remarks) for goal in request.goal_constraints]
+            path_constraints = constraint_set_of(request.path_constraints, scene, reader, remarks)
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
         if any(goal is None for goal in goals):
-            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a goal without any constraint says nothing")
+            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "; ".join(
+                ["a goal without any constraint says nothing", *remarks]))
         query = pipeline.PlanQuery(
             scene, request.group_name, goals, path_constraints, self._planner(request, pipe),
             request.allowed_planning_time if request.allowed_planning_time > 0.0 else _USUAL_TIME_S,
             request.num_planning_attempts, _scaling(request.max_velocity_scaling_factor),
             _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
-        return self._limited(request, pipeline.plan(query, self._tools(stop)))
+        try:
+            plan = pipeline.plan(query, self._tools(stop))
+        except PlanningError as error:
+            raise RequestError(getattr(error, "code", MoveItErrorCodes.FAILURE), "; ".join([str(error), *remarks]),
+                               getattr(error, "contacts", ()), getattr(error, "joints", None)) from None
+        remarks += plan.remarks
+        context.remark("planning", remarks, request.group_name)
+        return self._limited(request, plan._replace(remarks=tuple(remarks)))
 
     def plan_sequence(self, items, scene, stop=lambda: False):
         """Return [(group name, pipeline.Plan), ...] for MotionSequenceItems from the state of ``scene``.

@@ -20,11 +20,9 @@ def result_text(code, reason="", *, empty=False, plan_only=False):
     If MoveIt returns only a code, the ``reason`` is added to it.
     """
     codes = MoveItErrorCodes
-    if code == codes.SUCCESS:
-        if empty:
-            return "Requested path and goal constraints are already met."
-        return "Motion plan was computed succesfully." if plan_only else "Solution was found and executed."
     fixed = {
+        codes.SUCCESS: "Requested path and goal constraints are already met." if empty else
+            "Motion plan was computed succesfully." if plan_only else "Solution was found and executed.",
         codes.INVALID_GROUP_NAME: "Invalid group in motion plan request",
         codes.PLANNING_FAILED: "No motion plan found. No execution attempted." if empty else "",
         codes.INVALID_MOTION_PLAN: "No motion plan found. No execution attempted." if empty else

@@ -2,8 +2,9 @@
 """Messages to scenes and back."""
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
 from moveit_msgs.msg import (
+    AllowedCollisionEntry,
     AttachedCollisionObject,
     CollisionObject,
     LinkPadding,
@@ -17,11 +18,13 @@ from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 from std_msgs.msg import ColorRGBA
 
 from motion_planning.errors import PlanningError
+from motion_planning.scene import WorldObject
 from motion_planning.timing import time_path
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of, plane_shape_of, pose_of, shape_of
 from moveit_ros_move_group.convert.octomap import octree_of
 from moveit_ros_move_group.convert.scene_in import SceneReader
 from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message, state_message, trajectory_message
+from urdf_model import Box
 from urdf_model.transforms import axis_rotation, rigid
 
 READER = SceneReader()
@@ -229,6 +232,41 @@ def test_components_choose_parts(scene):
     assert state.robot_state.joint_state.name == ["turn", "reach", "balance"]
     assert not state.robot_state.attached_collision_objects and not state.world.collision_objects
     assert scene_message(there, wants.ROBOT_STATE_ATTACHED_OBJECTS).robot_state.attached_collision_objects
+
+
+def test_a_diff_without_entries_leaves_the_allowed_collisions_as_they_are(scene):
+    """As in MoveIt, which replaces the matrix by one with entry_names only; an empty one means nothing."""
+    scene = scene.with_allowed(scene.allowed.with_entries({("arm", "base"): True}))
+    message = PlanningScene(is_diff=True)
+    message.allowed_collision_matrix.default_entry_names = ["crate"]
+    message.allowed_collision_matrix.default_entry_values = [True]
+    changed, errors = READER.with_planning_scene(scene, message)
+    assert not errors and changed.allowed is scene.allowed
+    message.allowed_collision_matrix.entry_names = ["crate"]
+    message.allowed_collision_matrix.entry_values = [AllowedCollisionEntry([False])]
+    changed, errors = READER.with_planning_scene(scene, message)
+    assert not errors and changed.allowed.allowed("crate", "hand") and not changed.allowed.allowed("arm", "base")
+    message.allowed_collision_matrix.entry_names, message.allowed_collision_matrix.entry_values = [], []
+    message.is_diff = False
+    assert READER.with_planning_scene(scene, message)[0].allowed.allowed("crate", "hand")
+
+
+def test_an_empty_field_of_a_diff_changes_nothing_and_others_are_added(scene):
+    full = scene.with_transforms({"wall": rigid(np.eye(3), (1.0, 0.0, 0.0))}).with_padding({"arm": 0.1}, {"arm": 2.0})
+    full = full.with_colours({"crate": (1.0, 0.0, 0.0, 1.0)}).with_object(
+        WorldObject("crate", np.eye(4), ((Box((0.1, 0.1, 0.1)), np.eye(4)),)))
+    full = READER.with_planning_scene(full, PlanningScene(is_diff=True, name="kitchen"))[0]
+    message = PlanningScene(is_diff=True)
+    same, errors = READER.with_planning_scene(full, message)
+    assert not errors and same.name == "kitchen"
+    for name in ("state", "objects", "allowed", "colours", "octomap", "transforms", "link_padding", "link_scale"):
+        assert getattr(same, name) is getattr(full, name) or dict(getattr(same, name)) == dict(getattr(full, name))
+    tree = TransformStamped(child_frame_id=scene.model.frame, transform=Transform(Vector3(0.0, 2.0, 0.0), UNIT))
+    tree.header.frame_id = "door"  # MoveIt's way round: the child is the planning frame
+    message.fixed_frame_transforms, message.link_padding = [tree], [LinkPadding("hand", 0.2)]
+    more, errors = READER.with_planning_scene(full, message)
+    assert not errors and set(more.transforms) == {"wall", "door"} and more.link_padding == {"arm": 0.1, "hand": 0.2}
+    assert np.allclose(more.frame("door")[:3, 3], (0.0, 2.0, 0.0))
 
 
 def test_a_diff_that_fails_in_part_does_the_rest(scene):

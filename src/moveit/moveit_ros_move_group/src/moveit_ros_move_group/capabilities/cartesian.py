@@ -70,7 +70,9 @@ class CartesianPath:
         return body.link
 
     def _acceptance(self, request, scene, group):
-        constraints = constraint_set_of(request.path_constraints, scene, self.context.monitor.reader)
+        remarks = []
+        constraints = constraint_set_of(request.path_constraints, scene, self.context.monitor.reader, remarks)
+        self.context.remark("compute_cartesian_path", remarks, group.name)
         model, exact = self.context.model, self.context.exact
         if not request.avoid_collisions and constraints is None:
             return None

@@ -34,8 +34,9 @@ class Kinematics:
         poses = self._poses(request, group, scene)
         timeout = request.timeout.to_sec() or self._timeouts.get(group.name, _TIMEOUT_S)
         timeout = min(timeout, _LONGEST_S)
-        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader)
-        touching = []
+        remarks, touching = [], []
+        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader, remarks)
+        context.remark("compute_ik", remarks, group.name)
 
         def accept(q):
             state = scene.state.with_q(q)

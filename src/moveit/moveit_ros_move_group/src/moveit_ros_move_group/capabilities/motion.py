@@ -102,9 +102,9 @@ class MoveAction:
         context, options = self.context, goal.planning_options
         scene = context.scene_from(goal.request.start_state, "move_group")
         scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=False)
-        self._plan(goal.request, scene, result)
+        plan = self._plan(goal.request, scene, result)
         result.error_code.val = MoveItErrorCodes.SUCCESS
-        return ""
+        return "; ".join(plan.remarks)
 
     def _plan(self, request, scene, result):
         result.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())
@@ -114,7 +114,7 @@ class MoveAction:
         return plan
 
     def _plan_and_execute(self, goal, result):
-        """Fill the result; return the reason if it fails."""
+        """Fill the result; return the reason if it fails, else what was planned otherwise than asked."""
         context, options, request = self.context, goal.planning_options, goal.request
         if request.start_state.joint_state.name and not request.start_state.is_diff:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
@@ -128,7 +128,7 @@ class MoveAction:
             plan = self._plan(request, scene, result)
             if len(plan.timed.times) < 2:
                 result.error_code.val = MoveItErrorCodes.SUCCESS
-                return ""
+                return "; ".join(plan.remarks)
             self._feedback("MONITOR")
             watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options))
             outcome = context.executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
@@ -143,7 +143,7 @@ class MoveAction:
         if outcome.code != MoveItErrorCodes.SUCCESS:
             context.failures.tell("move_group", outcome.code, outcome.text, request.group_name, watch.contacts,
                                   outcome.joints)
-        return outcome.text
+        return "; ".join(plan.remarks) if outcome.code == MoveItErrorCodes.SUCCESS else outcome.text
 
     def _scene_after_change(self, options):
         """A function that returns the scene if it has changed since the last call, else None."""

@@ -71,7 +71,9 @@ class StateValidity:
         contacts = context.exact.contacts(scene, scene.state, group.name if group else None)
         stamp = rospy.Time.now()
         response.contacts = [contact_message(contact, model.frame, stamp) for contact in contacts]
-        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader)
+        remarks = []
+        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader, remarks)
+        context.remark("check_state_validity", remarks, request.group_name)
         evaluated = constraints.evaluate(model, scene.state, scene, context.exact) if constraints is not None else []
         response.constraint_result = [ConstraintEvalResult(bool(met), float(off)) for met, off, _ in evaluated]
         beyond = model.beyond_limits(scene.state.q, 1e-9, None if group is None else group.indices)

@@ -2,6 +2,7 @@
 """What messages do to a scene, with MoveIt's meaning of each."""
 import itertools
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -105,6 +106,8 @@ class SceneReader:
         errors = []
         if not message.is_diff:
             scene = Scene(scene.model, scene.state.with_attached({}), name=message.name)
+        elif message.name:
+            scene = replace(scene, name=message.name)
         if message.fixed_frame_transforms:
             scene = self._with_transforms(scene, message.fixed_frame_transforms, errors)
         held_before = set(scene.state.attached)
@@ -112,7 +115,8 @@ class SceneReader:
         if state.joint_state.name or state.multi_dof_joint_state.joint_names or state.attached_collision_objects:
             scene = self.with_robot_state(scene, state, errors)
         matrix = message.allowed_collision_matrix
-        if matrix.entry_names or matrix.default_entry_names:
+        # A diff with defaults alone leaves the matrix as it is, as in MoveIt.
+        if matrix.entry_names or matrix.default_entry_names and not message.is_diff:
             try:
                 scene = scene.with_allowed(AllowedCollisions.from_matrix(
                     matrix.entry_names, [row.enabled for row in matrix.entry_values], matrix.default_entry_names,
@@ -187,12 +191,16 @@ class SceneReader:
     def _with_transforms(self, scene, transforms, errors):
         known = {}
         for entry in transforms:
+            name, parent = entry.child_frame_id.lstrip("/"), entry.header.frame_id
+            if name == scene.model.frame:
+                # MoveIt's way: the header names the frame, and the child is the planning frame that it is seen from.
+                name, parent = parent.lstrip("/"), name
             try:
-                parent = self.frame(scene, entry.header.frame_id)
-                known[entry.child_frame_id.lstrip("/")] = parent @ matrix_of(entry.transform, entry.child_frame_id)
+                if name != scene.model.frame:
+                    known[name] = self.frame(scene, parent) @ matrix_of(entry.transform, name)
             except PlanningError as error:
                 errors.append("fixed frame '%s': %s" % (entry.child_frame_id, error))
-        return scene.with_transforms(known)
+        return scene.with_transforms({**scene.transforms, **known})
 
     def _each(self, scene, messages, apply, errors):
         def step(message):

@@ -80,8 +80,9 @@ def scene_message(scene, components=EVERYTHING, octomap=None, stamp=None):
     if bits & wants.TRANSFORMS:
         frames = {model.frame: np.eye(4), **scene.transforms}
         for name, pose in frames.items():
-            entry = TransformStamped(child_frame_id=name, transform=transform_of(pose))
-            entry.header.frame_id = model.frame
+            # As MoveIt has it: the header names the frame, the child is the planning frame that it is seen from.
+            entry = TransformStamped(child_frame_id=model.frame, transform=transform_of(pose))
+            entry.header.frame_id = name
             message.fixed_frame_transforms.append(entry)
     if bits & wants.ALLOWED_COLLISION_MATRIX:
         message.allowed_collision_matrix = matrix_message(scene.allowed)
