@@ -240,6 +240,8 @@ step_build() {
     fi
     # -j without -l, which catkin_make would add: on a busy machine make would then wait for other processes.
     # With the virtual environment's Python, installed executables get a first line that finds its packages.
+    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)" cmake_check_build_system
+    run "$VENV/bin/python3" tools/generate_messages.py build
     run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)"
     remove_dead_relays
     stamp "$key"

@@ -60,6 +60,11 @@ def pytest_collect_file(file_path, parent):
     return None
 
 
+def pytest_make_parametrize_id(val, argname):
+    # Every worker must give a test the same name, and bytes may hold the time at which they were made.
+    return argname if isinstance(val, bytes) else None
+
+
 class RostestFile(pytest.File):
     def collect(self):
         yield Rostest.from_parent(self, name="rostest")
@@ -261,7 +266,7 @@ class Controller:
 
 
 class FileScheduling(LoadScopeScheduling):
-    """A file's tests run in one worker. The last worker gets only .test files that mostly wait, the others those last."""
+    """A file's tests run in one worker. The last one gets only .test files that mostly wait, the others those last."""
 
     def _split_scope(self, nodeid):
         return file_of(nodeid)
