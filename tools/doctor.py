@@ -13,7 +13,8 @@ from lab_doctor.probe import gather
 QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "master": "the ROS master",
              "move_group": "move_group",
              "is_fresh": "reading the packages", "listeners": "the list of open ports",
-             "other_masters": "other ROS masters", "users_python": "your own Python"}
+             "other_masters": "other ROS masters", "deaf_nodes": "the nodes' ports",
+             "users_python": "your own Python"}
 
 
 def say_what_takes_long(names):

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The doctor's findings in fake environments, and its deadline."""
 
+import contextlib
 import fcntl
 import socket
 import threading
 import time
 from dataclasses import replace
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
@@ -26,6 +28,7 @@ from lab_doctor.probe import (
     answer_all,
     ask_master,
     clock_offset_s,
+    find_deaf_nodes,
     gather,
     master_ports,
     parse_listeners,
@@ -33,6 +36,7 @@ from lab_doctor.probe import (
     set_up_at_work,
     users_python,
 )
+from lab_testing.waiting import wait_until
 
 ENABLED = {"enabled": True, "stopped": False, "error": False}
 HEALTHY_LAB = Facts(
@@ -147,6 +151,7 @@ SICK = {
         "simulator", "/gazebo_2", "rosnode kill",
     ),
     "dead simulator": (with_master(HEALTHY_LAB, dead_nodes=["/gazebo"]), "simulator", "died", "rosnode cleanup"),
+    "deaf node": (replace(HEALTHY_LAB, deaf_nodes=["/gazebo"]), "nodes", "/gazebo", "rosnode kill /gazebo"),
     "stopped": (with_state(stopped=True, enabled=False), "robot", "stopped", "-r"),
     "error": (with_state(error=True), "robot", "error", "-r"),
     "silent robot": (replace(HEALTHY_LAB, topics=Topics(5, True)), "robot", "/robot/state", "roslaunch"),
@@ -374,6 +379,50 @@ def test_refused_connection_is_an_error_text():
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     assert "111" in ask_master(f"http://127.0.0.1:{port}").error  # its text depends on the locale
+
+
+class Graph:
+    """A master, and the XML-RPC and service ports of one node. ``greets``: whether it answers handshakes."""
+
+    def __init__(self, greets):
+        self.port, self._greets = socket.create_server(("127.0.0.1", 0)), greets
+        self.server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False)
+        self.uri = "http://127.0.0.1:%d" % self.server.server_address[1]
+        service = "rosrpc://127.0.0.1:%d" % self.port.getsockname()[1]
+        services = [["/node/get_loggers", ["/node"]]]
+        self.server.register_function(lambda *_: [1, "", [[], [], services]], "getSystemState")
+        self.server.register_function(lambda *_: [1, "", service], "lookupService")
+        self.server.register_function(lambda *_: [1, "", self.uri], "lookupNode")
+        self.server.register_function(lambda *_: [1, "", 1], "getPid")
+        for work in (self.server.serve_forever, self._greet):
+            threading.Thread(target=work, daemon=True).start()
+
+    def _greet(self):
+        with contextlib.suppress(OSError):
+            while True:
+                connection, _ = self.port.accept()
+                with connection:
+                    asked = connection.recv(1000)
+                    if self._greets and b"/node/get_loggers" in asked and b"probe=1" in asked:
+                        connection.sendall(b"\0\0\0\0")
+                    connection.recv(1)
+
+    def close(self):
+        self.server.shutdown()
+        self.server.server_close()
+        self.port.close()
+
+
+@pytest.mark.parametrize("greets", [True, False])
+def test_a_node_that_answers_calls_and_no_handshake_is_deaf(greets):
+    graph = Graph(greets)
+    try:
+        if greets:
+            assert find_deaf_nodes(graph.uri, 60.0) == []
+        else:  # not at once where the machine is too busy for its calls
+            wait_until(lambda: find_deaf_nodes(graph.uri, 0.5) == ["/node"], "the deaf node to be found")
+    finally:
+        graph.close()
 
 
 @pytest.mark.parametrize("offset_s", [7.5, -40.0])

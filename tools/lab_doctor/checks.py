@@ -204,8 +204,15 @@ def check_simulators(facts):
         yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
 
 
+def check_nodes(facts):
+    for node in facts.deaf_nodes:
+        what = f"{node} runs and takes no connections any more: no new subscriber, no call of a service"
+        yield Finding("nodes", Level.WRONG, what, f"rosnode kill {node}, then start it, or the lab, again")
+
+
 def check_troubles(facts):
-    """Errors that the simulator survived: a failed plugin is stopped; a dropped message does no harm."""
+    """Errors that the lab survived: a failed plugin is stopped; a dropped message, or a thread that was restarted, does
+    no harm."""
     if facts.topics is None:
         return
     for name, level, message in facts.topics.troubles:
@@ -285,6 +292,7 @@ CHECKS = (
     check_master,
     check_clock,
     check_simulators,
+    check_nodes,
     check_troubles,
     check_robot,
     check_move_group,

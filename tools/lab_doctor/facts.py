@@ -117,6 +117,8 @@ class Facts:
     # Path of `python3` outside the lab's environment, if it is not the system's.
     users_python: str = ""
     other_masters: list[OtherMaster] = field(default_factory=list)
+    # Nodes that answer calls and take no connections any more.
+    deaf_nodes: list[str] = field(default_factory=list)
     # Questions that were not answered in time: names of the fields above.
     timed_out: frozenset[str] = frozenset()
     listeners: list[Listener] | None = None

@@ -14,16 +14,18 @@ from rosgraph_msgs.msg import Clock
 LISTEN_S = 2.0
 STATE_FIELDS = ("enabled", "stopped", "error")
 SIMULATOR_STATUS = "gazebo: "  # prefix of the names of the simulator's statuses
+THREADS_STATUS = ": threads"  # ending of the name of every node's status of its threads
 
 
 def main():
     # Time from /clock may stand still, so use wall time.
     rospy.init_node("lab_doctor", anonymous=True, disable_signals=True, disable_rostime=True)
-    clock, state, statuses = [], [], []
+    clock, state, statuses = [], [], {}
     everything = threading.Event()
 
     def heard():
-        if state and statuses and len(clock) > 1 and clock[-1] > clock[0]:
+        simulator = any(name.startswith(SIMULATOR_STATUS) for name in statuses)
+        if state and simulator and len(clock) > 1 and clock[-1] > clock[0]:
             everything.set()
 
     def on_clock(message):
@@ -35,10 +37,9 @@ def main():
         heard()
 
     def on_diagnostics(message):
-        found = [status for status in message.status if status.name.startswith(SIMULATOR_STATUS)]
-        if found:
-            statuses[:] = [(status.name, status.level, status.message) for status in found]
-            heard()
+        statuses.update((status.name, (status.name, status.level, status.message)) for status in message.status
+                        if status.name.startswith(SIMULATOR_STATUS) or status.name.endswith(THREADS_STATUS))
+        heard()
 
     rospy.Subscriber("/clock", Clock, on_clock)
     rospy.Subscriber("/diagnostics", DiagnosticArray, on_diagnostics)
@@ -48,7 +49,7 @@ def main():
         "clock_messages": len(clock),
         "clock_advanced": len(clock) > 1 and clock[-1] > clock[0],
         "robot_state": state[-1] if state else None,
-        "troubles": [status for status in statuses if status[1] > 0],
+        "troubles": [status for status in statuses.values() if status[1] > 0],
     }
     print(json.dumps(answer), flush=True)
     rospy.signal_shutdown("done")

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import socket
+import struct
 import subprocess
 import threading
 import time
@@ -34,6 +35,8 @@ DEADLINE_S = 15.0
 PATIENCE_S = 4.0
 CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
+# A node that has not answered a handshake for so long, and answers calls, takes no connections any more [s].
+DEAF_S = 4.0
 # Of the log of a running set-up: the end that is read, and the most of its last line that is shown.
 LOG_TAIL_BYTES, LINE_LENGTH = 4096, 100
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
@@ -60,6 +63,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         "python": ask_python,
         "listeners": list_listeners,
         "other_masters": lambda: find_masters(ros["ROS_MASTER_URI"]),
+        "deaf_nodes": lambda: find_deaf_nodes(ros["ROS_MASTER_URI"]),
         "users_python": lambda: users_python(variables),
         **{f"address of {name}": lambda name=name: resolve(name) for name in hosts},
     }
@@ -77,6 +81,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         python=answers.get("python"),
         listeners=answers.get("listeners"),
         other_masters=answers.get("other_masters") or [],
+        deaf_nodes=answers.get("deaf_nodes") or [],
         users_python=answers.get("users_python") or "",
         timed_out=frozenset(timed_out),
         display=variables.get("DISPLAY", ""),
@@ -213,6 +218,34 @@ def _node_state(master, node):
     except (OSError, xmlrpc.client.Error, http.client.HTTPException):
         return "dead"
     return "alive"
+
+
+def find_deaf_nodes(uri: str, patience_s: float = DEAF_S) -> list[str]:
+    """Nodes that answer calls and take no connections any more: the thread that accepts them has ended, or hangs.
+
+    Each is asked for one of its services, as a client asks.
+    """
+    services = _proxy(uri).getSystemState(CALLER_ID)[2][2]
+    of_node = {node: service for service, nodes in services for node in nodes}
+    questions = {node: lambda node=node, service=service: _greet(uri, node, service, patience_s)
+                 for node, service in sorted(of_node.items())}
+    answers, _ = answer_all(questions, 3.0 * patience_s, patience_s=3.0 * patience_s)
+    return [node for node in questions if answers.get(node) == "deaf"]
+
+
+def _greet(uri, node, service, patience_s):
+    """ "deaf", or None where the node answers, or is not there, or is too slow in all."""
+    master = _proxy(uri)
+    address = urlparse(master.lookupService(CALLER_ID, service)[2])
+    fields = (b"callerid=" + CALLER_ID.encode(), b"md5sum=*", b"probe=1", b"service=" + service.encode())
+    header = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+    with socket.create_connection((address.hostname, address.port), patience_s) as connection:
+        connection.sendall(struct.pack("<I", len(header)) + header)
+        try:
+            connection.recv(1)
+        except TimeoutError:
+            return "deaf" if _node_state(master, node) == "alive" else None
+    return None
 
 
 def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
