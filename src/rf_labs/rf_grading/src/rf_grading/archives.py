@@ -95,8 +95,8 @@ def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
     """{path in the archive: bytes} of the wanted files, and the list of the other files' paths.
 
     source: path, or bytes. name: its name, which tells the kind. is_wanted: function of a path. bounds:
-    Bounds. refused: a dict that gets {path: sentence} of files that are too large; None: such an archive is refused.
-    Raises BadArchive.
+    Bounds. refused: a dict that gets {path: sentence} of files that are not read, as links and what is too large; None:
+    such an archive is refused. Raises BadArchive.
     """
     try:
         with (io.BytesIO(source) if isinstance(source, bytes) else open(source, "rb")) as stream:
@@ -109,24 +109,30 @@ def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
 
 def _take(entries, is_wanted, bounds, refused):
     taken, others, seen, size = {}, [], set(), 0
-    for count, (path, read_it) in enumerate(entries, 1):
+    for count, (name, problem, read_it) in enumerate(entries, 1):
         if count > bounds.entries:
             raise BadArchive("holds more than %d files" % bounds.entries)
-        path = safe_name(path)
-        if is_litter(path):
-            continue
-        if path in seen:
-            raise BadArchive("holds two files named %s" % path)
-        seen.add(path)
-        if not is_wanted(path):
-            others.append(path)
-            continue
-        content = read_it()
-        if len(content) > most_bytes(path):
-            sentence = "holds %s with more than %d bytes" % (path, most_bytes(path))
-            if refused is None:
-                raise BadArchive(sentence)
-            refused[path] = sentence
+        try:
+            path = safe_name(name)
+            if is_litter(path):
+                continue
+            if path in seen:
+                raise BadArchive("holds two files named %s" % path)
+            seen.add(path)
+            if problem:
+                raise BadArchive(problem)
+            if not is_wanted(path):
+                others.append(path)
+                continue
+            content = read_it()
+            if len(content) > most_bytes(path):
+                raise BadArchive("holds %s with more than %d bytes" % (path, most_bytes(path)))
+        except (BadArchive, *_DAMAGED) as error:
+            # In the archive of a class it belongs to the student in whose folder it is.
+            if refused is None or not _is_in_a_folder(name):
+                raise
+            refused[name.replace("\\", "/")] = str(error) if isinstance(error, BadArchive) else (
+                "holds %s, which is damaged" % name)
             continue
         size += len(content)
         if len(taken) >= bounds.files or size > bounds.taken_bytes:
@@ -134,6 +140,12 @@ def _take(entries, is_wanted, bounds, refused):
                 bounds.files, bounds.taken_bytes >> 20))
         taken[path] = content
     return taken, others
+
+
+def _is_in_a_folder(name):
+    """Whether a path begins with the name of a folder in the archive."""
+    top, slash, _ = name.replace("\\", "/").partition("/")
+    return bool(slash) and top not in ("", ".", "..") and not set(top) & set(":\0")
 
 
 class _ListLimited:
@@ -158,17 +170,19 @@ def _zip_entries(stream, bounds):
     with zipfile.ZipFile(limited) as archive:
         limited.most = None
         for info in archive.infolist():
-            kind = info.external_attr >> 16 & _FILE_KIND
-            if info.is_dir():
+            kind, path, problem = info.external_attr >> 16 & _FILE_KIND, _zip_name(info), ""
+            # Not is_dir(), which fails for a name that is empty.
+            if path.endswith("/"):
                 continue
-            path = _zip_name(info)
-            if kind == _LINK:
-                raise BadArchive("holds a link, %s; links are not followed" % path)
-            if kind not in (0, _REGULAR):
-                raise BadArchive("holds %s, which is not a file" % path)
-            if info.flag_bits & _ENCRYPTED_FLAG:
-                raise BadArchive("is encrypted")
-            yield path, lambda info=info, path=path: _zip_content(archive, info, most_bytes(path) + 1)
+            if not path:
+                problem = "holds a file without a name"
+            elif kind == _LINK:
+                problem = "holds a link, %s; links are not followed" % path
+            elif kind not in (0, _REGULAR):
+                problem = "holds %s, which is not a file" % path
+            elif info.flag_bits & _ENCRYPTED_FLAG:
+                problem = "is encrypted"
+            yield path, problem, lambda info=info, path=path: _zip_content(archive, info, most_bytes(path) + 1)
 
 
 def _zip_content(archive, info, most):
@@ -223,8 +237,9 @@ def _tar_entries(stream, name, bounds):
         for info in archive:
             if info.isdir():
                 continue
+            problem = ""
             if info.issym() or info.islnk():
-                raise BadArchive("holds a link, %s to %s; links are not followed" % (info.name, info.linkname))
-            if not info.isreg():
-                raise BadArchive("holds %s, which is not a file" % info.name)
-            yield info.name, lambda info=info: archive.extractfile(info).read(most_bytes(info.name) + 1)
+                problem = "holds a link, %s to %s; links are not followed" % (info.name, info.linkname)
+            elif not info.isreg():
+                problem = "holds %s, which is not a file" % info.name
+            yield info.name, problem, lambda info=info: archive.extractfile(info).read(most_bytes(info.name) + 1)

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from lab_batch import JobError, Spec
@@ -19,7 +20,7 @@ from rf_checks.command import remove_drafts, write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S
 from rf_checks.sandbox import MEMORY_BYTES
-from rf_grading import alike, archives, formats, keys, pages, plan, programs, results
+from rf_grading import alike, archives, formats, keys, pages, plan, programs, reading, results
 from rf_grading.ledger import Ledger, LedgerError
 from rf_grading.submissions import BadFolder, read_class
 
@@ -30,6 +31,9 @@ LAB_BYTES = 1 << 30
 _GRACE_S = 120.0
 #: Judges keep memory: a worker is replaced after so many checks.
 _CHECKS_OF_A_WORKER = 50
+#: The results of the whole class, by the names of their files.
+_TABLES = {"results.json": formats.as_json, "results.csv": formats.as_csv, "results.xml": formats.as_junit,
+           "nbgrader.csv": formats.as_nbgrader}
 _JOB = "rf_grading.job:Grade"
 
 
@@ -129,7 +133,12 @@ class _Grading:
                                 "EXERCISE" % (self._folder, self._options.folder))
             given = [path.read_text(encoding="utf-8", errors="replace") for path in options.given]
             texts = {entry.submission.entry: list(entry.texts.values()) for entry in entries if entry.texts}
-            pairs = alike.pairs(texts, [*similarity.Library(_workspace()).handed_out, *given])
+            handed_out = [*similarity.Library(_workspace()).handed_out, *given]
+            try:
+                pairs = alike.pairs(texts, handed_out)
+            except Exception as error:  # noqa: BLE001  (grading goes on without it)
+                _fail("the submissions are not compared with each other: %s" % reading.unforeseen(error))
+                pairs = []
             todo = [task for task in tasks.values() if task.key not in ledger.verdicts]
             print("%d submissions, %d programs; %d have their verdict already, %d to judge; results in %s" % (
                 len(sent), sum(len(entry.keys) for entry in entries), len(tasks) - len(todo), len(todo), self._out),
@@ -139,7 +148,7 @@ class _Grading:
                 self._judge(todo, ledger, entries, work)
             finally:
                 rows = results.rows_of(entries, exercises, ledger.verdicts, self._failures)
-                self._write(results.Results(name, tuple(exercises), rows, conditions, version, tuple(left_out),
+                rows = self._write(results.Results(name, tuple(exercises), rows, conditions, version, tuple(left_out),
                                             tuple(pairs)), entries)
         return self._conclude(rows)
 
@@ -163,7 +172,12 @@ class _Grading:
         with contextlib.closing(map_seeds(spec, range(len(todo)), limits)) as outcomes:
             for count, outcome in enumerate(outcomes, 1):
                 task = todo[outcome.seed]
-                said = self._take(task, outcome, ledger)
+                try:
+                    said = self._take(task, outcome, ledger)
+                except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+                    # OSError, as of a full disk, concerns them all.
+                    said = self._failures[task.key] = (
+                        "the check itself failed, which is not the program's fault: %s" % reading.unforeseen(error))
                 print(formats.one_line("%d of %d: %s, %s: %s" % (
                     count, len(todo), ", ".join(owners[task.key]), task.exercise.name, said)), flush=True)
 
@@ -181,22 +195,40 @@ class _Grading:
         return "%g points%s" % (round(verdict["points"], 1), "; " + verdict["hint"] if verdict["hint"] else "")
 
     def _write(self, found, entries):
+        """Write all reports; returns the Rows that they show."""
         out = self._out
+        found = replace(found, rows=tuple(self._reported(found, row) for row in found.rows))
         # Programs made of notebooks, for the check on the student's own machine.
         made = {entry.submission.entry: {Path(path).name: entry.texts[path] for name, path in entry.paths.items()
                                          if entry.notes[name]} for entry in entries}
-        for name, write in (("results.json", formats.as_json), ("results.csv", formats.as_csv),
-                            ("results.xml", formats.as_junit), ("nbgrader.csv", formats.as_nbgrader)):
+        for name, write in _TABLES.items():
             write_report(out / name, write(found))
         for row in found.rows:
             folder = out / _page_of(row)
             folder.parent.mkdir(parents=True, exist_ok=True)
-            motions = {cell.key: self._motions(cell.key) for cell in row.cells.values() if cell.key}
-            write_report(folder, pages.feedback(found, row, motions))
+            write_report(folder, pages.feedback(found, row, self._motions_of(row)))
             write_report(folder.parent / "results.json", formats.as_gradescope(row))
             for name, text in made.get(row.submission.entry, {}).items():
                 write_report(folder.parent / name, text)
         write_report(out / "index.html", pages.overview(found, time.monotonic() - self._began, _page_of))
+        return found.rows
+
+    def _reported(self, found, row):
+        """A row whose reports can be written: this one, or one that says why it cannot."""
+        try:
+            single = replace(found, rows=(row,), alike=())
+            for write in _TABLES.values():
+                write(single).encode()
+            pages.overview(single, None, _page_of).encode()
+            pages.feedback(single, row, self._motions_of(row)).encode()
+            formats.as_gradescope(row).encode()
+        except Exception as error:  # noqa: BLE001  (one submission ends no report of the others)
+            sentence = "its report cannot be written: %s" % reading.unforeseen(error)
+            return replace(row, cells={name: results.Cell(results.NOT_GRADED, None, sentence) for name in row.cells})
+        return row
+
+    def _motions_of(self, row):
+        return {cell.key: self._motions(cell.key) for cell in row.cells.values() if cell.key}
 
     def _motions(self, key):
         try:

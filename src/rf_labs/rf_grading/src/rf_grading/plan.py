@@ -38,11 +38,7 @@ def make(submissions, exercises, version, conditions, folder, only_used=False):
     conditions: {"seed", "profile", ...} of every verdict. folder: an empty one for the programs. only_used: leave out
     exercises for which no submission has a program. Raises OSError.
     """
-    for one in submissions:
-        sentence = reading.problem(one.files, exercises)
-        if sentence:
-            one.refuse(sentence)
-    assigned = {one.entry: programs.assign(one.files, exercises) if one.files else {} for one in submissions}
+    assigned = {one.entry: _assigned(one, exercises) for one in submissions}
     if only_used:
         exercises = [exercise for exercise in exercises if any(
             isinstance(found.get(exercise), programs.Program) for found in assigned.values())]
@@ -60,18 +56,34 @@ def make(submissions, exercises, version, conditions, folder, only_used=False):
                 laid_out = laid_out or _lay_out(found.files, Path(folder) / str(number))
                 path = laid_out / found.path
                 used = files_of_programs.files(path)
-            except (OSError, files_of_programs.BadSubmission) as error:
+                key = keys.key(version, exercise, conditions, path.name, used)
+                parent = Path(found.path).parent
+                texts = {(parent / name).as_posix(): files_of_programs.decoded(content)
+                         for name, content in used.items()}
+            except Exception as error:  # noqa: BLE001  (one submission ends no grading of the others)
                 entry.problems[exercise.name] = "%s cannot be judged: %s" % (
                     found.path, _shorter(error, folder, number))
                 continue
-            key = keys.key(version, exercise, conditions, path.name, used)
             entry.keys[exercise.name], entry.paths[exercise.name] = key, found.path
             entry.notes[exercise.name] = found.note
-            parent = Path(found.path).parent
-            entry.texts.update({(parent / name).as_posix(): files_of_programs.decoded(content)
-                                for name, content in used.items()})
+            entry.texts.update(texts)
             tasks.setdefault(key, Task(key, exercise, str(path)))
     return exercises, entries, tasks
+
+
+def _assigned(one, exercises):
+    """{exercise: Program, or NoProgram} of a Submission; {}, and it is refused, where its programs cannot be read."""
+    if not one.files:
+        return {}
+    sentence = reading.problem(one.files, exercises)
+    if sentence:
+        one.refuse(sentence)
+        return {}
+    try:
+        return programs.assign(one.files, exercises)
+    except Exception as error:  # noqa: BLE001  (one submission ends no grading of the others)
+        one.refuse("the submission is not read: %s" % reading.unforeseen(error))
+        return {}
 
 
 def _lay_out(files, folder):
@@ -83,5 +95,8 @@ def _lay_out(files, folder):
 
 
 def _shorter(error, folder, number):
-    text = "%s" % (getattr(error, "strerror", None) or error)
+    if isinstance(error, OSError | files_of_programs.BadSubmission):
+        text = "%s" % (getattr(error, "strerror", None) or error)
+    else:
+        text = reading.unforeseen(error)
     return text.replace("%s/%d/" % (folder, number), "")

@@ -6,8 +6,9 @@ import posixpath
 import re
 from dataclasses import dataclass
 
-from rf_checks.exercises import EXERCISES, UnknownExercise, choose
-from rf_checks.submission import decoded, imported
+from lab_environment.options import did_you_mean
+from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
+from rf_checks.submission import LARGEST_BYTES, decoded, imported
 
 _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
 #: Lines of cells that are for the notebook alone.
@@ -18,6 +19,10 @@ _OF_PROGRAMS = re.compile(r"rospy|roslib|baxter_interface|moveit_commander|__mai
 
 class NoProgram(Exception):
     """A submission has no program for an exercise, or several; the text says so."""
+
+
+class TooLarge(Exception):
+    """A notebook has more code than a program may have; the text says so."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +39,12 @@ def exercises_of(lab="", names=()):
     """The Exercises of a lab ("": of all) with these names (none: all). Raises UnknownExercise."""
     known = [exercise for exercise in EXERCISES if lab in ("", exercise.lab)]
     if not known:
-        raise UnknownExercise("there is no lab '%s'; labs are %s" % (
-            lab, ", ".join(dict.fromkeys(exercise.lab for exercise in EXERCISES))))
+        raise UnknownExercise("there is no lab '%s'; labs are %s%s" % (lab, ", ".join(LABS), did_you_mean(lab, LABS)))
     unknown = [name for name in names if name not in [exercise.name for exercise in known]]
     if unknown:
-        raise UnknownExercise("%s has no exercise '%s'; its exercises are %s" % (
-            lab or "no lab", unknown[0], ", ".join(exercise.name for exercise in known)))
+        names = [exercise.name for exercise in known]
+        raise UnknownExercise("%s has no exercise '%s'; its exercises are %s%s" % (
+            lab or "no lab", unknown[0], ", ".join(names), did_you_mean(unknown[0], names)))
     return [exercise for exercise in known if not names or exercise.name in names]
 
 
@@ -57,11 +62,16 @@ def with_notebooks_as_programs(files):
         if target in found:  # exported by its author
             continue
         try:
-            text = program_of_notebook(content)
+            found[target] = program_of_notebook(content).encode()
+        except TooLarge as error:
+            notes[path] = "%s %s" % (path, error)
+            continue
+        except UnicodeEncodeError:
+            notes[path] = "%s holds a character that no file can hold, half of a surrogate pair" % path
+            continue
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             notes[path] = "%s is no notebook that can be read" % path
             continue
-        found[target] = text.encode()
         notes[target] = "made of the code cells of %s" % path
     return found, notes
 
@@ -69,10 +79,13 @@ def with_notebooks_as_programs(files):
 def program_of_notebook(content):
     """The code cells of a notebook (bytes) as one program; its own commands (%magic, !shell) become comments.
 
-    Raises ValueError, KeyError, TypeError, AttributeError for anything that is no notebook.
+    Raises TooLarge; ValueError, KeyError, TypeError, AttributeError for anything that is no notebook.
     """
     cells = json.loads(content)["cells"]
     texts = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    # Before Python's parser sees it, which needs hundreds of bytes for each.
+    if sum(map(len, texts)) > LARGEST_BYTES:
+        raise TooLarge("has more than %d bytes of code" % LARGEST_BYTES)
     return "\n\n".join(_plain(text) for text in texts) + "\n"
 
 

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import yaml
 
+from lab_environment.user_files import check_file
 from rf_checks import submission as files_of_programs
-from rf_grading import archives
+from rf_grading import archives, reading
 
 #: What a submission may bring.
 PROGRAMS = (".py", ".ipynb")
@@ -118,6 +119,12 @@ def _sort_in(top, name, collected, left_out, exercise_names):
     except OSError as error:
         one.refuse("%s cannot be read: %s" % (name, error.strerror or error))
         return
+    except reading.NotRead as error:
+        one.refuse("%s is not read: %s" % (name, error))
+        return
+    except Exception as error:  # noqa: BLE001  (one submission ends no grading of the others)
+        one.refuse("%s cannot be read: %s" % (name, reading.unforeseen(error)))
+        return
     if moodle and not is_folder:
         files = {moodle["file"] if path == name else path: content for path, content in files.items()}
     one.others += others
@@ -147,7 +154,7 @@ def _unpacked(files, others):
             found[path] = content
             continue
         try:
-            packed, further = archives.read(content, path, is_program)
+            packed, further = reading.limited(archives.read, content, path, is_program)
         except archives.BadArchive as error:
             raise files_of_programs.BadSubmission("%s %s" % (path, error)) from None
         folder = archives.stem(path)
@@ -184,7 +191,7 @@ def _name_by_gradescope(top, collected):
     """Names and numbers from Gradescope's list, where there is one."""
     try:
         listed = yaml.safe_load(top.text(_GRADESCOPE) or "") or {}
-    except (yaml.YAMLError, ValueError, OSError, files_of_programs.BadSubmission):
+    except (yaml.YAMLError, ValueError, RecursionError, OSError, files_of_programs.BadSubmission):
         return
     for one in collected.values():
         entry = listed.get(one.entry) if isinstance(listed, dict) else None
@@ -221,7 +228,7 @@ class _Folder:
         """(files, others) below an entry. Raises BadArchive, BadSubmission, OSError."""
         path = self._path / name
         if archives.is_archive(name) and path.is_file() and not path.is_symlink():
-            return archives.read(path, name, is_program)
+            return reading.limited(archives.read, path, name, is_program)
         if not self.is_folder(name):
             return ({name: _content(path, name)}, []) if is_program(name) or path.is_symlink() else ({}, [name])
         return _walk(path)
@@ -284,6 +291,10 @@ class _Archive:
 
         refused = {}
         try:
+            check_file(path, archives.OF_A_CLASS.bytes)
+        except OSError as error:
+            raise BadFolder("%s cannot be read: %s" % (path, error.strerror or error)) from error
+        try:
             found, others = archives.read(path, path.name, is_wanted, archives.OF_A_CLASS, refused)
         except archives.BadArchive as error:
             raise BadFolder("%s %s; unpack it yourself, and name the folder" % (path, error)) from error
@@ -320,5 +331,5 @@ class _Archive:
             return ({path[start:]: content for path, content in self._found.items() if path.startswith(name + "/")},
                     [path[start:] for path in self._others if path.startswith(name + "/")])
         if archives.is_archive(name):
-            return archives.read(self._found[name], name, is_program)
+            return reading.limited(archives.read, self._found[name], name, is_program)
         return ({name: self._found[name]}, []) if name in self._found else ({}, [name])

@@ -145,3 +145,23 @@ def test_stems():
     assert [archives.stem(name) for name in ("a.b.tar.gz", "a.zip", "a.TGZ", "a.py")] == ["a.b", "a", "a", "a.py"]
     assert archives.is_other_archive("x.rar") and archives.is_other_archive("x.tar.xz")
     assert not archives.is_other_archive("x.tar.gz")
+
+
+def test_an_entry_without_a_name_is_told():
+    with pytest.raises(archives.BadArchive, match="without a name"):
+        archives.read(zipped([("", b"a = 1")]), "a.zip", is_wanted)
+
+
+@pytest.mark.parametrize("name", ["class.zip", "class.tar"])
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_in_the_archive_of_a_class_a_bad_file_costs_its_folder_alone(name):
+    make = zipped if name.endswith("zip") else (lambda files: tarred(files, "w"))
+    content = make([("anna/wave.py", b"a = 1"), ("li/../../x.py", b"b"), ("li/wave.py", b"b"), ("max/wave.py", b"1"),
+                    ("max/wave.py", b"2")])
+    refused = {}
+    taken, _ = archives.read(content, name, is_wanted, archives.OF_A_CLASS, refused)
+    assert set(taken) == {"anna/wave.py", "li/wave.py", "max/wave.py"}
+    assert {path.partition("/")[0] for path in refused} == {"li", "max"}
+    # One that begins outside has no folder to belong to.
+    with pytest.raises(archives.BadArchive, match="leads out"):
+        archives.read(make([("../x.py", b"b")]), name, is_wanted, archives.OF_A_CLASS, {})

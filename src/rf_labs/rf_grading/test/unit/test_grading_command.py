@@ -5,13 +5,14 @@ import fcntl
 import json
 import os
 import tempfile
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from lab_batch import JobError, Outcome
 from lab_environment import isolation
-from rf_grading import command, keys
+from rf_grading import command, keys, pages
 
 MOTION = {"times": [0.0, 1.0], "left": [[[0, 0, 0]] * 5] * 2, "right": [[[0, 0, 0]] * 5] * 2}
 
@@ -34,7 +35,7 @@ class StandIn:
             if self.failing and self.failing in text:
                 yield Outcome(seed, {}, "its worker died twice: signal SIGKILL")
                 continue
-            points = 100.0 if "right" in text else 0.0
+            points = 100.0 if "right" in text else float("nan") if "nan" in text else 0.0
             yield Outcome(seed, {"motions": [MOTION], "verdict": {
                 "graded": "slow" not in text, "not_graded": "the machine reached 0.01 of real time", "points": points,
                 "passed": points > 80, "pass_mark": 80, "hint": None if points else "it does nothing", "fault": None,
@@ -224,3 +225,33 @@ def test_workers_are_limited_by_processors_and_memory():
     assert command.workers_for(2, 64 << 30) == 2
     assert command.workers_for(16, 7 << 30) == 2
     assert command.workers_for(4, 1 << 30) == 1
+
+
+def test_one_submission_costs_itself_alone(judge, class_folder, capsys):
+    with zipfile.ZipFile(class_folder / "dana.zip", "w") as archive:
+        info = zipfile.ZipInfo("wave.py")
+        archive.writestr(info, "right")
+        info.filename = ""
+    for name, cells in (("eve", [{"cell_type": "code", "source": ["# \ud800 right"]}]), ("fay", None)):
+        (class_folder / name).mkdir()
+        (class_folder / name / "wave.ipynb").write_text(json.dumps({"cells": cells}))
+    # The judge's points are no number.
+    (class_folder / "gil_wave.py").write_text("# nan")
+    (class_folder / "hal_wave.py").write_text("# -*- coding: undefined -*-\n")
+    assert command.main(["class", "lab2", "wave"]) == command.NOT_ALL_GRADED
+    assert points() == {"anna": 100.0, "bo": 0.0, "cy": 100.0, "dana": 0.0, "eve": 0.0, "fay": 0.0, "gil": None,
+                        "hal": 0.0}
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_report_that_cannot_be_written_costs_its_row_alone(judge, class_folder, monkeypatch):
+    def feedback(results, row, motions):
+        if row.submission.entry == "bo" and row.points is not None:
+            raise KeyError("found")
+        return genuine(results, row, motions)
+
+    genuine = pages.feedback
+    monkeypatch.setattr(pages, "feedback", feedback)
+    assert command.main(["class", "lab2"]) == command.NOT_ALL_GRADED
+    assert points() == {"anna": 100.0, "bo": None, "cy": 100.0}
+    assert "cannot be written" in Path("class-graded/feedback/bo/feedback.html").read_text()

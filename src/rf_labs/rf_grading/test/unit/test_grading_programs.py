@@ -68,3 +68,11 @@ def test_exercises_are_chosen_by_lab_and_name():
     for lab, names, words in (("lab7", (), "no lab 'lab7'"), ("lab2", ("wav",), "no exercise 'wav'")):
         with pytest.raises(UnknownExercise, match=words):
             programs.exercises_of(lab, names)
+
+
+@pytest.mark.parametrize(("source", "words"), [
+    ("print('\ud800')", "half of a surrogate pair"), ("a\n" * (1 << 20), "bytes of code")])
+def test_a_notebook_that_makes_no_program_is_told(source, words):
+    cells = [{"cell_type": "code", "source": [source]}]
+    files, notes = programs.with_notebooks_as_programs({"wave.ipynb": json.dumps({"cells": cells}).encode()})
+    assert files == {} and words in notes["wave.ipynb"]
