@@ -22,11 +22,14 @@ from lab_class.roster import INSTRUCTOR, RosterError
 from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError, default_folder
 from lab_environment import isolation
 from lab_environment.family import is_running
+from lab_environment.user_files import PIPE_WAIT_S, read_file
 from lab_web.libraries import LibrariesError, fetched
 
 #: Time for the supervisor to open the front door, and to end all labs [s].
 OPEN_S, DOWN_S = 30.0, 60.0
 _LOOK_S = 0.2
+#: A gradebook of 500 students has a hundred kilobytes.
+MAX_ROSTER_BYTES = 20 << 20
 _LOG = "supervisor.log"
 _DONE, _FAILED, _WRONG_WORDS, _INTERRUPTED = 0, 1, 2, 130
 _COLUMNS = "%-20s %-9s %5s %6s %8s %8s %8s  %s"
@@ -146,7 +149,7 @@ def _students(who):
     if who.isdecimal():
         return roster.numbered(int(who))
     try:
-        data = Path(who).read_bytes()
+        data = read_file(who, MAX_ROSTER_BYTES, pipe_wait_s=PIPE_WAIT_S)
     except OSError as error:
         raise RosterError("%s is neither a number of students nor a file that can be read: %s"
                           % (who, error.strerror)) from error

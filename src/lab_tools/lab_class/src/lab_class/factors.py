@@ -73,6 +73,6 @@ def factor_of(message):
     """The real-time factor in a frame of rosbridge, None for any other frame: a lab is free to send what it likes."""
     try:
         factor = float(json.loads(message)["msg"]["real_time_factor"])
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ArithmeticError, ValueError, KeyError, TypeError, RecursionError):
         return None
     return round(factor, 3) if math.isfinite(factor) else None

@@ -17,6 +17,8 @@ _KEPT = "verdicts.json"
 _LARGEST_BYTES = 1 << 20
 # Exercises of one student that are kept, and letters of an exercise's name.
 _MOST, _LONGEST = 40, 60
+#: Most points of a check.
+POINTS = 100.0
 
 
 class Verdicts:
@@ -39,7 +41,7 @@ class Verdicts:
             name = "".join(sign for sign in result["exercise"][:_LONGEST] if sign.isprintable())
             if not name or len(self.known) >= _MOST and name not in self.known:
                 return
-            self.known[name] = {"points": result["points"], "passed": result["passed"]}
+            self.known[name] = {"points": _points(result["points"]), "passed": result["passed"]}
             draft = self._file.with_suffix(".new")
             draft.write_text(json.dumps(self.known), encoding="utf-8")
             draft.replace(self._file)
@@ -47,8 +49,16 @@ class Verdicts:
     def _kept(self):
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
             kept = json.loads(self._file.read_text(encoding="utf-8"))
-            return {name: {"points": one["points"], "passed": one["passed"]} for name, one in kept.items()}
+            return {name: {"points": _points(one["points"]), "passed": bool(one["passed"])}
+                    for name, one in kept.items()}
         return {}
+
+
+def _points(value):
+    """Points as a check gives them, or None for what is not graded. Raises ValueError, TypeError."""
+    if value is not None and not 0.0 <= value <= POINTS:
+        raise ValueError("%r are no points of a check" % value)
+    return value
 
 
 def _read(home, seen):

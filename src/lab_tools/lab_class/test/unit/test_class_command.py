@@ -12,6 +12,7 @@ import pytest
 
 from lab_class import command, roster
 from lab_class.disk import remove
+from lab_class.factors import factor_of
 from lab_class.roster import Student
 from lab_class.store import ClassRecord, Options, Store, StoreError, default_folder
 from lab_class.supervisor import Supervisor
@@ -192,3 +193,17 @@ def test_students_who_are_not_in_the_class_any_more_are_named(capsys):
                                        "files stay in labs/ben/home.\n")
     command._say_who_has_left(None, earlier)
     assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("kind", ["device", "empty"])
+def test_a_roster_that_is_no_file_is_not_waited_for(tmp_path, capsys, kind):
+    (tmp_path / "empty").touch()
+    roster_file = {"device": "/dev/zero", "empty": str(tmp_path / "empty")}[kind]
+    assert command.main(["--folder", str(tmp_path / "class"), "up", roster_file]) == 2
+    said = capsys.readouterr().err
+    assert roster_file in said and kind in said
+
+
+@pytest.mark.parametrize("factor", ["1e999", "NaN", "1" + "0" * 400, '"x"', "[1]"])
+def test_a_factor_beyond_all_bounds_is_none(factor):
+    assert factor_of('{"msg": {"real_time_factor": %s}}' % factor) is None

@@ -51,6 +51,23 @@ def test_a_file_that_is_no_result_changes_nothing(file, verdicts):
     assert list(verdicts.known) == ["wave"]
 
 
+@pytest.mark.parametrize("points", ["NaN", "-Infinity", "1e999", "1e300", "-1", "1" + "0" * 400, "true1", '"x"'])
+def test_points_that_no_check_gives_are_not_kept(tmp_path, file, verdicts, points):
+    replace(file, result())
+    verdicts.look()
+    replace(file, result("joint_command").replace("100.0", points))
+    verdicts.look()
+    replace(file, result("rotate").replace("80.0", points))
+    verdicts.look()
+    expected = {"wave": {"points": 100.0, "passed": True}}
+    assert verdicts.known == expected or points in ("-1", "1e300")
+    assert "joint_command" not in verdicts.known
+    json.dumps(verdicts.known, allow_nan=False)
+    # What an earlier version has kept.
+    (tmp_path / "verdicts.json").write_text('{"wave": {"points": %s, "passed": true}}' % points)
+    assert Verdicts(tmp_path, tmp_path / "home").known == {}
+
+
 def test_links_pipes_and_folders_are_not_read(tmp_path, file, verdicts):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

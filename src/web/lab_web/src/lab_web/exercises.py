@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The result of an exercise for pages, from the file that ``./baxter.sh check`` writes. No ROS."""
 import json
+import math
 
 _LARGEST_BYTES = 1 << 20
 
@@ -35,18 +36,26 @@ class Results:
 
 def shown_of(text):
     """What pages show of a result's JSON text: ``exercise``, ``passed``, ``points`` (None: not graded), ``due``,
-    ``why`` (of what is not graded), ``hint``, ``runs`` [{call, criteria [{name, points, of, found}]}]. Raises
-    ValueError.
+    ``why`` (of what is not graded), ``hint``, ``runs`` [{call, criteria [{name, points, of, found}]}]. All
+    numbers are finite. Raises ValueError.
     """
     try:
         result = json.loads(text)
         return {"exercise": str(result["exercise"]), "passed": result["passed"] is True,
-                "points": None if result["points"] is None else float(result["points"]),
-                "due": float(result["pass_mark"]), "why": str(result["not_graded"] or ""),
+                "points": None if result["points"] is None else _number(result["points"]),
+                "due": _number(result["pass_mark"]), "why": str(result["not_graded"] or ""),
                 "hint": str(result["hint"] or ""),
                 "runs": [{"call": " ".join(map(str, run["arguments"])),
-                          "criteria": [{"name": str(one["name"]), "points": float(one["points"]),
-                                        "of": float(one["of"]), "found": str(one["found"])}
+                          "criteria": [{"name": str(one["name"]), "points": _number(one["points"]),
+                                        "of": _number(one["of"]), "found": str(one["found"])}
                                        for one in run["criteria"]]} for run in result["runs"]]}
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError("no result of an exercise: %s" % error) from None
+
+
+def _number(value):
+    """A finite number. JSON as Python reads it has NaN, and 1e999 is infinity: no browser reads either."""
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("%s is no number of points" % value)
+    return number
