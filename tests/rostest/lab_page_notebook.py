@@ -145,6 +145,8 @@ class LabNotebook(PageTest):
         self.open_notebook("fails.ipynb", CHECK % (self.exercises / "skeletons" / "tf_listener.py"))
         self.run_cell(0)
         self.assertIn("Hint: ", self.verdict("tf_listener: not passed"))
+        self.browser.wait("document.getElementById('notebook-frame').contentDocument.getElementById('jp-left-stack')"
+                          ".offsetWidth === 0")
         self.assertLessEqual(self.browser.evaluate("document.documentElement.scrollWidth"), 390)
         self.browser.evaluate("document.getElementById('exercise').scrollIntoView()")
         self.keep("lab_page_notebook_telephone")

@@ -6,8 +6,11 @@ import {text} from "./texts.js";
 const byId = (name) => document.getElementById(name);
 // The notebook's share of the width [%], as the separator says it.
 const [LEAST, MOST, STEP, DEFAULT] = [20, 80, 5, 55];
-// Below this width [px] JupyterLab shows a notebook alone: its list of files would leave too little beside it.
-const NARROW = 800;
+// Below this width [px], as on a telephone held either way, JupyterLab shows a notebook alone, with its list of files
+// closed: it would leave too little beside it.
+const NARROW = 900;
+// JupyterLab takes a while until it has opened what it had open before.
+const LOOK_MS = 200;
 
 export class Notebook {
   constructor(send, query) {
@@ -17,9 +20,12 @@ export class Notebook {
     this.may = false;
     this.isOpen = localStorage.getItem("notebook") === "open";
     this.loaded = "";
+    this.isList = false;
+    this.timer = 0;
     this.share = Number(localStorage.getItem("notebook-share")) || DEFAULT;
     byId("notebook-toggle").onclick = () => this.toggle();
     byId("notebook-file").onchange = () => this.load(true);
+    byId("notebook-frame").onload = () => this.closeList();
     this.startSplit();
     this.setShare(this.share);
   }
@@ -71,7 +77,23 @@ export class Notebook {
     const {state, number} = this.state;
     if (state !== "running" || (this.loaded === number && !again)) return;
     this.loaded = number;
+    this.isList = again && !byId("notebook-file").value;
     byId("notebook-frame").src = this.address(byId("notebook-file").value);
+  }
+
+  // Its symbol at the left edge opens it again; so does who chooses it by name.
+  async closeList() {
+    const frame = byId("notebook-frame");
+    clearTimeout(this.timer);
+    if (frame.clientWidth >= NARROW || this.isList) return;
+    const app = frame.contentWindow?.jupyterapp;
+    if (!app) {
+      if (this.loaded !== "") this.timer = setTimeout(() => this.closeList(), LOOK_MS);
+      return;
+    }
+    await app.restored;
+    app.shell.collapseLeft();
+    app.shell.collapseRight();
   }
 
   // Of a file below the topmost folder, or, for "", of the list of files.

@@ -153,6 +153,8 @@ def main():
         return keeper.keep(runtime / "state", command(options.root, {
             "ServerApp.sock": runtime / _SOCKET, "ServerApp.sock_mode": "0600", "ServerApp.base_url": options.base_url,
             "IdentityProvider.token": "", "Application.log_level": "ERROR",
+            # The page around it closes the list of files on a telephone.
+            "LabApp.expose_app_in_browser": True,
             # The owner lets no foreign page in, and hides from it who asks.
             "ServerApp.disable_check_xsrf": True}), grace_s=STOP_TIMEOUT_S)
     finally:

@@ -25,3 +25,12 @@ def test_an_address_holds_its_token_whatever_its_signs(capsys, monkeypatch, tmp_
     assert parse_qs(urlsplit(address).query) == {"token": [token]}
     (file,) = node.page_files.folder().iterdir()
     assert file.read_text() == address
+
+
+@pytest.mark.parametrize("port", [None, 8090])
+@pytest.mark.parametrize("is_launched", [False, True])
+def test_the_operators_address_is_the_last_line_alone(port, is_launched):
+    text = node.announcement("http://localhost:8090/?token=a", "http://localhost:8090/?token=b", port, is_launched)
+    assert text.splitlines()[-1].strip() == "http://localhost:8090/?token=a" and "token=b" in text
+    # Ctrl-C in roslaunch's terminal ends the lab.
+    assert ("Ctrl-C" in text) is not is_launched and ("every machine" in text) is (port is not None)

@@ -88,6 +88,26 @@ def test_the_notebook_is_above_the_robot_on_a_telephone(notebook, browser):
     assert 0 <= left < right <= 390 and 0 <= top < bottom <= 844
 
 
+def test_the_list_of_files_is_closed_where_it_leaves_no_room_unless_it_was_chosen(notebook, browser):
+    def choose(number):
+        browser.evaluate(FRAME + ".contentWindow.old = true")
+        browser.evaluate("(() => { const list = document.getElementById('notebook-file'); list.selectedIndex = %d;"
+                         "list.onchange(); })()" % number)
+        browser.wait("!%s.contentWindow.old && %s.contentWindow.jupyterapp" % (FRAME, FRAME))
+    browser.resize(844, 390)
+    choose(1)
+    browser.wait(FRAME + ".contentWindow.closed_list")
+    choose(0)
+    browser.evaluate("lab.notebook.closeList()")
+    assert not browser.evaluate(FRAME + ".contentWindow.closed_list")
+    browser.resize(1920, 800)
+    choose(1)
+    browser.evaluate("lab.notebook.closeList()")
+    assert not browser.evaluate(FRAME + ".contentWindow.closed_list")
+    left, right, top, bottom = browser.evaluate(BOX % "#stop")
+    assert 0 <= left < right <= 1920 and 0 <= top < bottom <= 800
+
+
 def test_a_page_that_only_watches_has_no_notebook(lab, browser):
     share_notebook(lab, "running", "1")
     browser.open(lab.address + "look")
