@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What controllers are spoken to by: an action each, or nothing where they are fake."""
+import itertools
 import threading
 import time
 
 import actionlib
 import rospy
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalID, GoalStatus
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
     FollowJointTrajectoryGoal,
@@ -55,6 +56,15 @@ class Handles:
         return self._made[key]
 
 
+_goals = itertools.count(1)
+
+
+def goal_id() -> GoalID:
+    """Return the id of a new goal in roscpp's form, which MoveIt's goals have: node, count, seconds.nanoseconds."""
+    now = rospy.Time.now()
+    return GoalID(stamp=now, id="%s-%d-%d.%d" % (rospy.get_caller_id(), next(_goals), now.secs, now.nsecs))
+
+
 class _Goal:
     """One goal. handle: actionlib's once it is over."""
 
@@ -75,6 +85,7 @@ class _ActionHandle:
         self.controller = controller
         # Resolved: actionlib remaps the name as written, roscpp's version remaps the resolved name.
         self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
+        self._client.manager._generate_id = goal_id  # rospy's ids end in milliseconds
         self._sent, self._goal = None, _Goal()
 
     @property
