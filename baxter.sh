@@ -114,12 +114,13 @@ run_program() {
         use_loopback
     fi
     use_build || exit
+    use_writable_folders
     exec "${command[@]}" "$@"
 }
 
 # Replace this process by a command in the workspace's environment, or by a shell with the lab's prompt.
 enter() {
-    warn_of_logs
+    use_writable_folders
     if [[ $# -gt 0 ]]; then
         exec "$@"
     elif [[ -t 0 ]]; then
@@ -212,7 +213,8 @@ main() {
             ;;
         handout)
             # Needs no set-up, so it takes the system's Python: the first one in PATH may be conda's.
-            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec /usr/bin/python3 -m rf_checks.handout "$@"
+            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src:$LAB_ROOT/src/lab_tools/lab_environment/src \
+                exec /usr/bin/python3 -m rf_checks.handout "$@"
             ;;
         sim)
             local public=

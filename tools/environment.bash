@@ -218,14 +218,31 @@ use_build_if_there() {
     if [[ -f $LAB_ROOT/devel/setup.bash ]]; then use_build; fi
 }
 
-# Warn where ROS cannot keep its logs, as in folders that sudo has made root's: roslaunch then ends with several tracebacks.
-warn_of_logs() {
-    local home=${ROS_HOME:-$HOME/.ros} folder
-    for folder in "$home" "${ROS_LOG_DIR:-$home/log}"; do
-        if [[ -e $folder && ! (-d $folder && -w $folder) ]]; then
-            echo "baxter.sh: you cannot write to $folder, so ROS cannot start: it keeps its logs there. If it is root's," \
-                 "make it yours: sudo chown -R $(id -un) '$folder'" >&2
+# Whether a folder can be written to, or made.
+can_write() {
+    local folder=$1
+    while [[ ! -e $folder && $folder == */* ]]; do folder=${folder%/*}; done
+    [[ -d ${folder:-/} && -w ${folder:-/} ]]
+}
+
+# Where the home is read-only, or sudo has made folders in it root's, ROS and our caches use a folder of temporary files:
+# roslaunch would end with several tracebacks. A line says which folder it is, and what mends it.
+use_writable_folders() {
+    local home=${ROS_HOME:-$HOME/.ros} spare folder
+    for folder in "$home" "${ROS_LOG_DIR:-$home/log}" "${XDG_CACHE_HOME:-$HOME/.cache}"; do
+        can_write "$folder" && continue
+        spare=${TMPDIR:-/tmp}/baxter_home_$(id -u)
+        if ! mkdir -p -m 700 "$spare" || [[ ! -O $spare || ! -w $spare ]]; then
+            echo "baxter.sh: you can write neither to $folder nor to $spare, so ROS cannot start: it keeps its logs there." \
+                 "Set HOME or ROS_HOME to a folder of yours" >&2
             return
         fi
+        echo "baxter.sh: you cannot write to $folder; what would be kept there, such as logs, goes to $spare. If it is" \
+             "root's, make it yours: sudo chown -R $(id -un) '$folder'. If your home is read-only, set HOME to a folder" \
+             "of yours" >&2
+        can_write "${ROS_LOG_DIR:-$home/log}" || export ROS_LOG_DIR=$spare/log
+        can_write "$home" || export ROS_HOME=$spare
+        can_write "${XDG_CACHE_HOME:-$HOME/.cache}" || export XDG_CACHE_HOME=$spare/cache
+        return
     done
 }

@@ -413,14 +413,30 @@ def test_students_copy_does_not_run_on_the_first_python_in_path(tmp_path):
     assert done.returncode == 2 and "FOLDER" in done.stderr and "stranger" not in done.stderr
 
 
+def writable_folders(tmp_path, **environment):
+    """(stderr, {variable: value} of ROS and caches) after use_writable_folders."""
+    script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; use_writable_folders; env'
+    (tmp_path / "temporary").mkdir()
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, env={
+        "PATH": "/usr/bin:/bin", "HOME": str(tmp_path / "home"), "TMPDIR": str(tmp_path / "temporary"), **environment})
+    return done.stderr, {name: value for name, _, value in (line.partition("=") for line in done.stdout.splitlines())
+                         if name in ("ROS_HOME", "ROS_LOG_DIR", "XDG_CACHE_HOME")}
+
+
 @pytest.mark.parametrize(("make", "warns"), [("mkdir", False), ("touch", True), ("true", False)])
-def test_logs_that_cannot_be_written_are_named_with_what_mends_it(tmp_path, make, warns):
+def test_logs_that_cannot_be_written_go_elsewhere_with_a_line_that_says_what_mends_it(tmp_path, make, warns):
     logs = tmp_path / "log"
     subprocess.run([make, str(logs)], check=True)
-    script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; warn_of_logs'
-    environment = {"PATH": "/usr/bin:/bin", "HOME": "/nowhere", "ROS_LOG_DIR": str(logs)}
-    done = subprocess.run(["bash", "-c", script], env=environment,
-                          capture_output=True, text=True)
-    assert done.returncode == 0
-    assert (f"cannot write to {logs}" in done.stderr and "sudo chown -R" in done.stderr) == warns
-    assert warns or not done.stderr
+    said, found = writable_folders(tmp_path, ROS_LOG_DIR=str(logs))
+    assert (f"cannot write to {logs}" in said and "sudo chown -R" in said) == warns
+    assert warns or not said
+    assert found == {"ROS_LOG_DIR": f"{tmp_path}/temporary/baxter_home_{os.getuid()}/log" if warns else str(logs)}
+
+
+def test_a_lab_starts_with_a_home_that_cannot_be_written(tmp_path):
+    """As a read-only one; a device stands for it, since root may write anywhere."""
+    said, found = writable_folders(tmp_path, HOME="/dev/null")
+    spare = Path(f"{tmp_path}/temporary/baxter_home_{os.getuid()}")
+    assert "cannot write to /dev/null/.ros" in said and said.count("\n") == 1
+    assert found == {"ROS_HOME": str(spare), "ROS_LOG_DIR": f"{spare}/log", "XDG_CACHE_HOME": f"{spare}/cache"}
+    assert spare.stat().st_mode & 0o777 == 0o700
