@@ -184,6 +184,45 @@ def test_every_argument_is_explained(name):
         assert argument.get("doc"), argument.get("name")
 
 
+CONTEXT = {"load_robot_description", "left_electric_gripper", "right_electric_gripper", "left_tip_name", "right_tip_name"}
+RVIZ, CAMERAS = {"config", "rviz_config"}, {"kinect", "xtion", "camera_link_pose"}
+
+
+@pytest.mark.parametrize(("name", "arguments"), [
+    ("move_group.launch", {"debug", "info", "allow_trajectory_execution", "fake_execution", "max_safe_path_cost",
+                           "jiggle_fraction", "publish_monitored_planning_scene", "planner"} | CAMERAS),
+    ("planning_context.launch", CONTEXT | {"robot_description"}),
+    ("moveit_rviz.launch", RVIZ | {"debug"}),
+    ("baxter_grippers.launch", CONTEXT | RVIZ | CAMERAS),
+    ("demo_baxter.launch", CONTEXT | RVIZ | CAMERAS | {"planner", "debug"}),
+    ("demo_kinect.launch", CONTEXT | RVIZ | {"planner", "debug", "camera_link_pose"}),
+    ("demo_xtion.launch", CONTEXT | RVIZ | {"planner", "debug", "camera_link_pose"}),
+    ("demo_dummy.launch", CONTEXT - {"load_robot_description"} | RVIZ | CAMERAS | {"planner", "debug", "use_gui", "db",
+                                                                                   "db_path"})])
+def test_every_argument_of_the_vendors_files_is_there(name, arguments):
+    """roslaunch refuses an argument that an included file does not have."""
+    there = {argument.get("name") for argument in etree.parse(str(PACKAGE / "launch" / name)).iterfind("/arg")}
+    assert arguments <= there, sorted(arguments - there)
+
+
+def test_the_planning_server_alone_has_all_that_it_waits_for_but_the_robot():
+    values = parameters("move_group.launch")
+    assert "left_neutral" in values["/robot_description_semantic"] and "/robot_description" not in values
+    assert values["/robot_description_planning/joint_limits/left_s0/max_velocity"] == 0.75
+    assert values["/robot_description_kinematics/left_arm/kinematics_solver"]
+    values = parameters("move_group.launch", "load_robot_description:=true", "planner:=pilz_industrial_motion_planner")
+    assert values["/robot_description"].startswith("<?xml")
+    assert any(key.startswith("/move_group/planning_pipelines/pilz") for key in values)
+    assert parameters("baxter_planning_execution.launch", "left_tip_name:=left_wrist")[
+        "/robot_description_semantic"].count("left_wrist") > values["/robot_description_semantic"].count("left_wrist")
+
+
+@pytest.mark.parametrize(("name", "plugin"), [("demo_kinect.launch", "PointCloud"), ("demo_xtion.launch", "DepthImage")])
+def test_the_demo_of_a_camera_is_the_whole_demo(name, plugin):
+    assert plugin in parameters(name)["/move_group/sensors"][0]["sensor_plugin"]
+    assert {"move_group", "camera_link_broadcaster"} <= {node.name for node in load(name).nodes}
+
+
 def test_the_tutorials_command():
     values = parameters("demo_baxter.launch", "right_electric_gripper:=true", "left_electric_gripper:=true")
     assert "/robot_description" not in values

@@ -179,6 +179,16 @@ def test_fake_arms_move_as_asked_for(arguments):
     assert config.params["/move_group/controller_list"].value[0]["type"] == "last point"
 
 
+@pytest.mark.parametrize(("name", "arguments"), [
+    ("move_group.launch", "gazebo debug info allow_trajectory_execution fake_execution max_safe_path_cost jiggle_fraction "
+                          "publish_monitored_planning_scene capabilities disable_capabilities"),
+    ("planning_context.launch", "load_robot_description robot_description"),
+    ("moveit_rviz.launch", "debug config"), ("demo.launch", "db db_path debug use_gui")])
+def test_every_argument_of_the_originals_is_there(name, arguments):
+    there = {argument.get("name") for argument in etree.parse(str(PACKAGE / "launch" / name)).iterfind("/arg")}
+    assert set(arguments.split()) <= there
+
+
 def run(executable, *arguments, **environment):
     environment = {**os.environ, **environment}
     return subprocess.run([str(PACKAGE / "nodes" / executable), *arguments], env=environment, text=True,
