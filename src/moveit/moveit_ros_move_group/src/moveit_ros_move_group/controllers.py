@@ -12,6 +12,12 @@ _FAKE_TYPES = ("interpolate", "via points", "last point")
 _MOST_TO_COMBINE = 12
 
 
+# What serves well-known actions, for configurations that do not say it: (beginning, end of the action's name, command).
+_SERVERS = (
+    ("robot/limb/", "/follow_joint_trajectory", "rosrun baxter_interface joint_trajectory_action_server.py"),
+    ("robot/end_effector/", "/gripper_action", "rosrun baxter_interface gripper_action_server.py"))
+
+
 class ControllerError(PlanningError):
     """No set of controllers fits; the sentence names the joints."""
 
@@ -33,6 +39,16 @@ class Controller:
 
     def __str__(self):
         return "'%s'" % (self.action or self.name)
+
+    @property
+    def remedy(self):
+        """What to do where the action does not answer, the command that starts its server if that is known."""
+        action = self.action.lstrip("/")
+        command = self.options.get("started_by") or next(
+            (line for begin, end, line in _SERVERS if action.startswith(begin) and action.endswith(end)), None)
+        if command:
+            return "start its server: %s" % command
+        return "start the controller that serves it, or correct its name in controller_list"
 
 
 def read_list(entries, fake=False):

@@ -104,6 +104,12 @@ class Executor:
             return str(error)
         return None
 
+    def silent(self, timeout_s):
+        """Return the Controllers whose actions do not answer within ``timeout_s`` [s, wall time] in all."""
+        deadline = time.monotonic() + timeout_s
+        return [controller for controller in self._controllers()
+                if not self._handle_of(controller).connected(max(0.0, deadline - time.monotonic()))]
+
     def _follow(self, trajectory, preempted, invalidated, from_anywhere):
         def given_up():
             return self._stop.is_set() or preempted()
@@ -117,8 +123,8 @@ class Executor:
             if not handle.connected(self.settings.connection_timeout, given_up):
                 if given_up():
                     return Outcome(MoveItErrorCodes.PREEMPTED, "stopped on request")
-                return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; is "
-                               "the controller running, and is its name in controller_list right?" % controller)
+                return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; %s"
+                               % (controller, controller.remedy))
         try:
             for controller, handle in zip(chosen, handles, strict=True):
                 handle.send(part_of(trajectory, controller.joints))

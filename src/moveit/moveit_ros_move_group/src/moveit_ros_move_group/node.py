@@ -28,6 +28,8 @@ from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
 # Wall time to wait for the robot's model [s].
 _DESCRIPTION_TIMEOUT_S = 60.0
+# Wall time after the start in which controllers may come up before they are missed [s].
+_CONTROLLERS_TIMEOUT_S = 10.0
 
 _DESCRIPTION = """Plan and execute motions behind MoveIt's interface.
 
@@ -118,6 +120,22 @@ def _capabilities(context, wanted, description, may_execute):
     return made + tuning.servers(context.executor, context.monitor, move_action)
 
 
+def tell_of_silent_controllers(executor):
+    """Warn of controllers that do not answer, by which command they are started. Servers may start after this node."""
+    if executor is None:
+        return
+    try:
+        silent = {}
+        for controller in executor.silent(_CONTROLLERS_TIMEOUT_S):
+            silent.setdefault(controller.remedy, []).append(str(controller))
+        for remedy, names in silent.items():
+            if not rospy.is_shutdown():
+                rospy.logwarn("no answer yet from %s: plans for its joints cannot be executed; %s", ", ".join(names),
+                              remedy)
+    except PlanningError as error:
+        rospy.logwarn("%s", error)
+
+
 def main():
     parser = argparse.ArgumentParser(description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--debug", action="store_true", help="log more")
@@ -127,7 +145,7 @@ def main():
         limit_ports()
         rospy.init_node("move_group", disable_signals=True, log_level=rospy.DEBUG if options.debug else rospy.INFO)
         logging.getLogger("actionlib").setLevel(logging.WARNING)
-        kept = build()  # noqa: F841  (keeps services and subscribers alive)
+        kept = build()
     except (PlanningError, MissingParameter, rospy.ROSInitException) as error:
         if not rospy.is_shutdown():
             sys.exit("move_group: %s" % error)
@@ -135,4 +153,5 @@ def main():
     compiler_pages.release()
     # Scripts wait for this line.
     print("\nYou can start planning now!\n", flush=True)
+    tell_of_silent_controllers(kept[0].executor)
     rospy.spin()

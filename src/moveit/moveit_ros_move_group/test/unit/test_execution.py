@@ -12,7 +12,7 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from lab_testing.waiting import wait_until
-from moveit_ros_move_group import handles
+from moveit_ros_move_group import handles, node
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings, Executor
 
@@ -305,3 +305,27 @@ def test_a_fake_controller_that_was_cancelled_plays_what_comes_next():
 @pytest.mark.parametrize("rate", [0, -1.0, "fast", None])
 def test_a_rate_that_is_none_counts_as_ten_times_a_second(rate):
     assert fake("interpolate", rate=rate)._step == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("entry", "named"), [
+    ({"name": "/robot/limb/left", "action_ns": "follow_joint_trajectory"}, "joint_trajectory_action_server.py"),
+    ({"name": "robot/end_effector/left_gripper", "action_ns": "gripper_action"}, "gripper_action_server.py"),
+    ({"name": "arm", "action_ns": "follow", "started_by": "rosrun my_robot arm_server"}, "my_robot arm_server"),
+    ({"name": "arm", "action_ns": "follow"}, "controller_list")])
+def test_a_controller_that_does_not_answer_is_named_with_the_command_that_starts_it(entry, named, monkeypatch):
+    """When a motion fails, and already at the start."""
+    controllers, _ = read_list([{**entry, "type": "FollowJointTrajectory", "joints": list(JOINTS)}])
+    missing = Handle(there=False)
+    executor = Executor(lambda: controllers, ExecutionSettings(connection_timeout=0.01), Joints(), lambda _: missing)
+    outcome = executor.execute(trajectory(1.0))
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED and named in outcome.text and entry["name"] in outcome.text
+    told = []
+    monkeypatch.setattr(node, "_CONTROLLERS_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    monkeypatch.setattr(rospy, "logwarn", lambda text, *values: told.append(text % values))
+    node.tell_of_silent_controllers(executor)
+    assert len(told) == 1 and named in told[0] and entry["name"] in told[0]
+    missing.there = True
+    node.tell_of_silent_controllers(executor)
+    node.tell_of_silent_controllers(None)
+    assert len(told) == 1
