@@ -54,6 +54,8 @@ class Records:
         self._path = path
         self.outcomes = {}  # {seed: the newest Outcome}
         self.header = header = {"job": spec.name, "parameters": spec.parameters, "versions": found_versions}
+        if path.is_fifo():  # opening it would wait for a reader
+            raise RecordsError("%s is a named pipe; name a file with --out" % path)
         path.parent.mkdir(parents=True, exist_ok=True)
         self._stream = path.open("a", encoding="utf-8")
         try:

@@ -281,6 +281,12 @@ def test_wrong_options_say_what_is_expected(capsys, words, text):
     assert caught.value.code == 2 and text in capsys.readouterr().err
 
 
+def test_a_named_pipe_is_not_waited_for(tmp_path, capsys):
+    os.mkfifo(tmp_path / "pipe")
+    assert run(SQUARE, "--seeds", "0:2", "--out", tmp_path / "pipe") == 1
+    assert "named pipe" in capsys.readouterr().err
+
+
 def test_a_disk_without_space_ends_the_batch_with_one_line(capsys):
     assert run(SQUARE, "--seeds", "0:2", "--out", "/dev/full") == 1
     assert capsys.readouterr().err.startswith("batch: [Errno 28]")
