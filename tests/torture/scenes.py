@@ -23,8 +23,8 @@ SIZES = (0.0, 1e-9, 1e-4, 0.01, 0.1, 0.3, 1.0, 10.0, 1e3, 1e5)
 STATES = 12
 _LESS = 50
 URDF = """<robot name="reacher"><link name="base"/>%s</robot>""" % "".join("""
-    <link name="link_%d"><collision><origin xyz="0 0 0.15"/><geometry><box size="0.06 0.06 0.28"/></geometry></collision>
-    </link>
+    <link name="link_%d"><collision><origin xyz="0 0 0.15"/><geometry><box size="0.06 0.06 0.28"/></geometry>
+    </collision></link>
     <joint name="joint_%d" type="revolute"><origin xyz="0 0 %g"/><parent link="%s"/><child link="link_%d"/>
     <axis xyz="%s"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>""" % (
         k, k, 0.3 if k else 0.0, "link_%d" % (k - 1) if k else "base", k, "0 1 0" if k % 2 else "1 0 0")

@@ -184,7 +184,8 @@ def test_every_argument_is_explained(name):
         assert argument.get("doc"), argument.get("name")
 
 
-CONTEXT = {"load_robot_description", "left_electric_gripper", "right_electric_gripper", "left_tip_name", "right_tip_name"}
+CONTEXT = {"load_robot_description", "left_electric_gripper", "right_electric_gripper", "left_tip_name",
+           "right_tip_name"}
 RVIZ, CAMERAS = {"config", "rviz_config"}, {"kinect", "xtion", "camera_link_pose"}
 
 
@@ -217,7 +218,8 @@ def test_the_planning_server_alone_has_all_that_it_waits_for_but_the_robot():
         "/robot_description_semantic"].count("left_wrist") > values["/robot_description_semantic"].count("left_wrist")
 
 
-@pytest.mark.parametrize(("name", "plugin"), [("demo_kinect.launch", "PointCloud"), ("demo_xtion.launch", "DepthImage")])
+@pytest.mark.parametrize(("name", "plugin"), [("demo_kinect.launch", "PointCloud"),
+                                              ("demo_xtion.launch", "DepthImage")])
 def test_the_demo_of_a_camera_is_the_whole_demo(name, plugin):
     assert plugin in parameters(name)["/move_group/sensors"][0]["sensor_plugin"]
     assert {"move_group", "camera_link_broadcaster"} <= {node.name for node in load(name).nodes}

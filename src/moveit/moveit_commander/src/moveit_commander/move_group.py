@@ -95,7 +95,8 @@ class MoveGroupCommander(Targeting):
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name):
-        """Make poses be for this link. Raises MoveItCommanderException for an unknown link."""
+        """Make poses be for this link, attached object or "object/subframe" of one. Raises MoveItCommanderException for
+        a name that is neither."""
         self._end_effector_link = self._known_link(link_name)
 
     def get_interface_description(self):
@@ -162,7 +163,10 @@ class MoveGroupCommander(Targeting):
         return states.state_of(self._model, message)
 
     def _frame_of(self, state, link):
-        return self._model.frame_of(state.q, self._link(link, "get the pose of"), state.base)
+        link, within = self._link(link, "get the pose of"), np.eye(4)
+        if link not in self._model.links:
+            link, within = scene_calls.held_frame(self._connection, link)
+        return self._model.frame_of(state.q, link, state.base) @ within
 
     def _link(self, link, purpose):
         """The link that a caller means; the end effector's where he names none."""
@@ -173,7 +177,7 @@ class MoveGroupCommander(Targeting):
 
     def _known_link(self, link):
         if link not in self._model.links:
-            raise MoveItCommanderException("the robot has no link '%s'" % link)
+            scene_calls.held_frame(self._connection, link)
         return link
 
     @staticmethod

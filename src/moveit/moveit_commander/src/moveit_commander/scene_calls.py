@@ -3,6 +3,9 @@
 import rospy
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
 
+from .conversions import matrix_of
+from .exception import MoveItCommanderException
+
 
 def scene(connection, components):
     """Return the PlanningScene with the parts that ``components``, a sum of PlanningSceneComponents' numbers, names."""
@@ -15,6 +18,20 @@ def robot_state(connection):
                   | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS).robot_state
     state.joint_state.header.stamp = state.multi_dof_joint_state.header.stamp = rospy.Time()
     return state
+
+
+def held_frame(connection, name):
+    """Return (link, pose (4, 4) in it) of an attached object, or of "object/subframe" of one. Raises
+    MoveItCommanderException for other names."""
+    owner, _, subframe = name.rpartition("/")
+    for body in robot_state(connection).attached_collision_objects:
+        one = body.object
+        if one.id == name:
+            return body.link_name, matrix_of(one.pose)
+        if one.id == owner and subframe in one.subframe_names:
+            return body.link_name, matrix_of(one.pose) @ matrix_of(
+                one.subframe_poses[one.subframe_names.index(subframe)])
+    raise MoveItCommanderException("the robot has no link '%s', and holds no object or subframe of that name" % name)
 
 
 def difference():

@@ -6,13 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import (
-    MoveItErrorCodes,
-    RobotState,
-)
+from moveit_msgs.msg import AttachedCollisionObject, MoveItErrorCodes, RobotState
 from sensor_msgs.msg import JointState
 
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, conversions
+from moveit_commander.conversions import matrix_of
 
 
 def pose_stamped(frame, *values):
@@ -183,3 +181,25 @@ def test_bad_poses_are_refused(arm):
                        (lambda: arm.set_pose_target([0.0] * 6, "toe"), "no link 'toe'")):
         with pytest.raises(MoveItCommanderException, match=text):
             call()
+
+
+def test_what_the_robot_holds_and_its_subframes_are_end_effector_links(arm, connection):
+    """As for MoveIt: plans by message with these links work, and so do these methods."""
+    held = AttachedCollisionObject(link_name="tool")
+    held.object.id, held.object.pose = "pen", Pose(Point(0.0, 0.0, 0.1), Quaternion(0.0, 0.0, 0.0, 1.0))
+    held.object.subframe_names = ["tip"]
+    held.object.subframe_poses = [Pose(Point(0.2, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))]
+    connection.held = [held]
+    tool = matrix_of(arm.get_current_pose().pose)
+    for name, point in (("pen", (0.0, 0.0, 0.1, 1.0)), ("pen/tip", (0.2, 0.0, 0.1, 1.0))):
+        arm.set_end_effector_link(name)
+        assert arm.get_end_effector_link() == name
+        assert np.allclose(matrix_of(arm.get_current_pose().pose)[:, 3], tool @ point)
+        arm.clear_pose_targets()
+        arm.set_pose_target([0.1, 0.2, 0.3, 0.0, 0.0, 0.0])
+        arm.set_pose_target([0.1, 0.2, 0.3, 0.0, 0.0, 0.0], name)
+        goal = arm.construct_motion_plan_request().goal_constraints[0]
+        assert goal.position_constraints[0].link_name == name == goal.orientation_constraints[0].link_name
+    for name in ("pen/cap", "pencil", "tip"):
+        with pytest.raises(MoveItCommanderException, match="holds no object or subframe"):
+            arm.set_pose_target([0.0] * 6, name)

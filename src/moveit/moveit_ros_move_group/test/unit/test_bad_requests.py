@@ -10,10 +10,11 @@ from moveit_msgs.msg import MoveItErrorCodes
 
 from lab_testing.waiting import wait_until
 from motion_planning.scene import Scene
+from moveit_ros_move_group.convert.geometry import matrix_of, pose_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bad_requests import cases, flaws_of, outcome  # noqa: E402
-from good_requests import good_requests, many_objects, nothing_left  # noqa: E402
+from good_requests import good_requests, many_objects, nothing_left, pose  # noqa: E402
 from in_process import Node  # noqa: E402
 from small_arm import SIX, joint_state, parameters  # noqa: E402
 
@@ -48,6 +49,25 @@ def test_good_requests_succeed(node, endpoint):
     code, text = outcome(node.ask(endpoint, good_requests(SIX)[endpoint]))
     assert code in (None, MoveItErrorCodes.SUCCESS), text
     assert not failures(node)
+
+
+def test_poses_of_what_is_held_and_of_its_subframes_are_solved(node):
+    """A subframe 0.1 m in front of the tip: where it is, the tip is 0.1 m behind."""
+    held = good_requests(SIX)["attached_collision_object"]
+    held.object.header.frame_id = SIX.tip
+    held.object.subframe_names, held.object.subframe_poses = ["end"], [pose(0.0, 0.0, 0.1)]
+    node.ask("attached_collision_object", held)
+    request = good_requests(SIX)["compute_ik"]
+    tip = node.ask("compute_ik", request)
+    ahead = matrix_of(request.ik_request.pose_stamped.pose) @ matrix_of(pose(0.0, 0.0, 0.1))
+    for link, there in (("held", request.ik_request.pose_stamped.pose), ("held/end", pose_of(ahead))):
+        request.ik_request.ik_link_name, request.ik_request.pose_stamped.pose = link, there
+        found = node.ask("compute_ik", request)
+        assert found.error_code.val == MoveItErrorCodes.SUCCESS
+        for one, other in zip(found.solution.joint_state.position, tip.solution.joint_state.position, strict=True):
+            assert abs(one - other) < 1e-3
+    request.ik_request.ik_link_name = "held/nothing"
+    assert node.ask("compute_ik", request).error_code.val == MoveItErrorCodes.INVALID_LINK_NAME
 
 
 def asked(node, case):

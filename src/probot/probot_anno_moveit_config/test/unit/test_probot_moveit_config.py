@@ -180,8 +180,8 @@ def test_fake_arms_move_as_asked_for(arguments):
 
 
 @pytest.mark.parametrize(("name", "arguments"), [
-    ("move_group.launch", "gazebo debug info allow_trajectory_execution fake_execution max_safe_path_cost jiggle_fraction "
-                          "publish_monitored_planning_scene capabilities disable_capabilities"),
+    ("move_group.launch", "gazebo debug info allow_trajectory_execution fake_execution max_safe_path_cost capabilities "
+                          "jiggle_fraction publish_monitored_planning_scene disable_capabilities"),
     ("planning_context.launch", "load_robot_description robot_description"),
     ("moveit_rviz.launch", "debug config"), ("demo.launch", "db db_path debug use_gui")])
 def test_every_argument_of_the_originals_is_there(name, arguments):

@@ -9,7 +9,8 @@ from motion_planning.constraints.targets import (
     OrientationTarget,
     PositionTarget,
     VisibilityTarget,
+    holder,
 )
 
 __all__ = ["ConstraintError", "ConstraintSet", "Evaluation", "JointTarget", "OrientationTarget", "PositionTarget",
-           "Sampler", "VisibilityTarget", "sampler"]
+           "Sampler", "VisibilityTarget", "holder", "sampler"]

@@ -102,7 +102,7 @@ class PositionTarget:
 
     def resolved(self, scene):
         frame = _frame(scene, self.frame)
-        link, inside = _holder(scene, self.link)
+        link, inside = holder(scene, self.link)
         placed = tuple((shape, frame @ pose) for shape, pose in self.regions)
         return replace(self, link=link, offset=inside[:3, :3] @ self.offset + inside[:3, 3], regions=placed, frame="")
 
@@ -160,7 +160,7 @@ class OrientationTarget:
             abs(angle) - allowed for angle, allowed in zip(angles, self.tolerances, strict=True)))
 
     def resolved(self, scene):
-        link, inside = _holder(scene, self.link)
+        link, inside = holder(scene, self.link)
         rotation = _frame(scene, self.frame)[:3, :3] @ self.rotation
         return replace(self, link=link, rotation=rotation, frame="", axes=inside[:3, :3] @ self.axes)
 
@@ -268,8 +268,9 @@ def _frame(scene, name):
         raise ConstraintError("a constraint names a frame: %s" % error) from None
 
 
-def _holder(scene, name):
-    """(link, pose (4, 4) in it) of a link, of an attached object, or of an object's subframe."""
+def holder(scene, name):
+    """Return (link, pose (4, 4) in it) of a link, of an attached object, or of an object's subframe. Raises
+    ConstraintError for other names."""
     if name in scene.model.link_index:
         return name, np.eye(4)
     owner = name if name in scene.state.attached else name.rpartition("/")[0]

@@ -6,6 +6,8 @@ from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
 
 from motion_planning.cartesian import CartesianError, Steps, cartesian_path
+from motion_planning.constraints import holder
+from motion_planning.errors import PlanningError
 from motion_planning.timing import LONGEST_S, time_path
 from moveit_ros_move_group.context import RequestError, answered
 from moveit_ros_move_group.convert.constraints import constraint_set_of
@@ -60,14 +62,12 @@ class CartesianPath:
         """A link of the robot for one that may be an object it holds; the waypoints are changed to fit."""
         if link in self.context.model.link_index:
             return link
-        body = scene.state.attached.get(link.partition("/")[0])
-        if body is None:
-            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "'%s' is neither a link nor held by the robot"
-                               % link)
-        holder = scene.frame(body.link)
-        offset = np.linalg.inv(scene.frame(link)) @ holder
-        waypoints[:] = [waypoint @ offset for waypoint in waypoints]
-        return body.link
+        try:
+            link, within = holder(scene, link)
+        except PlanningError as error:
+            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, str(error)) from None
+        waypoints[:] = [waypoint @ np.linalg.inv(within) for waypoint in waypoints]
+        return link
 
     def _acceptance(self, request, scene, group):
         remarks = []

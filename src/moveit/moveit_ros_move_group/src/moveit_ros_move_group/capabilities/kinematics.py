@@ -4,6 +4,7 @@ import rospy
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPositionFK, GetPositionFKResponse, GetPositionIK, GetPositionIKResponse
 
+from motion_planning.constraints import holder
 from motion_planning.errors import PlanningError
 from motion_planning.kinematics import ik
 from moveit_ros_move_group.context import RequestError, answered
@@ -63,14 +64,17 @@ class Kinematics:
             if links == [None]:
                 raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is not a chain; name a link for the "
                                    "pose" % group.name)
-        twice = next((link for k, link in enumerate(links) if link in links[:k]), None)
-        if twice is not None:
-            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "two poses are given for link '%s'" % twice)
-        unknown = [link for link in links if link not in self.context.model.link_index]
-        if unknown:
-            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "the robot has no link '%s'" % unknown[0])
-        return {link: self.context.frame(scene, pose.header.frame_id) @ matrix_of(pose.pose, "the pose of '%s'" % link)
-                for link, pose in zip(links, poses, strict=True)}
+        found = {}
+        for name, pose in zip(links, poses, strict=True):
+            try:
+                link, within = holder(scene, name)
+            except PlanningError as error:
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, str(error)) from None
+            if link in found:
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "two poses are given for link '%s'" % link)
+            frame = self.context.frame(scene, pose.header.frame_id)
+            found[link] = frame @ matrix_of(pose.pose, "the pose of '%s'" % name) @ inverse(within)
+        return found
 
     @answered("compute_fk", GetPositionFKResponse)
     def _fk(self, request, response):
