@@ -7,6 +7,7 @@ import os
 import re
 import secrets
 import socket
+import sys
 import threading
 import time
 from functools import partial
@@ -22,6 +23,7 @@ import rospy
 from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
 from lab_environment import jupyter, page_files, ports
+from lab_environment.simulator_start import SimulatorDied, StartWatch
 from lab_web.buttons import Buttons
 from lab_web.comparison import Comparison, findings_of
 from lab_web.errands import Errands
@@ -69,6 +71,8 @@ _LARGEST_PORT = 65535
 _POSES_S, _LOOK_S, _LOOK_UNSEEN_S, _UNSEEN_S = 0.05, 1.0, 5.0, 0.25
 # Between two looks at whether somebody needs the robot's states [s].
 _NEED_S = 0.1
+# The addresses are printed so long after the page is there at most, if the lab is still starting [s].
+_START_S = 60.0
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 # How long the comparison with a physical robot waits for the messages of some topics [s].
@@ -300,7 +304,7 @@ def _port(options):
 
 
 def _announce(port, tokens, public):
-    """Print the addresses; returns the operator's."""
+    """Make the addresses known, and print them once the lab has started; returns the operator's."""
     host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
     address = "http://%s:%d/" % (host, port)
     # A token of the user may hold signs that mean something else in an address.
@@ -309,13 +313,33 @@ def _announce(port, tokens, public):
     # Notebooks of this user find it there; a folder that cannot be written costs only that.
     with contextlib.suppress(OSError):
         page_files.write_address(rosgraph.get_master_uri(), operators)
-    print("Open in a browser:\n\n    %s\n\nTo watch, and to stop the robot:\n\n    %s\n" % (operators, viewers),
-          flush=True)
-    if public:
-        print("Port %d is open to every machine of the network: who has the first address moves the robot. The "
-              "connection is not encrypted.\n" % port, flush=True)
-    print("Ctrl-C here ends the page; the lab goes on.", flush=True)
+    # roslaunch names its nodes; what else it starts still prints lines.
+    is_launched = "__name" in rosgraph.names.load_mappings(sys.argv)
+    text = announcement(operators, viewers, port if public else None, is_launched)
+    threading.Thread(target=_print_when_started, args=(text,), daemon=True).start()
     return operators
+
+
+def announcement(operators: str, viewers: str, public_port: int | None, is_launched: bool) -> str:
+    """What is printed of the addresses; the operator's is the last line."""
+    text = "To watch, and to stop the robot:\n\n    %s\n\n" % viewers
+    if public_port is not None:
+        text += ("Port %d is open to every machine of the network: who has the operator's address moves the robot. The "
+                 "connection is not encrypted.\n\n" % public_port)
+    if not is_launched:
+        text += "Ctrl-C here ends the page; the lab goes on.\n\n"
+    return text + "Open in a browser:\n\n    %s" % operators
+
+
+def _print_when_started(text):
+    """Print a text once no process of the lab is starting any more, or after _START_S."""
+    watch, deadline = StartWatch(rosgraph.get_master_uri(), rospy.get_name()), time.monotonic() + _START_S
+    # A lab that ends meanwhile says so itself.
+    with contextlib.suppress(SimulatorDied):
+        while watch.look() and time.monotonic() < deadline and not rospy.is_shutdown():
+            rospy.rostime.wallsleep(_LOOK_S)
+    if not rospy.is_shutdown():
+        print(text, flush=True)
 
 
 def _watch(robot, equipment, pages, is_needed, ends):
