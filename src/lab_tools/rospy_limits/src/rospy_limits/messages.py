@@ -46,6 +46,20 @@ def checked_read(read_messages):
     return read
 
 
+def checked_answer(read_messages):
+    """``TCPROSServiceClient.read_messages``, with the same limit for what a service answers: its first byte says
+    whether it is fine, then comes the length."""
+
+    def read(protocol, buffer, message_queue, connection):
+        if buffer.tell() > _LENGTH.size:
+            length, = _LENGTH.unpack(buffer.getbuffer()[1:1 + _LENGTH.size])
+            if length > largest_message_bytes():
+                raise MessageTooLarge(limits.size_fault(length, largest_message_bytes()))
+        read_messages(protocol, buffer, message_queue, connection)
+
+    return read
+
+
 def reported_receive(receive_once, events):
     """``TCPROSTransport.receive_once``, with a line about a publisher whose message is too large."""
 

@@ -24,11 +24,16 @@ def lasting_run(run: Callable, faults) -> Callable:
 
 
 def limited_update(update: Callable) -> Callable:
-    """``ROSHandler.publisherUpdate``, which refuses more publishers than a topic can have: each gets a thread."""
+    """``ROSHandler.publisherUpdate``, which refuses what would cost a thread each for ever: more publishers than a
+    topic can have, and addresses that nobody can be called at."""
     @functools.wraps(update)
     def limited(self, *arguments):
-        if len(arguments) == 3 and isinstance(arguments[2], list) and len(arguments[2]) > limits.PUBLISHERS:
-            return -1, "%d publishers of a topic, at most %d are taken" % (len(arguments[2]), limits.PUBLISHERS), 0
+        publishers = arguments[2] if len(arguments) == 3 and isinstance(arguments[2], list) else ()
+        if len(publishers) > limits.PUBLISHERS:
+            return -1, "%d publishers of a topic, at most %d are taken" % (len(publishers), limits.PUBLISHERS), 0
+        for address in publishers:
+            if isinstance(address, str) and not address.startswith("http://"):
+                return -1, "%s is no address of a publisher, expected http://HOST:PORT/" % ascii(address[:100]), 0
         return update(self, *arguments)
     return limited
 
