@@ -9,7 +9,7 @@ import unittest
 
 import actionlib
 import rospy
-from control_msgs.msg import FollowJointTrajectoryAction
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryActionGoal
 from sensor_msgs.msg import JointState
 
 from lab_testing.waiting import stretched, wait_for_message, wait_until
@@ -47,8 +47,22 @@ class BringupTest(unittest.TestCase):
         self.assertEqual(len(state.name), 6)
         self.assertIn("manipulator", rospy.get_param("/robot_description_semantic"))
 
+        goals = []
+        listener = rospy.Subscriber("/probot_anno/arm_joint_controller/follow_joint_trajectory/goal",
+                                    FollowJointTrajectoryActionGoal, goals.append)
+        self.addCleanup(listener.unregister)
+        wait_until(lambda: listener.get_num_connections() > 0, "move_group's goals to be heard", TIMEOUT_S)
         group = MoveGroupCommander("manipulator", wait_for_servers=TIMEOUT_S)
         self.assertTrue(group.go("upward"))
+        # As on the slide, except for the frame, which is the root of our description.
+        wait_until(lambda: goals, "the goal that was sent", TIMEOUT_S)
+        self.assertRegex(goals[0].goal_id.id, r"^/move_group-\d+-%d\.%d$" % (
+            goals[0].goal_id.stamp.secs, goals[0].goal_id.stamp.nsecs))
+        trajectory = goals[0].goal.trajectory
+        self.assertEqual(trajectory.joint_names, ["joint_%d" % number for number in range(1, 7)])
+        self.assertEqual(trajectory.header.frame_id, "world")
+        first = trajectory.points[0]
+        self.assertEqual((first.velocities, first.effort, first.time_from_start.to_sec()), ((0.0,) * 6, (), 0.0))
         upward = group.get_named_target_values("upward")
         wait_for_message("/probot_anno/joint_states", JointState, lambda message: all(
             abs(position - upward[name]) < 0.02 for name, position in zip(message.name, message.position, strict=True)))
