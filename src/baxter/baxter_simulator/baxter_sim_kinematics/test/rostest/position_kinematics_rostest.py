@@ -287,6 +287,7 @@ class PositionKinematics(unittest.TestCase):
         start = time.monotonic()
         answer = self.assert_logged("cannot relate frame 'nowhere'",
                                     lambda: self.ask("left", [pose(*LAB_POSE, "nowhere")] * 20))
+        self.assertTrue(any("nowhere" in line and "shelf" in line for line in self.log), self.log)
         self.assert_invalid(answer, 19, 20)
         # A second for each of the poses would be 20.
         self.assertLess(time.monotonic() - start, 15.0)
