@@ -20,7 +20,8 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "actionlib.action_client": "lab_environment.lost_goals",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
-           "rosgraph.roslogging": "lab_environment.full_disk",
+           "rosgraph.roslogging": "lab_environment.full_disk lab_environment.hidden_tokens",
+           "roslaunch.config": "lab_environment.hidden_tokens",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 #: Folders of the system's programs.

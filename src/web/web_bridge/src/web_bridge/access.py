@@ -8,8 +8,6 @@ operator lists.
 import fnmatch
 import hmac
 import ipaddress
-import logging
-import re
 import socket
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -18,14 +16,8 @@ from web_bridge.errors import Refused, shown
 
 #: The last part of the names of parameters that hold a server's tokens: whoever reads the first one may move the robot.
 _TOKENS = {"token", "view_token"}
-# A token in a text: in an address, a header, a parameter, an option.
-_TOKEN_IN_TEXT = re.compile(r"""((?:token["']?\s*[=:]\s*\[?b?["']?|--(?:view-)?token |\bbearer\s+))[^\s&;"'<>,)\]]+""",
-                            re.IGNORECASE)
 #: How the names of those services of rosapi begin that change something, set_logger_level of every node among them.
 _CHANGING = ("/rosapi/set_", "/rosapi/delete_")
-
-
-_TRACEBACKS = logging.Formatter()
 
 
 class Rules(NamedTuple):
@@ -69,34 +61,6 @@ def without_tokens(value):
     if not isinstance(value, dict):
         return value
     return {name: without_tokens(part) for name, part in value.items() if not is_token(name)}
-
-
-def hidden(text):
-    """A text with "…" in the place of each token, for a log: others may read that."""
-    return _TOKEN_IN_TEXT.sub(r"\1…", text)
-
-
-def hide_in_logs():
-    """From now on no record of this process's logs has a token in it: tornado logs the address of a request that fails.
-    """
-    make = logging.getLogRecordFactory()
-    if getattr(make, "hides_tokens", False):
-        return
-
-    def made(*args, **kwargs):
-        record = make(*args, **kwargs)
-        try:
-            said = record.getMessage()
-        except (TypeError, ValueError):
-            return record  # its arguments do not fit its text; the handler says so
-        if (clean := hidden(said)) != said:
-            record.msg, record.args = clean, ()
-        if record.exc_info:
-            # What a handler writes of an error, unless somebody has done so.
-            record.exc_text = hidden(_TRACEBACKS.formatException(record.exc_info))
-        return record
-    made.hides_tokens = True
-    logging.setLogRecordFactory(made)
 
 
 def patterns_of(text):
