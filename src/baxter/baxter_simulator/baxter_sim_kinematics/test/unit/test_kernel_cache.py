@@ -8,6 +8,7 @@ import sys
 import pytest
 
 import baxter_sim_kinematics
+import lab_environment
 import numba_cache
 import urdf_model
 
@@ -34,7 +35,7 @@ def copy(tmp_path):
     """A copy of the package that may be changed; run(code) -> the lines that it prints."""
     site = tmp_path / "site"
     package = site / "baxter_sim_kinematics"
-    for module in (baxter_sim_kinematics, numba_cache, urdf_model):
+    for module in (baxter_sim_kinematics, numba_cache, urdf_model, lab_environment):
         shutil.copytree(source_of(module), site / module.__name__, ignore=shutil.ignore_patterns("__pycache__"))
 
     def run(code=_POSE_ERROR, **environment):
