@@ -15,13 +15,13 @@ from urllib.parse import urlsplit
 
 import rospkg
 
-from lab_class import control, control_groups, memory, roster
+from lab_class import control, control_groups, memory
 from lab_class.disk import ENTRIES, entries_left, remove, room
 from lab_class.labs import ClassError, State
-from lab_class.roster import INSTRUCTOR, RosterError
 from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError, default_folder
-from lab_environment import isolation
+from lab_environment import isolation, roster
 from lab_environment.family import is_running
+from lab_environment.roster import INSTRUCTOR, RosterError
 from lab_environment.user_files import PIPE_WAIT_S, read_file
 from lab_web.libraries import LibrariesError, fetched
 

@@ -10,12 +10,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab_class import command, roster
+from lab_class import command
 from lab_class.disk import remove
 from lab_class.factors import factor_of
-from lab_class.roster import Student
 from lab_class.store import ClassRecord, Options, Store, StoreError, default_folder
 from lab_class.supervisor import Supervisor
+from lab_environment import roster
+from lab_environment.roster import Student
 
 
 def test_a_launch_file_of_this_folder_is_found_from_another(tmp_path, monkeypatch):

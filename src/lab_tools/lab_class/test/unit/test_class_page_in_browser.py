@@ -8,9 +8,10 @@ import pytest
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from lab_class import front_door, roster
+from lab_class import front_door
 from lab_class.labs import ClassError
 from lab_class.store import ClassRecord, Options
+from lab_environment import roster
 from lab_testing.browser import Browser, why_not
 from lab_testing.waiting import wait_until
 

@@ -5,9 +5,9 @@ import os
 
 import pytest
 
-from lab_class import roster
 from lab_class.labs import ClassError
 from lab_class.store import ClassRecord, Options, Store, StoreError
+from lab_environment import roster
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 """Rosters, as teachers' programs write them, and wrong ones."""
 import pytest
 
-from lab_class import roster
+from lab_environment import roster
 
 
 def test_a_number_of_students():
