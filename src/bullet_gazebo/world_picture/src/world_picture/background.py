@@ -88,6 +88,8 @@ class BackgroundDrawings(DrawingCache):
                 made = error
             except OSError as error:  # no room on the disk
                 made = LimitError(str(error))
+            except Exception as error:  # noqa: BLE001  (one mesh must not keep all later ones from being drawn)
+                made = LimitError("%s: %s" % (type(error).__name__, error))
             with self._changed:
                 self._made[key] = made
                 self._changed.notify_all()

@@ -94,7 +94,8 @@ def test_waiting_has_an_end(tmp_path, process):
     assert cache.is_making([caught.value.key])
 
 
-@pytest.mark.parametrize("failure", [LimitError("it took too long"), OSError("no space left")])
+@pytest.mark.parametrize("failure", [LimitError("it took too long"), OSError("no space left"),
+                                     ZeroDivisionError("an error that nobody foresaw")])
 def test_a_mesh_that_cannot_be_used_is_not_tried_again(tmp_path, process, failure):
     cache, process.failure = BackgroundDrawings(tmp_path / "cache"), failure
     path = ball(tmp_path / "1.obj", 1)
