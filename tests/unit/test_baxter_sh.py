@@ -41,7 +41,7 @@ def variables_after(tmp_path):
 
 def test_whether_set_up_is_due_does_not_depend_on_the_language(tmp_path):
     script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; fingerprint'
-    german = {**comma_locale.environment(tmp_path), "PATH": "/usr/bin:/bin"}
+    german = {**comma_locale.variables(tmp_path), "PATH": "/usr/bin:/bin"}
     seen = {
         subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True).stdout
         for environment in ({"PATH": "/usr/bin:/bin", "LC_ALL": "C"}, german)
