@@ -331,3 +331,23 @@ def test_a_wide_tolerance_may_be_used_up_to_its_edge(reacher):
             target = OrientationTarget("l5", wanted, tuple(angles + 2e-3))
             assert straight(reacher, ConstraintSet(orientations=[target]), start, goal), number
     assert looked > 15
+
+
+def test_a_goal_for_two_links_of_one_arm_is_sampled(reacher):
+    """The hand's position and a region for the elbow: so one chooses among the postures that put the hand there."""
+    scene, exact = reacher
+    choose = np.random.default_rng(7)
+    for number in range(10):
+        q = choose.uniform(-1.0, 1.0, 6)
+        hand, elbow = (scene.model.frame_of(q, link) for link in ("l5", "l2"))
+        goal = ConstraintSet(
+            positions=[PositionTarget("l2", [(Sphere(0.05), rigid(np.eye(3), elbow[:3, 3]))]),
+                       PositionTarget("l5", [(Sphere(0.005), rigid(np.eye(3), hand[:3, 3]))])],
+            orientations=[OrientationTarget("l5", hand[:3, :3], (0.2, 0.2, math.pi))])
+        found = next(iter(sampler(scene.model, "arm", goal, scene, exact, number)), None)
+        assert found is not None, number
+        assert goal.broken(scene.model, scene.state.with_q(found), scene) is None
+        far = goal.merged(ConstraintSet(positions=[
+            PositionTarget("l2", [(Sphere(0.05), rigid(np.eye(3), elbow[:3, 3] + 1.0))])]))
+        samples = sampler(scene.model, "arm", far, scene, exact, number)
+        assert next(samples, None) is None and samples.reason

@@ -8,6 +8,7 @@ from collections import Counter
 import numpy as np
 
 from motion_planning.constraints import regions
+from motion_planning.constraints.manifold import Manifold
 from motion_planning.constraints.targets import ConstraintError
 from motion_planning.kinematics import KinematicsFailure, NoIkSolution, limbs_of
 
@@ -162,11 +163,14 @@ class Sampler:
         """By inverse kinematics of poses within the tolerances, from the present posture and from random ones."""
         links = list(dict.fromkeys(one.link for one in constraints_with_links(self._constraints)))
         try:
-            limbs = limbs_of(self._model, self._group, links)
+            limbs = self._independent(links)
         except KinematicsFailure as error:
             self.reason = str(error)
             return
-        failed, patience = 0, _FAILED_POSES if self._is_wide() else _FAILED_POSES_IF_ONE
+        # Other links of the same chains are brought into their constraints by what the chains have left.
+        whole = None if len(limbs) == len(links) else Manifold(
+            self._scene, self._group, self._constraints, self._scene.state.q[self._group.indices])
+        failed, patience = 0, _FAILED_POSES if whole or self._is_wide() else _FAILED_POSES_IF_ONE
         first, known = True, np.empty((0, len(self._group)))
         while failed < patience:
             if self._stop is not None and self._stop():
@@ -174,6 +178,8 @@ class Sampler:
                 return
             failed += 1
             for q in self._solutions(limbs, first):
+                if whole is not None:
+                    q = self._brought(q, whole)
                 own = q[self._group.indices]
                 if (np.abs(known - own).max(axis=1, initial=0.0) < _SAME).any():
                     continue
@@ -181,6 +187,32 @@ class Sampler:
                 failed = 0
                 yield q
             first = False
+
+    def _independent(self, links):
+        """The limbs of those of ``links`` that share no joint, the most constrained ones first. Raises
+        KinematicsFailure."""
+        def weight(link):
+            many = sum(one.link == link for one in constraints_with_links(self._constraints))
+            return -many, -len(limbs_of(self._model, self._group, [link])[0].indices)
+
+        chosen = []
+        for link in sorted(links, key=weight):
+            try:
+                limbs_of(self._model, self._group, [*chosen, link])
+            except KinematicsFailure:
+                continue
+            chosen.append(link)
+        return limbs_of(self._model, self._group, chosen)
+
+    def _brought(self, q, manifold):
+        """``q`` (n,), or a posture near it that satisfies the constraints on all links, if one is found."""
+        own = q[self._group.indices]
+        near = None if manifold.keeps(own) else manifold.project(own)
+        if near is None:
+            return q
+        whole = np.array(q)
+        whole[self._group.indices] = near
+        return self._model.wrapped(whole)
 
     def _solutions(self, limbs, first):
         """Postures [q (n,), ...] that put each link of ``limbs`` at a pose within its constraints.
