@@ -19,6 +19,8 @@ def amend(tcpros_base):
     def validate_and_tell(self, header):
         # Service clients raise the answer themselves.
         reason = header.get("error", "")[:LONGEST_REASON]
+        # A terminal must not obey what a publisher answers.
+        reason = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in reason)
         is_service = self.protocol.direction == tcpros_base.BIDIRECTIONAL
         key = (self.name, self.endpoint_id, reason)
         if reason and not is_service and key not in told and len(told) < MOST_LINES:

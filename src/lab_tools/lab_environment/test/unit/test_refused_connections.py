@@ -31,6 +31,12 @@ def answered(protocol, header, publisher="/talker"):
     return connection
 
 
+def test_an_answer_for_the_terminal_is_only_shown(said):
+    with pytest.raises(tcpros_base.TransportInitError):
+        answered(TCPROSSub("/chatter", String), {"error": "\x1b[2Jno\nsuch topic"})
+    assert said[0].isprintable() and "\\x1b[2Jno\\nsuch topic" in said[0]
+
+
 def test_a_refusal_is_said_once_for_each_publisher(said):
     for publisher in ("/talker", "/talker", "/other"):
         with pytest.raises(tcpros_base.TransportInitError, match="do not match"):
