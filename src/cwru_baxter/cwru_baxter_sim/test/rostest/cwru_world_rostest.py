@@ -19,6 +19,7 @@ from std_srvs.srv import Empty
 
 from lab_testing.waiting import wait_for_message
 
+SIDES = ("left", "right")
 SIDE_M, AT = 0.06, (0.72, 0.15, 0.775)  # on the table; physics world
 BASE_Z = 0.93  # of the robot's base in the physics world
 CUBE = """<sdf version="1.6"><model name="cube"><static>true</static><link name="l"><pose>0 0 0.03 0 0 0</pose>
@@ -237,8 +238,8 @@ class CwruWorldTest(unittest.TestCase):
 
     def test_the_robot_stands_as_the_notes_have_it(self):
         states = wait_for_message("/robot/joint_states", JointState)
-        self.assertEqual(states.name, ["head_pan", *("%s_%s" % (side, joint) for side in ("left", "right") for joint in (
-            "e0", "e1", "s0", "s1", "w0", "w1", "w2"))])
+        joints = ("e0", "e1", "s0", "s1", "w0", "w1", "w2")
+        self.assertEqual(states.name, ["head_pan", *("%s_%s" % (side, joint) for side in SIDES for joint in joints)])
         self.assertEqual(states.header.frame_id, "")
         self.assertLess(max(map(abs, states.position)), 0.02)
         place = matrix_of(self.buffer.lookup_transform("head", "kinect_link", rospy.Time(), rospy.Duration(30.0)))
