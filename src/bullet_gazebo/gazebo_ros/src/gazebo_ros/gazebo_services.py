@@ -136,9 +136,10 @@ class GazeboServices:
         except SURVIVED as error:  # a plugin's constructor is user code
             self._log.error("spawning '%s' failed: %s" % (request.model_name, described(error)))
             return SpawnModelResponse(False, "SpawnModel: Failure - %s: %s" % (type(error).__name__, error))
-        self._ros.flush()
-        mended = "; %s" % prepared.mended if prepared.mended else ""
-        return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity%s" % mended)
+        notes = [prepared.mended] if prepared.mended else []
+        if not self._ros.flush():
+            notes.append("the ROS master has not answered yet, which must know its topics and services")
+        return SpawnModelResponse(True, "; ".join(["SpawnModel: Successfully spawned entity", *notes]))
 
     def _spawn_prepared(self, prepared, request):
         try:

@@ -6,8 +6,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from gazebo_msgs.srv import SpawnModelRequest
 
 from gazebo_ros import urdf_extras, world_file
+from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.spawning import Spawner, is_floor
 from gazebo_ros.urdf_extras import ExtrasError
@@ -48,6 +50,18 @@ def test_a_namespace_that_is_none_in_ros_is_refused_unless_a_plugin_has_its_own(
     with pytest.raises(urdf_extras.ExtrasError) as found:
         urdf_extras.namespace_of(none, namespace)
     assert "robot_namespace" in str(found.value) and "libb.so" in str(found.value) and str(found.value).isprintable()
+
+
+@pytest.mark.parametrize("answers", [True, False])
+def test_who_spawns_a_model_is_told_that_the_master_does_not_answer(answers):
+    services = object.__new__(GazeboServices)
+    services._spawner = SimpleNamespace(prepare=lambda *_: SimpleNamespace(mended="a box replaces it"),
+                                        make_shapes=lambda prepared: None)
+    services._simulation = SimpleNamespace(requests=SimpleNamespace(call=lambda *_: None))
+    services._ros = SimpleNamespace(flush=lambda: answers)
+    response = services._spawn_model(SpawnModelRequest(model_name="m", model_xml=URDF))
+    assert response.success and "a box replaces it" in response.status_message
+    assert ("ROS master" in response.status_message) is not answers
 
 
 class Plain(ModelPlugin):
