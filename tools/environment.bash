@@ -32,7 +32,7 @@ use_loopback() {
 # use_public [ADDRESS]: the simulator on this machine, for other machines too: all nodes announce an address that they
 # can connect to: ADDRESS, or ROS_IP or ROS_HOSTNAME if set, or this machine's address in its network.
 use_public() {
-    local address=${1:-} variable=ROS_IP port=11311
+    local address=${1:-} variable=ROS_IP port=11311 there=
     if [[ -z $address && -n ${ROS_HOSTNAME:-} ]] && ! is_loopback "$ROS_HOSTNAME"; then
         address=$ROS_HOSTNAME variable=ROS_HOSTNAME
     elif [[ -z $address && -n ${ROS_IP:-} ]] && ! is_loopback "$ROS_IP"; then
@@ -55,7 +55,8 @@ use_public() {
     fi
     unset ROS_IP ROS_HOSTNAME
     export ROS_MASTER_URI=http://$address:$port "$variable=$address"
-    echo "Open to every machine that reaches $address (docs/security.md). There: ./baxter.sh $address" >&2
+    if [[ $port != 11311 ]]; then there="ROS_MASTER_URI=$ROS_MASTER_URI "; fi
+    echo "Open to every machine that reaches $address (docs/security.md). There: $there./baxter.sh $address" >&2
 }
 
 # use_robot HOST: a master on another machine, which must be able to connect to the address that we announce. The port of a

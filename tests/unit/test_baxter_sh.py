@@ -117,6 +117,15 @@ def test_public_by_address(variables_after):
     assert variables_after("use_public 10.1.2.3", ROS_IP="10.9.9.9") == expected
 
 
+@pytest.mark.parametrize(("port", "line"), [
+    ("11311", "There: ./baxter.sh 10.1.2.3"),
+    ("11411", "There: ROS_MASTER_URI=http://10.1.2.3:11411 ./baxter.sh 10.1.2.3")])
+def test_public_prints_the_line_for_other_machines(port, line):
+    script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; use_public 10.1.2.3'
+    environment = {"PATH": "/usr/bin:/bin", "ROS_MASTER_URI": f"http://localhost:{port}"}
+    assert line in subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True).stderr
+
+
 def baxter(*arguments, script=ROOT / "baxter.sh", **options):
     options.update(capture_output=True, text=True, stdin=subprocess.DEVNULL)
     return subprocess.run([str(script), *arguments], **options)
@@ -136,14 +145,14 @@ def modes():
 
 
 def test_each_mode_has_help_without_a_build(tmp_path):
-    copy = copy_of_tools(tmp_path / "ws")
-    assert {"sim", "setup", "test", "labs", "doctor"} < set(modes())
-    for mode in [*modes(), "localhost", "some-robot"]:
+    copy, known = copy_of_tools(tmp_path / "ws"), modes()
+    assert {"sim", "setup", "test", "labs", "doctor"} < set(known)
+    for mode in [*known, "localhost", "some-robot"]:
         if mode == "handout":  # its own help needs its package
             continue
         done = baxter(mode, "--help", script=copy / "baxter.sh")
         assert (done.returncode, done.stderr) == (0, ""), mode
-        shown = "sim" if mode == "localhost" else mode if mode in modes() else "HOST"
+        shown = "sim" if mode == "localhost" else mode if mode in known else "HOST"
         assert f"\n  {shown}" in done.stdout
     assert "meshes" in baxter("setup", "-h", script=copy / "baxter.sh").stdout  # one of its steps
 
