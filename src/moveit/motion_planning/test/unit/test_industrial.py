@@ -243,6 +243,20 @@ def test_refusals_have_codes_and_reasons(lab):
     lab.refused(Code.NO_IK_SOLUTION, "LIN ends after", "LIN", at(far))
 
 
+def test_ptp_into_a_collision_is_an_invalid_plan_as_for_pilz(lab):
+    """Its inverse kinematics looks at the robot alone; the scene is looked at when the motion is there."""
+    goal = shifted(lab.pose(), y=0.1)
+    before = lab.scene
+    try:
+        for at_goal in (True, False):
+            place = goal if at_goal else lab.pose()
+            lab.scene = before.with_object(WorldObject("wall", rigid(np.eye(3), place[:3, 3]),
+                                                       ((Box((0.06, 0.06, 0.06)), np.eye(4)),)))
+            lab.refused(Code.INVALID_MOTION_PLAN, "wall", "PTP", at(goal))
+    finally:
+        lab.scene = before
+
+
 def test_lin_too_fast_for_a_joint_is_slower(lab):
     command = lab.command("LIN", at(shifted(lab.pose(), x=-0.1, y=0.2)), velocity_scaling=1.0, acceleration_scaling=1.0)
     timed = plan(command, lab.tools, CartesianLimits(3.0, 30.0, 30.0, 20.0)).timed

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests to the pipeline pilz_industrial_motion_planner."""
+import math
+
+import numpy as np
 import rospy
+from geometry_msgs.msg import Quaternion
 from moveit_msgs.msg import MoveItErrorCodes
 from shape_msgs.msg import SolidPrimitive
 
@@ -48,16 +52,18 @@ class IndustrialPlanner:
         planner = request.planner_id or pipe.default_planner(request.group_name)
         reader = self._context.monitor.reader
         auxiliary = path_constraints = None
-        remarks = []
+        remarks, of_goals = [], []
         try:
             if planner == "CIRC":
                 auxiliary = self._auxiliary(request.path_constraints, scene)
             else:
                 path_constraints = constraint_set_of(_with_regions(request.path_constraints), scene, reader, remarks)
-            goals = [constraint_set_of(_with_regions(goal), scene, reader, remarks)
+            goals = [constraint_set_of(_with_regions(goal), scene, reader, of_goals)
                      for goal in request.goal_constraints]
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
+        if of_goals:  # this planner leaves nothing out of a goal
+            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "; ".join(of_goals))
         self._context.remark(planner, remarks, request.group_name)
         query = pipeline.PlanQuery(
             scene, request.group_name, [goal for goal in goals if goal is not None], path_constraints,
@@ -83,8 +89,13 @@ class IndustrialPlanner:
 
 
 def _with_regions(constraints):
-    """The message, with a region around positions that are given by primitive_poses alone, as this planner takes
-    them."""
+    """The message, with a region around positions that are given by primitive_poses alone, and with quaternions of
+    length 1, as this planner takes them."""
+    for one in constraints.orientation_constraints:
+        turn = np.array([one.orientation.x, one.orientation.y, one.orientation.z, one.orientation.w])
+        length = float(np.linalg.norm(turn))
+        if 0.0 < length < math.inf:
+            one.orientation = Quaternion(*(turn / length).tolist())
     for position in constraints.position_constraints:
         region = position.constraint_region
         if not region.primitives:

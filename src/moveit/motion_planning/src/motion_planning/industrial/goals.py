@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Conversion of a command's goal constraints to one posture, or one pose of one link."""
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -80,18 +81,28 @@ def _pose(query, goal):
 
 
 def _reached(query, tools, link, pose):
-    """The group's joints (k,) nearest to the start that put the link there without collision."""
+    """The group's joints (k,) nearest to the start that put the link there without collision; where none do, the
+    nearest without a collision of the robot with itself, whose motion is then found invalid, as by Pilz's planner."""
     scene, group = query.scene, query.scene.model.groups[query.group]
+    alone, fallback = replace(scene, objects={}, octomap=None), []
 
     def accept(q):
         state = scene.state.with_q(q)
         if tools.exact.free(scene, state, query.group):
             return None
+        if not fallback and tools.exact.free(alone, state, query.group):
+            fallback.append(q)
         return "; ".join(map(str, tools.exact.contacts(scene, state, query.group, 1)))
 
     try:
         return ik(scene.model, group, {link: pose}, scene.state, _IK_TIMEOUT_S, accept, tools.clock)[group.indices]
     except PlanningError as error:
+        if fallback:
+            return fallback[0][group.indices]
+        touching = tools.exact.contacts(scene, scene.state, query.group)
+        if touching:
+            raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the start is in collision: %s" % "; ".join(
+                map(str, touching[:3])), touching) from None
         raise PlanningFailure(Code.NO_IK_SOLUTION, "no posture of group '%s' puts link '%s' there: %s"
                               % (group.name, link, error)) from None
 
