@@ -289,5 +289,12 @@ def test_the_page_fits_a_telephone(lab, browser):
         browser.click("#reach-left")
         browser.wait("!lab.hands.hands.get('left').fields.hidden")
         assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+        # What the page says is in sight below STOP, wherever the button was.
+        browser.evaluate("lab.served.told({code: 'held', text: 'the crate is near'})")
+        browser.evaluate("document.getElementById('record').scrollIntoView({block: 'center'})")
+        header, (top, bottom) = (browser.evaluate(
+            "(({top, bottom}) => [top, bottom])(document.querySelector('%s').getBoundingClientRect())" % selector)
+            for selector in ("header", "#told"))
+        assert header[0] == 0 and header[1] <= top < bottom < 844, (header, top, bottom)
     finally:
         browser.resize(1000, 800)
