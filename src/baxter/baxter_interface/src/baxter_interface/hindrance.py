@@ -39,15 +39,15 @@ def ask_what_holds(side: str, is_kept_away: bool) -> str:
     `is_kept_away`: whether its commands were of a mode in which collision avoidance acts.
     """
     prefix = "robot/limb/%s/" % side
-    avoidance = _newest(prefix + "collision_avoidance_state", CollisionAvoidanceState) if is_kept_away else None
+    avoidance = newest(prefix + "collision_avoidance_state", CollisionAvoidanceState) if is_kept_away else None
     if avoidance is not None and avoidance.collision_object:
         return held_by_avoidance(avoidance.collision_object)
-    detection = _newest(prefix + "collision_detection_state", CollisionDetectionState)
+    detection = newest(prefix + "collision_detection_state", CollisionDetectionState)
     return COLLIDES if detection is not None and detection.collision_state else ""
 
 
-def _newest(topic, kind):
-    """The next message of a topic, None where nobody publishes it."""
+def newest(topic: str, kind: type) -> object:
+    """The next message of a topic, or its latched one; None where nobody publishes it."""
     if not startup.topic_published(rospy.resolve_name(topic)).is_met():
         return None
     try:

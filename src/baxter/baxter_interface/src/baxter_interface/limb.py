@@ -2,6 +2,7 @@
 """One arm: its state, and commands to it."""
 import collections
 import copy
+import importlib
 import math
 import threading
 import time
@@ -19,7 +20,7 @@ from baxter_model import BASE_FRAME, poses
 from baxter_model.readiness import why_not_ready
 
 from . import settings, startup
-from .hindrance import ArmHindrance, IgnoredCommands
+from .hindrance import ArmHindrance, IgnoredCommands, newest
 from .joint_checks import (
     beyond_a_turn,
     limb_joint_names,
@@ -266,12 +267,25 @@ class Limb:
         name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % self.name
         answer = call_service(name, SolvePositionIK, request, timeout_s=timeout)
         if not answer.result_type or answer.result_type[0] == answer.RESULT_INVALID:
-            point = request.pose_stamp[0].pose.position
+            target = request.pose_stamp[0]
+            point, why = target.pose.position, self._why_no_solution(target)
             raise NoIKSolution("the %s arm has no solution for the end-point at x y z %.3f %.3f %.3f in %s with this "
-                               "orientation; rostopic echo -n 1 %s says why"
-                               % (self.name, point.x, point.y, point.z, request.pose_stamp[0].header.frame_id,
+                               "orientation%s; more: rostopic echo -n 1 %s"
+                               % (self.name, point.x, point.y, point.z, target.header.frame_id, why and ": " + why,
                                   IK_REPORT % self.name))
         return dict(zip(answer.joints[0].name, answer.joints[0].position, strict=True))
+
+    def _why_no_solution(self, target: PoseStamped) -> str:
+        """The sentence in the IK service's report on `target`, "" where there is none, as on a physical robot."""
+        report = newest(IK_REPORT % self.name, rospy.AnyMsg)
+        if report is None:
+            return ""
+        package, name = report._connection_header["type"].split("/")
+        try:
+            verdicts = getattr(importlib.import_module(package + ".msg"), name)().deserialize(report._buff).verdicts
+        except (ImportError, AttributeError):
+            return ""
+        return next((verdict.detail for verdict in verdicts if verdict.target == target), "")
 
     def _command(self, mode, values, unit):
         """Send one command; returns its values by joint name."""

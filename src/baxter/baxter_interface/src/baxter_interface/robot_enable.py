@@ -10,9 +10,11 @@ from baxter_core_msgs.msg import AssemblyState
 from std_msgs.msg import Bool, Empty
 
 from baxter_dataflow import wait_for
+from baxter_model import SIDES
 from baxter_model.readiness import RESET
 
 from . import settings, startup
+from .hindrance import ask_what_holds
 from .version_check import VersionMismatch, require_compatible
 
 # Time limit for the robot to carry out each request [s, ROS time].
@@ -135,17 +137,20 @@ class RobotEnable:
             if failure.errno != errno.ETIMEDOUT:
                 raise
             raise OSError(errno.ETIMEDOUT, "failed to %s the robot within %.0f s: %s" % (
-                verb, timeout_s, self._why_not(publisher))) from failure
+                verb, timeout_s, self._why_not(publisher, verb))) from failure
         finally:
             publisher.unregister()
 
-    def _why_not(self, publisher):
+    def _why_not(self, publisher: rospy.Publisher, verb: str) -> str:
         state = self.state()
         if publisher.get_num_connections() == 0:
             return "nobody listens to %s (%s)" % (publisher.resolved_name, _brief(state))
         if state.stopped:
             return "it is stopped; release its stop button and reset it: %s (%s)" % (RESET, _brief(state))
-        return "it was asked but stays %s" % _brief(state)
+        # A physical robot is not enabled while an arm is in the field of its collision avoidance.
+        holds = {side: ask_what_holds(side, is_kept_away=True) for side in SIDES} if verb == "enable" else {}
+        return "; ".join(["it was asked but stays %s" % _brief(state),
+                          *("the %s arm: %s" % (side, why) for side, why in holds.items() if why)])
 
 
 def _is_clear(state):

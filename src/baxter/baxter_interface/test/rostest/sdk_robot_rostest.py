@@ -132,6 +132,13 @@ class RobotEnableTest(unittest.TestCase):
         self.assertIn("enabled: False, stopped: False", caught.exception.strerror)
         self.assertGreater(time.monotonic() - begin_s, ENABLE_TIMEOUT_S - 0.1)
 
+    def test_enable_that_collision_avoidance_refuses_says_so_and_what_helps(self):
+        set_knobs(refuse_enable=True, near=["collision_head_link_2"])
+        with self.assertRaises(OSError) as caught:
+            self.robot.enable()
+        for text in ("the left arm", "collision_head_link_2", "tuck_arms.py -u"):
+            self.assertIn(text, caught.exception.strerror)
+
     def test_pressed_stop_button_is_named_at_once(self):
         set_knobs(stop_button=True)
         wait_for(lambda: self.robot.state().stopped, DEADLINE_S)
