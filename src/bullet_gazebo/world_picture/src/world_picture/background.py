@@ -34,8 +34,8 @@ class BackgroundDrawings(DrawingCache):
         self._patience_s, self._clock = patience_s, clock
         self._patient_until = clock() + patience_s
         # Separate processes: smaller meshes do not wait for large ones.
-        self._makers = {is_large: DrawingCache(folder, LimitedProcess(**LIMITS)) for is_large in (False, True)}
-        self._jobs = {is_large: collections.deque() for is_large in self._makers}
+        self._caches = {is_large: DrawingCache(folder, LimitedProcess(**LIMITS)) for is_large in (False, True)}
+        self._jobs = {is_large: collections.deque() for is_large in self._caches}
         self._changed = threading.Condition()
         self._made = {}  # by key: the file, a LimitError, or None while it is being made
         self._working = set()
@@ -83,7 +83,7 @@ class BackgroundDrawings(DrawingCache):
                     return
                 key, *job = self._jobs[is_large].popleft()
             try:
-                made = self._makers[is_large]._make(key, *job)
+                made = self._caches[is_large]._make(key, *job)
             except LimitError as error:
                 made = error
             except OSError as error:  # no room on the disk
