@@ -56,6 +56,9 @@ class All(Torture):
     def test_names(self):
         self.torture("names", SEED, "--messages", 100_000)
 
+    def test_submissions(self):
+        self.torture("submissions", SEED, "--messages", 100_000)
+
     def test_machine(self):
         self.torture("machine", SEED, "--minutes", 10)
 

@@ -36,6 +36,7 @@ SUITES = {
     "machine": ("run_machine", "a state machine over services and topics, in lock-step (hypothesis)"),
     "faults": ("run_faults", "nodes killed and stopped at random moments; the recovery time of each"),
     "scenes": ("run_scenes", "hostile planning scenes for the planner's core, without a lab"),
+    "submissions": ("run_submissions", "hostile programs, notebooks and archives for a grading, without a judge"),
     "disk": ("run_disk", "a full disk under logs and temporary files (root)"),
     "shm": ("run_shm", "a full /dev/shm (root)"),
     "crowd": ("run_crowd", "60 clients for two minutes"),

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.once
 PROGRAM = Path(__file__).resolve().parents[1] / "torture" / "torture.py"
 
 
-@pytest.mark.parametrize("suite, inputs", [("handshakes", 500), ("names", 1000)])
+@pytest.mark.parametrize("suite, inputs", [("handshakes", 500), ("names", 1000), ("submissions", 500)])
 def test_a_slice_finds_nothing(suite, inputs, tmp_path):
     done = subprocess.run([sys.executable, str(PROGRAM), suite, "--seed", "16", "--messages", str(inputs), "--out",
                            str(tmp_path)], capture_output=True, text=True, timeout=600)
