@@ -12,6 +12,7 @@ import rospy
 import rostest
 from gazebo_msgs import srv
 from geometry_msgs.msg import Point, Pose, Quaternion
+from nav_msgs.msg import Odometry
 
 from lab_testing.hostile_descriptions import chain, write_ball, write_entity_bomb
 from lab_testing.waiting import wait_until
@@ -20,6 +21,8 @@ BODY = """<robot name="m"><link name="l"><inertial><mass value="1"/>
   <inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
   <collision><geometry>%s</geometry></collision></link></robot>"""
 MESH = BODY % '<mesh filename="%s"/>'
+POSE_TOPIC = """<gazebo><plugin name="p" filename="libgazebo_ros_p3d.so"><bodyName>l</bodyName>
+  <topicName>place</topicName></plugin></gazebo></robot>"""
 BOX = BODY % '<box size="0.2 0.2 0.2"/>'
 DEADLINE_S = 60.0
 # As many ticks as pass while a large mesh is read, on any machine: reading it takes seconds, a tick 2 ms.
@@ -47,8 +50,8 @@ class GazeboHostile(unittest.TestCase):
     def path(self, name):
         return os.path.join(self.folder, name)
 
-    def spawn(self, xml):
-        return self.spawn_urdf_model("m", xml, "", Pose(Point(5, 0, 0.5), Quaternion(0, 0, 0, 1)), "")
+    def spawn(self, xml, namespace=""):
+        return self.spawn_urdf_model("m", xml, namespace, Pose(Point(5, 0, 0.5), Quaternion(0, 0, 0, 1)), "")
 
     def sim_time(self):
         return self.get_world_properties().sim_time
@@ -80,6 +83,14 @@ class GazeboHostile(unittest.TestCase):
             response = self.spawn(xml)
             self.assertFalse(response.success)
             self.assertIn(word, response.status_message)
+
+    def test_a_namespace_that_is_none_keeps_no_later_model_from_its_topics(self):
+        for namespace in ("a\x01b", "a b"):
+            response = self.spawn(BODY.replace("</robot>", POSE_TOPIC) % "<box size='1 1 1'/>", namespace)
+            self.assertFalse(response.success)
+            self.assertIn(ascii(namespace)[1:-1], response.status_message)
+        self.assertTrue(self.spawn(BODY.replace("</robot>", POSE_TOPIC) % "<box size='1 1 1'/>", "/ok").success)
+        rospy.wait_for_message("/ok/place", Odometry, DEADLINE_S)
 
     def test_the_world_goes_on_while_a_large_mesh_is_read(self):
         write_ball(self.path("large.stl"), 548, radius=random.uniform(0.5, 1.5))  # 600,608 triangles, in no cache
