@@ -152,7 +152,7 @@ class SubscriberHub:
                  if entry.revents]
         more = ready
         while more:
-            more = [connection for connection in more if connection.read(self._buffer)]
+            more = [connection for connection in more if self._read(connection)]
             if self._clock() - now >= BUDGET_S:
                 break
         if any(connection.ended.is_set() for connection in ready):
@@ -166,11 +166,14 @@ class SubscriberHub:
             connection.end()
         self._follow([])
 
+    def _read(self, connection):
+        return _survive(connection, connection.read, self._buffer)
+
     def _take_new(self):
         connections = self._connections
         while self._new:
             connection = self._new.popleft()
-            connection.deliver_complete()
+            _survive(connection, connection.deliver_complete)
             if not connection.ended.is_set():
                 connections = [*connections, connection]
         self._follow(connections)
@@ -179,3 +182,13 @@ class SubscriberHub:
         self._connections = connections
         self._entries = (_PollEntry * len(connections))(
             *(_PollEntry(connection.fileno(), select.POLLIN, 0) for connection in connections))
+
+
+def _survive(connection, function, *arguments):
+    """The result of ``function(*arguments)``. An error that nobody foresaw, such as no memory for a message, ends this
+    connection: those behind it must be read."""
+    try:
+        return function(*arguments)
+    except Exception as error:  # noqa: BLE001
+        connection.end("%s: %s" % (type(error).__name__, error))
+        return False

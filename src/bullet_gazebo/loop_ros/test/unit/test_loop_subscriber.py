@@ -185,6 +185,24 @@ def test_a_message_that_announces_too_much_ends_the_connection_with_size_and_lim
     assert str(announced) in line.connection.fault and str(LARGEST_BYTES) in line.connection.fault
 
 
+@pytest.mark.parametrize("held", [b"", framed(b"at once")])
+def test_an_error_that_nobody_foresaw_ends_its_connection_and_no_other(hub, line, held):
+    def fail(data):
+        raise MemoryError("no room for %d bytes" % len(data))
+
+    first, second = Line(hub), Line(hub)
+    evil = Connection(line.near, fail, LARGEST_BYTES, held)
+    hub.add(evil)
+    line.connection.end()
+    line.far.sendall(framed(b"later"))
+    for good in (first, second):
+        good.far.sendall(framed(b"good"))
+    serve_until(hub, lambda: evil.ended.is_set() and first.got == second.got == [b"good"], "the good ones")
+    assert "MemoryError" in evil.fault
+    for good in (first, second):
+        good.close()
+
+
 def test_the_end_of_the_loop_ends_all(hub, line):
     hub.service()
     late = Line(hub)
