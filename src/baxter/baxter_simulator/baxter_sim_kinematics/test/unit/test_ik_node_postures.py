@@ -32,3 +32,10 @@ def test_without_a_parameter_they_are_baxters(node, limb):
 def test_a_parameter_comes_first(node, limb, turn):
     node.parameters["~null_space_postures"] = TABLE
     assert node._null_space_postures(limb) == {"neutral": {limb + "_turn": turn, limb + "_lift": -0.25}}
+
+
+@pytest.mark.parametrize("limb", ["", "a\x01b", "left arm", "/left", 3, None, ["left"]])
+def test_a_limb_that_is_no_name_is_refused_with_what_is_allowed(node, limb):
+    with pytest.raises(node.InvalidRequest) as found:
+        node._build(limb)
+    assert ascii(limb) in str(found.value) and "'left'" in str(found.value)
