@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from lab_environment.options import MOST_WORKERS, counted, did_you_mean, number, seconds
+from lab_environment.options import MOST_SEED, MOST_WORKERS, counted, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
@@ -25,8 +25,8 @@ BAR_WIDTH = 30
 # Python itself needs the least [GB].
 LEAST_GB, MOST_GB = 0.1, 1e6
 MOST_RECYCLE = 10**9
-# The largest seed, as results in Parquet have room for; most seeds of one batch, whose results are held in memory.
-MOST_SEED, MOST_SEEDS = 2**63 - 1, 10_000_000
+# Most seeds of one batch, whose results are held in memory.
+MOST_SEEDS = 10_000_000
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 

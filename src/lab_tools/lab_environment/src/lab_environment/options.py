@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable
 MOST_SECONDS = 1e9
 #: Most processes at a time.
 MOST_WORKERS = 1000
+#: Largest seed or serial number, as tables of results have room for.
+MOST_SEED = 2**63 - 1
 
 
 def number(kind: type, least: float, most: float, *, above: bool = False) -> Callable[[str], float]:

@@ -6,7 +6,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from lab_environment.options import number
+from lab_environment.options import MOST_SEED, number
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
 from motion_planning.exact import ExactChecker
@@ -33,7 +33,7 @@ def collisions_updater(arguments=None):
     parser.add_argument("--min-collision-fraction", type=number(float, 0, 1, above=True), default=ALWAYS_SHARE,
                         dest="share",
                         help="share of random states in which what touches always does (default: %(default)s)")
-    parser.add_argument("--seed", type=number(int, 0, 2**63 - 1), default=0,
+    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
                         help="of the random states (default: %(default)s)")
     options = parser.parse_args(arguments)
     if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:

@@ -14,7 +14,7 @@ import rospkg
 
 from lab_environment import isolation, page_files
 from lab_environment.isolation import NotIsolated
-from lab_environment.options import did_you_mean
+from lab_environment.options import MOST_SEED, did_you_mean, number, seconds
 from lab_environment.work_folder import work_folder
 from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose, meant_instead
@@ -66,12 +66,13 @@ def _parser():
     parser.add_argument("--list", action="store_true", help="list the exercises and end")
     parser.add_argument("--start", metavar="EXERCISE",
                         help="copy this exercise's skeleton into the current folder and end")
-    parser.add_argument("--seed", type=int, default=0, help="seed of start postures and goals (default: %(default)s)")
+    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
+                        help="seed of start postures and goals (default: %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
                         help="sim: ideal drives and sensors; robot: a physical robot's (default: %(default)s)")
-    parser.add_argument("--serial", type=int, default=0,
+    parser.add_argument("--serial", type=number(int, 0, MOST_SEED), default=0,
                         help="which robot: its mounts are its own; 0 is the drawing (default: %(default)s)")
-    parser.add_argument("--wall-limit", type=float, default=WALL_LIMIT_S, metavar="SECONDS",
+    parser.add_argument("--wall-limit", type=seconds(), default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up ungraded after so long; a slow or busy machine needs more (default: %(default)g)")
     parser.add_argument("--trusted", action="store_true",
                         help="where this machine allows no sandbox, run the program without one: your own program, or "
@@ -106,12 +107,6 @@ def _program_and_exercise(parser, options):
         link = _link_in(report_file) if report_file is not None else None
         if link is not None:
             parser.error("%s is a link, to %s; give the report a file of its own" % (link, os.readlink(link)))
-    if not options.wall_limit > 0.0:
-        parser.error("the wall limit is %g, expected a positive number of seconds" % options.wall_limit)
-    if options.seed < 0:
-        parser.error("the seed is %d, expected 0 or more" % options.seed)
-    if options.serial < 0:
-        parser.error("the serial number is %d, expected 0 or more" % options.serial)
     try:
         text = submission.texts(path)[path.name]
         exercise = choose(options.lab, name, path.name, text)
@@ -176,8 +171,8 @@ def main(argv=None):
     if options.start:
         return start(options.start)
     program, exercise, other = _program_and_exercise(parser, options)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: sys.exit(130))
+    for one in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(one, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
     if other:
         print("It looks like a program for another exercise: ./baxter.sh check %s %s %s" % (

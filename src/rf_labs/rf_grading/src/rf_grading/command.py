@@ -14,6 +14,8 @@ from lab_batch import JobError, Spec
 from lab_batch.keeping import default_memory_bytes
 from lab_batch.processes import Limits, map_seeds
 from lab_environment import isolation
+from lab_environment.options import MOST_SEED, MOST_WORKERS, number, seconds
+from lab_environment.user_files import read_file
 from lab_environment.work_folder import work_folder
 from rf_checks import similarity
 from rf_checks.command import remove_drafts, write_report
@@ -52,12 +54,14 @@ def _parser():
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="for results and pages (default: FOLDER-graded)")
     parser.add_argument("--assignment", default="", metavar="NAME",
                         help="nbgrader's: only STUDENT/NAME is read; also the name in the results")
-    parser.add_argument("--seed", type=int, default=0, help="of start postures and goals (default: %(default)s)")
+    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
+                        help="of start postures and goals (default: %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim", help="as in check (default: %(default)s)")
-    parser.add_argument("--serial", type=int, default=0, help="as in check (default: %(default)s)")
-    parser.add_argument("--workers", type=int, metavar="N",
+    parser.add_argument("--serial", type=number(int, 0, MOST_SEED), default=0,
+                        help="as in check (default: %(default)s)")
+    parser.add_argument("--workers", type=number(int, 1, MOST_WORKERS), metavar="N",
                         help="judges at a time (default: one for each processor, as far as memory lasts)")
-    parser.add_argument("--wall-limit", type=float, default=WALL_LIMIT_S, metavar="SECONDS",
+    parser.add_argument("--wall-limit", type=seconds(), default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up a check ungraded after so long (default: %(default)g)")
     parser.add_argument("--given", type=Path, action="append", default=[], metavar="FILE",
                         help="code that the students were given: it counts for nobody as copied; may be repeated")
@@ -131,7 +135,7 @@ class _Grading:
             if not exercises:
                 raise BadFolder("no submission in %s has a program for an exercise; name it: ./baxter.sh grade %s LAB "
                                 "EXERCISE" % (self._folder, self._options.folder))
-            given = [path.read_text(encoding="utf-8", errors="replace") for path in options.given]
+            given = [read_file(path, archives.most_bytes(path.name)).decode("utf-8", "replace") for path in options.given]
             texts = {entry.submission.entry: list(entry.texts.values()) for entry in entries if entry.texts}
             handed_out = [*similarity.Library(_workspace()).handed_out, *given]
             try:
@@ -263,18 +267,12 @@ def main(argv=None):
         return GRADED
     if options.folder is None:
         parser.error("say which folder has the submissions: ./baxter.sh grade FOLDER [LAB [EXERCISE ...]]")
-    for name, least in (("seed", 0), ("serial", 0), ("workers", 1)):
-        value = getattr(options, name)
-        if value is not None and value < least:
-            parser.error("--%s is %d, expected %d or more" % (name, value, least))
-    if not options.wall_limit > 0.0:
-        parser.error("--wall-limit is %g, expected a positive number of seconds" % options.wall_limit)
     if isolation.problem() and not options.trusted:
         _fail("programs of others are not run without walls around them, and this machine allows none: %s"
               % isolation.problem())
         return FAILED
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _stop)
+    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(one, _stop)
     sys.stdout.reconfigure(errors="backslashreplace")
     try:
         folder, out = _places(options)

@@ -191,8 +191,9 @@ def test_a_judge_that_cannot_start_is_told(judge, class_folder, monkeypatch, cap
 @pytest.mark.parametrize(("words", "said"), [
     (["gone"], "neither a folder nor"), (["class", "lab7"], "no lab 'lab7'"), (["class", "lab2", "wav"], "no exercise"),
     (["class", "--out", "class/out"], "must not lie in each other"), (["class", "--out", "."], "must not lie"),
-    (["empty"], "has no submissions"), (["class", "cwru", "--seed", "-1"], "--seed is -1"), ([], "which folder"),
-    (["class", "lab2", "--workers", "0"], "--workers is 0"), (["other"], "no submission in"),
+    (["empty"], "has no submissions"), (["class", "cwru", "--seed", "-1"], "--seed: expected a whole number from 0"),
+    ([], "which folder"),
+    (["class", "lab2", "--workers", "0"], "--workers: expected a whole number from 1"), (["other"], "no submission in"),
 ])
 def test_wrong_words_are_answered_in_a_sentence(judge, class_folder, capsys, words, said):
     Path("empty").mkdir()
