@@ -135,7 +135,8 @@ class _Grading:
             if not exercises:
                 raise BadFolder("no submission in %s has a program for an exercise; name it: ./baxter.sh grade %s LAB "
                                 "EXERCISE" % (self._folder, self._options.folder))
-            given = [read_file(path, archives.most_bytes(path.name)).decode("utf-8", "replace") for path in options.given]
+            given = [read_file(path, archives.most_bytes(path.name)).decode("utf-8", "replace")
+                     for path in options.given]
             texts = {entry.submission.entry: list(entry.texts.values()) for entry in entries if entry.texts}
             handed_out = [*similarity.Library(_workspace()).handed_out, *given]
             try:
