@@ -126,7 +126,7 @@ def soup(count, size=1.0):
 def test_a_mesh_costs_no_more_than_its_bound(mesh, monkeypatch):
     """2,000 triangles of a metre are 250 million samples at the usual distance."""
     monkeypatch.setattr(sphere_model, "_MOST_POINTS", 50_000)
-    monkeypatch.setattr(covers, "OF_OBJECTS", covers.Bound(50_000, 100_000, 2_000_000))
+    monkeypatch.setattr(covers, "OF_OBJECTS", covers.Bound(50_000, 100_000, 2_000_000, 2_000))
     made = []
     points_on = covers.points_on
 
@@ -160,7 +160,7 @@ def test_a_held_object_of_any_size_gets_few_spheres_that_contain_it(solid, late)
     geometry = pyramid(solid) if isinstance(solid, Cone) else solid
     where = pose((0.1, -0.2, 0.3), (0.3, -0.5, 1.0))
     spheres, beyond = sphere_model.object_spheres([(geometry, where)], TOLERANCE, late)
-    assert 0 < len(spheres) < 5000 and (beyond is not None or not late and max(getattr(solid, "size", (9.0,))) <= 0.3)
+    assert 0 < len(spheres) <= covers.OF_OBJECTS.spheres and (beyond is not None or not late and max(getattr(solid, "size", (9.0,))) <= 0.3)
     points = geometry.vertices if isinstance(solid, Cone) else points_in(solid, np.random.default_rng(1), 400)
     points = points @ where[:3, :3].T + where[:3, 3]
     far = np.linalg.norm(points[:, None] - spheres[:, :3], axis=2) - spheres[:, 3]

@@ -35,19 +35,19 @@ ROUNDING = 2e-5
 
 
 class Bound(NamedTuple):
-    """Greatest work for a mesh, beyond which it gets a larger tolerance. samples: of its surface; voxels: of the box
-    around it; distances: samples times centres."""
+    """Greatest work, beyond which geometry gets a larger tolerance. samples: of a mesh's surface; voxels: of the box
+    around it; distances: samples times centres; spheres: of anything."""
 
     samples: int
     voxels: int
     distances: int
+    spheres: int
 
 
-#: For links of a robot, which are covered once and kept on disk: most are meshes of half a metre, and take a second or
-# two.
-OF_LINKS = Bound(8_000_000, 20_000_000, 1_000_000_000)
+#: For links of a robot, which are covered once and kept on disk. Most are meshes of half a metre; they take a second.
+OF_LINKS = Bound(8_000_000, 20_000_000, 1_000_000_000, 1_000_000)
 #: For objects of a scene, while a plan waits: a few tenths of a second.
-OF_OBJECTS = Bound(2_000_000, 4_000_000, 200_000_000)
+OF_OBJECTS = Bound(2_000_000, 4_000_000, 200_000_000, 2_000)
 
 
 class CoverError(ValueError):
@@ -89,6 +89,8 @@ def _cover(parts, tolerance, bound):
     used = max(solid.tolerance for solid in solids)
     radii = depth + used
     chosen = _greedy(wanted, centres, radii - between)
+    if len(chosen) > bound.spheres:
+        return _cover(parts, 2.0 * used, bound)
     spheres = np.column_stack([centres[chosen], radii[chosen] + ROUNDING])
     return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)]), used
 
