@@ -48,7 +48,7 @@ class Build:
         return subprocess.run([sys.executable, script, self.build], check=True, capture_output=True, text=True).stdout
 
     def by_catkin(self) -> str:
-        """The same message as make generates it, in a process of its own."""
+        """The same message as make generates it, in a separate process."""
         folder = self.build / "by_catkin"
         folder.mkdir()
         subprocess.run([sys.executable, "/usr/lib/genpy/genmsg_py.py", self.source, self.words["path"], "-p", "things",

@@ -26,7 +26,8 @@ def parser():
         command = commands.add_parser(name, help=text, description=text)
         if picture:
             command.add_argument("--out", metavar="FILE.png", type=Path,
-                                 help="where the picture goes (default: %s.png; in the workspace: .baxter/pictures)" % name)
+                                 help="where the picture goes (default: %s.png; in the workspace's own folder below "
+                                 ".baxter/pictures)" % name)
         return command
 
     robot = add("robot", "the simulated world from outside")
@@ -72,11 +73,12 @@ ACTIONS = {
 
 
 def picture_path(name: str, here: Path, workspace: str) -> Path:
-    """Where a picture goes: into the current folder, but into the folder of the workspace's own files in its topmost one.
+    """Where a picture goes: into the current folder; but where this is the workspace's topmost one, below .baxter.
 
     ``workspace``: "" where none is known.
     """
-    return here / ".baxter" / "pictures" / (name + ".png") if workspace and here.samefile(workspace) else Path(name + ".png")
+    is_top = workspace and here.samefile(workspace)
+    return here / ".baxter" / "pictures" / (name + ".png") if is_top else Path(name + ".png")
 
 
 def main():

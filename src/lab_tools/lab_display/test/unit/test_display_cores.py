@@ -68,7 +68,8 @@ def test_arms_are_plotted_in_a_panel_each_from_time_zero():
 def test_a_joint_has_one_colour_in_whatever_order_and_company_it_is_plotted():
     line = np.array([[5.0, 6.0], [0.0, 1.0]])
     colours = {}
-    for names in (("left_s0", "left_s1", "left_e0"), ("left_e0", "left_s0"), ("other", "left_s1", "left_w2", "another")):
+    plots = (("left_s0", "left_s1", "left_e0"), ("left_e0", "left_s0"), ("other", "left_s1", "left_w2", "another"))
+    for names in plots:
         for axes in joint_plot.figure_of(dict.fromkeys(names, line)).axes:
             of_panel = {curve.get_label(): curve.get_color() for curve in axes.get_lines()}
             assert len(set(of_panel.values())) == len(of_panel)
