@@ -19,6 +19,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rospy.topics": "lab_environment.signals lab_environment.closed_connections",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "actionlib.action_client": "lab_environment.lost_goals",
+           "moveit_msgs.msg._PositionIKRequest": "lab_environment.former_fields",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
            "rosgraph.roslogging": "lab_environment.full_disk lab_environment.hidden_tokens",
            "roslaunch.config": "lab_environment.hidden_tokens",
