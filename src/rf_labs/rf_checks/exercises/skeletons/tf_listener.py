@@ -5,6 +5,8 @@
 
     tf_listener.py                   base -> left_hand, left_hand -> right_hand, head_camera -> left_gripper_base
     tf_listener.py TARGET SOURCE     this pair: the pose of SOURCE in TARGET
+
+The last matrices that are printed count, one for each pair.
 """
 import sys
 
