@@ -160,7 +160,8 @@ def test_a_held_object_of_any_size_gets_few_spheres_that_contain_it(solid, late)
     geometry = pyramid(solid) if isinstance(solid, Cone) else solid
     where = pose((0.1, -0.2, 0.3), (0.3, -0.5, 1.0))
     spheres, beyond = sphere_model.object_spheres([(geometry, where)], TOLERANCE, late)
-    assert 0 < len(spheres) <= covers.OF_OBJECTS.spheres and (beyond is not None or not late and max(getattr(solid, "size", (9.0,))) <= 0.3)
+    assert 0 < len(spheres) <= covers.OF_OBJECTS.spheres
+    assert beyond is not None or not late and max(getattr(solid, "size", (9.0,))) <= 0.3
     points = geometry.vertices if isinstance(solid, Cone) else points_in(solid, np.random.default_rng(1), 400)
     points = points @ where[:3, :3].T + where[:3, 3]
     far = np.linalg.norm(points[:, None] - spheres[:, :3], axis=2) - spheres[:, 3]
