@@ -5,7 +5,7 @@ rospy tries a registration until it succeeds, holding the locks of all topics me
 even read, such as one with a control character, is tried for ever, and a master that is stopped is waited for without
 end: from then on the node makes no topic, no service and no connection. Here a registration that the master refuses
 ends with a line in the log. One that gets no answer is tried for DEADLINE_S, then again and again by a thread, and
-those that come meanwhile with it.
+those that come meanwhile with it. A node that starts before its master still waits for it in its first registration.
 """
 import contextlib
 import functools
@@ -58,10 +58,13 @@ class _Registrar:
         self._lock = threading.RLock()  # a signal's handler may run inside
         self._late = []  # of (end of the master's methods, name, type or address of a service)
         self._master, self._is_calling = self._proxy(), threading.Lock()
+        self._has_answered = False  # the master, at least once
 
     def take(self, what):
-        """Register within the deadline, or later."""
-        end_s = time.monotonic() + DEADLINE_S
+        """Register within the deadline, or later; the first one whenever the master comes: what rospy.init_node does
+        next would fail without it.
+        """
+        end_s, is_told = time.monotonic() + DEADLINE_S, False
         with self._lock:
             must_wait = bool(self._late)
             if must_wait:
@@ -71,7 +74,11 @@ class _Registrar:
                 self._register(*what)
                 return
             except _NO_ANSWER as error:
-                if time.monotonic() < end_s:
+                if not self._has_answered and not is_told:
+                    is_told = True
+                    self._rospy.logerr("the ROS master at %s does not answer (%s); this program waits for it",
+                                       self._manager.master_uri, error)
+                if not self._has_answered or time.monotonic() < end_s:
                     time.sleep(RETRY_S)
                     continue
                 self._rospy.logerr("%s: the ROS master at %s does not answer (%s); it is asked again and again",
@@ -125,6 +132,7 @@ class _Registrar:
         finally:
             if is_free:
                 self._is_calling.release()
+        self._has_answered = True
         if code != 1:
             rospy.logerr("%s is not registered, the ROS master refuses it: %s. Names have letters, digits, _ and /, "
                          "and begin with a letter, / or ~", ascii(name)[1:-1], text)

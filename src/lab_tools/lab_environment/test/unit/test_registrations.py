@@ -25,7 +25,8 @@ class Master:
         for method in ("registerPublisher", "registerSubscriber", "registerService", "unregisterPublisher",
                        "unregisterSubscriber", "unregisterService"):
             self.listener.register_function(self._noting(method), method)
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._is_closed, self._serving = False, threading.Thread(target=self._serve, daemon=True)
+        self._serving.start()
 
     def _noting(self, method):
         def note(caller, name, data, *rest):
@@ -35,9 +36,16 @@ class Master:
 
     def _serve(self):
         with contextlib.suppress(OSError, ValueError):
-            while True:
+            while not self._is_closed:
                 self.answers.wait()
                 self.listener.handle_request()
+
+    def close(self):
+        self._is_closed = True
+        self.answers.set()
+        socket.create_connection(self.listener.server_address).close()  # the one that it waits for
+        self._serving.join(30.0)
+        self.listener.server_close()
 
     def names(self, method="registerPublisher"):
         return [name for called, name in self.calls if called == method]
@@ -47,8 +55,7 @@ class Master:
 def master():
     master = Master()
     yield master
-    master.answers.set()
-    master.listener.server_close()
+    master.close()
 
 
 @pytest.fixture
@@ -84,6 +91,7 @@ def test_a_name_that_the_master_cannot_read_is_refused_with_a_line_and_the_next_
 
 
 def test_a_master_that_says_nothing_gets_all_of_them_when_it_answers_again(node, master):
+    node.publish("/rosout")
     master.answers.clear()
     with socket.create_connection(master.listener.server_address):  # the request that it waits in
         for name in ("/one", "/two", "/three", "/gone"):
@@ -98,14 +106,32 @@ def test_a_master_that_says_nothing_gets_all_of_them_when_it_answers_again(node,
     assert "/gone" not in master.names()
 
 
-def test_a_master_that_is_gone_is_tried_until_it_is_back(node):
+def test_a_node_that_starts_before_its_master_waits_for_it(node, monkeypatch):
+    monkeypatch.setattr(registrations, "DEADLINE_S", 0.0)
     port = free_port()
     node.master_uri = "http://127.0.0.1:%d" % port
+    starting = threading.Thread(target=node.publish, args=["/rosout"], daemon=True)
+    starting.start()
+    wait_until(lambda: node.lines, "a line about the master")
+    starting.join(0.2)
+    assert starting.is_alive() and len(node.lines) == 1 and node.master_uri in node.lines[0]
+    late = Master(port)
+    starting.join(30.0)
+    assert late.names() == ["/rosout"] and not starting.is_alive()
+    late.close()
+
+
+def test_a_master_that_is_gone_is_tried_until_it_is_back(node):
+    port = free_port()
+    before = Master(port)
+    node.master_uri = before.uri
+    node.publish("/rosout")
+    before.close()
     node.publish("/early")
     assert any("/early" in line for line in node.lines)
     again = Master(port)
     wait_until(lambda: "/early" in again.names(), "the registration")
-    again.listener.server_close()
+    again.close()
 
 
 def test_what_is_registered_is_withdrawn(node, master):
