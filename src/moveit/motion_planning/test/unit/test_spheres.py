@@ -349,3 +349,17 @@ def test_a_scene_without_time_is_coarse_and_gets_better_with_the_next_request():
     other = scene.with_object(WorldObject("ring", pose((0.1, 0.0, 0.0)), ((ring, np.eye(4)),)))
     with pytest.raises(KeyError):
         SphereChecker(spheres, group, other, patience=Patience(check=ended))
+
+
+@pytest.mark.parametrize("link", ['<box size="0.2 0.2 0.2"/>', '<cylinder radius="0.1" length="0.2"/>'])
+@pytest.mark.parametrize(("padding", "scale"), [(0.1, 1.0), (0.0, 0.5), (0.05, 0.8), (0.0, 1.5)])
+def test_spheres_contain_a_link_that_is_padded_or_scaled(link, padding, scale):
+    """A padded box has corners; a link of half the size is no thinner than its spheres."""
+    model = PlanningModel.from_xml(ROD.replace('<sphere radius="0.1"/>', link), "<robot name='rod'><group name='g'>"
+                                   "<chain base_link='base' tip_link='ball'/></group></robot>")
+    scene = Scene(model).with_padding({"ball": padding}, {"ball": scale}).with_object(
+        WorldObject("tip", np.eye(4), ((Sphere(0.005), np.eye(4)),)))
+    exact, checker = ExactChecker(model, None), SphereChecker(SphereModel.of(model, None), model.groups["g"], scene)
+    states = np.random.default_rng(1).uniform(-0.3, 0.3, (400, 3))
+    free = states[checker.valid(states)]
+    assert len(free) and exact.first_blocked(scene, free, "g") is None

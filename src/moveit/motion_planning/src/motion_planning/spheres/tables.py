@@ -18,7 +18,7 @@ from motion_planning.spheres.cover import ball
 from motion_planning.spheres.pair_maps import pair_map
 from motion_planning.spheres.sphere_model import Patience, object_spheres
 from motion_planning.spheres.world_tables import Tree, forest, pyramid, solids_of, tree_of
-from urdf_model import Plane
+from urdf_model import Box, Cylinder, Plane
 
 # Clusters on the same joint become one if the ball around both is at most this much larger than the larger one's.
 _MERGED = 1.25
@@ -198,7 +198,8 @@ def _robot(sphere_model, group, scene, state, about):
         if joint >= 0:
             spheres = sphere_model.spheres(name)
             if len(spheres):
-                movers.append(_Mover(name, frozenset(), joint, _moved(spheres, pose, _padding(scene, name, spheres))))
+                movers.append(_Mover(name, frozenset(), joint, _moved(spheres, pose, _padding(
+                    scene, name, spheres, sphere_model.parts(name)))))
         elif sphere_model.fixed(name):
             pad = scene.link_padding.get(name, 0.0)
             still.append((name, frozenset(), sphere_model.kept(
@@ -325,12 +326,15 @@ def _moved(spheres, pose, larger):
     return np.column_stack([spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3], spheres[:, 3] + larger])
 
 
-def _padding(scene, link, spheres):
-    """How much larger [m] a link becomes: its padding, and the effect of its scale at the farthest point."""
+def _padding(scene, link, spheres, parts):
+    """How much larger [m] the spheres of a link become: its padding, which reaches farther at the corners of boxes and
+    the edges of cylinders, and the effect of its scale at the farthest point; a smaller scale has none."""
     larger, scale = scene.link_padding.get(link, 0.0), scene.link_scale.get(link, 1.0)
-    if scale != 1.0:
+    corner = max((math.sqrt(3.0 if isinstance(geometry, Box) else 2.0) for geometry, _ in parts
+                  if isinstance(geometry, Box | Cylinder)), default=1.0)
+    if scale > 1.0:
         larger += (scale - 1.0) * float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max(initial=0.0))
-    return larger
+    return corner * larger
 
 
 def _made_once(sphere_model, function, spheres):
