@@ -21,7 +21,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "actionlib.action_client": "lab_environment.lost_goals",
            "moveit_msgs.msg._PositionIKRequest": "lab_environment.former_fields",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
-           "rosgraph.roslogging": "lab_environment.full_disk lab_environment.hidden_tokens",
+           "rosgraph.roslogging": "lab_environment.full_disk",
            "roslaunch.config": "lab_environment.hidden_tokens",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
@@ -67,7 +67,8 @@ def _add_the_workspaces_packages() -> None:
     The virtual environment is the one that comes first in PATH. Its packages come before Debian's, as for its own
     Python: a package's parts from both would not fit each other. The system's programs keep Debian's alone.
     """
-    if sys.prefix != sys.base_prefix or not _runs_a_users_program(sys.orig_argv[1:]):
+    # Python 3.9 and older, whose packages are others, do not say what they run.
+    if sys.prefix != "/usr" or not _is_a_users(_program(getattr(sys, "orig_argv", ["", "-m"])[1:])):
         return
     for folder in os.environ.get("PATH", "").split(os.pathsep):
         if os.path.isfile(os.path.join(folder, "python3")):
@@ -79,10 +80,23 @@ def _add_the_workspaces_packages() -> None:
             return
 
 
-def _runs_a_users_program(words: list[str]) -> bool:
-    """Whether Python, called with `words`, runs something else than a module or a program of the system."""
-    program = next((word for word in words if not word.startswith("-")), "")
-    return "-m" not in words[:1] and not program.startswith(SYSTEM_FOLDERS)
+def _program(words: list) -> str:
+    """What Python, called with `words`, runs: a file, "-c" or "-m"; "" where its user types."""
+    words = iter(words)
+    for word in words:
+        if not word.startswith("-"):
+            return word
+        option = "" if word.startswith("--") else next((sign for sign in word if sign in "cmWX"), "")
+        if option in ("c", "m"):
+            return "-" + option
+        if word == "--check-hash-based-pycs" or (option and word.endswith(option)):
+            next(words, "")  # the option's value
+    return ""
+
+
+def _is_a_users(program: str) -> bool:
+    """Whether a program is something else than a module or a program of the system."""
+    return program != "-m" and not program.startswith(SYSTEM_FOLDERS)
 
 
 def _run_the_next():

@@ -43,17 +43,15 @@ def hide_in_logs() -> None:
     logging.setLogRecordFactory(made)
 
 
-def amend(module) -> None:
-    """Called when rosgraph.roslogging, which opens ROS's log files, or roslaunch.config, which writes a summary of the
-    parameters, has been loaded.
+def amend(config) -> None:
+    """Called when roslaunch.config, which writes a summary of the parameters, has been loaded: before roslaunch logs.
+    Other programs' logs are their own: a text with "token:" in it is what they mean.
     """
     hide_in_logs()
-    config = getattr(module, "ROSLaunchConfig", None)
-    if config is not None:
-        summary = config.summary
+    summary = config.ROSLaunchConfig.summary
 
-        @functools.wraps(summary)
-        def without_tokens(*args, **kwargs):
-            return hidden(summary(*args, **kwargs))
+    @functools.wraps(summary)
+    def without_tokens(*args, **kwargs):
+        return hidden(summary(*args, **kwargs))
 
-        config.summary = without_tokens
+    config.ROSLaunchConfig.summary = without_tokens

@@ -53,3 +53,10 @@ def test_roslaunch_logs_and_shows_no_token(tmp_path):
     assert "/token: …" in done.stdout and "9090" in done.stdout, done.stderr
     log = (tmp_path / "launch.log").read_text()
     assert "LAB_WEB_TOKEN" in log and "s3cret" not in log + done.stdout
+
+
+def test_users_programs_log_what_they_like(tmp_path):
+    program = "import logging, rosgraph.roslogging; logging.basicConfig(); logging.warning('token: %d', 3)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
+                          env={"PYTHONPATH": str(OURS), "PATH": os.environ["PATH"], "HOME": str(tmp_path)})
+    assert "token: 3" in done.stderr

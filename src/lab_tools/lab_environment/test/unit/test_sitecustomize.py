@@ -74,7 +74,7 @@ def test_a_users_script_for_debians_python_finds_what_python3_finds(tmp_path):
     script.write_text("import numpy, yaml; print(getattr(numpy, 'FROM', 'Debian'))")
     assert of_system_python(tmp_path / "bin", script) == ("Debian\n", "")  # a folder, no virtual environment
     (tmp_path / "pyvenv.cfg").write_text("")
-    for words in ((script,), ("-u", script), ("-c", script.read_text())):
+    for words in ((script,), ("-u", script), ("-W", "ignore", script), ("-X", "utf8", "-uc", script.read_text())):
         assert of_system_python(tmp_path / "bin", *words) == ("the workspace\n", "")
     assert of_system_python("/usr/bin", script) == ("Debian\n", "")
 
@@ -82,8 +82,9 @@ def test_a_users_script_for_debians_python_finds_what_python3_finds(tmp_path):
 def test_the_systems_programs_keep_debians_packages():
     # They would find parts of cffi from both: the package of one version, its extension module of another.
     path = os.environ["PATH"].split(":")[0]
-    done = of_system_python(path, "/usr/bin/rosbag", "-h")
+    done = of_system_python(path, "-W", "ignore", "/usr/bin/rosbag", "-h")
     assert "Traceback" not in done[1] and "play" in done[0]
+    assert path.removesuffix("/bin") not in of_system_python(path, "-um", "site")[0]
 
 
 def without_reader(program, *options):
