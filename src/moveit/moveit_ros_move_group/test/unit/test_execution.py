@@ -2,6 +2,7 @@
 """Trajectories are followed to their end, or everything that moves is stopped."""
 import contextlib
 import threading
+from types import SimpleNamespace
 
 import actionlib
 import pytest
@@ -249,7 +250,7 @@ class Client:
     """actionlib's client."""
 
     def __init__(self, *_):
-        self.sent = []
+        self.sent, self.manager = [], SimpleNamespace()
 
     def send_goal(self, goal, moved):
         self.sent.append(Sent(moved))
