@@ -9,7 +9,7 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.shapes import Cone, Octree, TriangleMesh
-from motion_planning.spheres import CoverError, Patience, SphereChecker, SphereModel, sphere_model
+from motion_planning.spheres import CoverError, Patience, SphereChecker, SphereModel, sphere_model, tables
 from motion_planning.spheres import cover as covers
 from motion_planning.spheres.cover import ball, boxes_of_cells, cover, voxels
 from motion_planning.spheres.world_tables import forest, pyramid, solids_of, tree_of
@@ -166,6 +166,17 @@ def test_a_held_object_of_any_size_gets_few_spheres_that_contain_it(solid, late)
     points = points @ where[:3, :3].T + where[:3, 3]
     far = np.linalg.norm(points[:, None] - spheres[:, :3], axis=2) - spheres[:, 3]
     assert far.min(axis=1).max() <= 1e-9 * np.abs(points).max()
+
+
+def test_a_held_object_of_many_shapes_gets_few_spheres_that_contain_it(monkeypatch):
+    monkeypatch.setattr(tables, "_MOST_HALVINGS", 6)
+    corners = np.random.default_rng(2).normal(size=(50, 3))
+    held = WorldObject("h", np.eye(4), tuple((Box((0.01, 0.01, 0.01)), pose(corner)) for corner in corners))
+    coarse = set()
+    spheres = tables._spheres_of(held, TOLERANCE, Patience(late=lambda: True), coarse)
+    assert len(spheres) == 64 and coarse
+    points = corners + [0.005, -0.005, 0.005]
+    assert all((np.linalg.norm(spheres[:, :3] - point, axis=1) <= spheres[:, 3]).any() for point in points)
 
 
 # -- the checker ----------------------------------------------------------------------------------------------------

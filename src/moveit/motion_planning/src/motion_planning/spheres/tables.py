@@ -24,6 +24,8 @@ from urdf_model import Box, Cylinder, Plane
 _MERGED = 1.25
 # Number of spheres that are checked one by one.
 _FEW_SPHERES = 4
+# Levels of halving that give a held object's greatest number of spheres, 4096: the robot has some hundred.
+_MOST_HALVINGS = 12
 _ENDLESS = Patience()
 
 
@@ -407,7 +409,20 @@ def _spheres_of(item, tolerance, patience, coarse):
         found.append(spheres)
         if beyond is not None:
             coarse.add("spheres that reach up to %.3g m beyond it" % beyond)
-    return np.concatenate(found) if found else np.empty((0, 4))
+    spheres = np.concatenate(found) if found else np.empty((0, 4))
+    if len(spheres) > 2**_MOST_HALVINGS:
+        coarse.add("%d spheres instead of %d" % (2**_MOST_HALVINGS, len(spheres)))
+        return np.array([ball(some, steps=12) for some in _halved(spheres, _MOST_HALVINGS)])
+    return spheres
+
+
+def _halved(spheres, times):
+    """2**times groups of neighbours among ``spheres`` (n, 4)."""
+    if not times:
+        return [spheres]
+    order = spheres[np.argsort(spheres[:, np.ptp(spheres[:, :3], axis=0).argmax()], kind="stable")]
+    middle = len(order) // 2
+    return [group for half in (order[:middle], order[middle:]) for group in _halved(half, times - 1)]
 
 
 def _placed(parts, pose):
