@@ -66,6 +66,12 @@ def arm_radius(robot):
                 for shape in link.collisions if isinstance(shape.geometry, Cylinder)), default=0.0)
 
 
+def avoided_balls(robot):
+    """[(link, centre (3,) in `base` [m], distance [m])]: collision avoidance holds an arm whose middle line, from joint
+    number FIRST_AVOIDING on, comes so near to the centre; it is a guard's radius and the arm's."""
+    return [(name, centre, radius + arm_radius(robot)) for name, centre, radius in head_guards(robot)]
+
+
 def cup_of(robot, side):
     """(frame at the rim, radius [m]) of the cup that one arm carries, or None.
 

@@ -15,6 +15,8 @@ HEAD = "head"
 # only solid part is the head, which has no collision shape in the description.
 HEAD_GUARDS = ("collision_head_link_1", "collision_head_link_2")
 _SOLIDS = {HEAD: "as drawn", "screen": "as drawn", **dict.fromkeys(HEAD_GUARDS, "hollow")}
+# The first joint of an arm, counted from 0, whose link comes near them: e0, the elbow's.
+FIRST_AVOIDING = 2
 # An arm from torso to wrist; the links of the description, of which several are one body.
 SHOULDER, UPPER_ARM = "upper_shoulder", "lower_shoulder"
 BEYOND_UPPER_ARM = ("upper_elbow", "lower_elbow", "upper_forearm", "lower_forearm", "wrist")

@@ -5,11 +5,11 @@ import pytest
 from std_msgs.msg import Empty
 
 from baxter_model import JOINTS, SIDES, poses, tip_of
-from baxter_model.description import arm_radius, head_guards
+from baxter_model.description import arm_radius, avoided_balls, head_guards
 from baxter_model.self_collision import HEAD, HEAD_GUARDS
 from baxter_sim_hardware.arms import avoidance, collision
 from baxter_sim_hardware.topics.collision import guards_of
-from baxter_sim_kinematics import Chain
+from baxter_sim_kinematics import Chain, OwnBody
 
 HEARD = ("state", "limb/*/collision_avoidance_state")
 
@@ -20,6 +20,12 @@ FOLDED, UNFOLDED = ([poses().angles(pose, name.split("_")[0])[name] for name in 
 PERIOD_TICKS = 25  # tuck_arms commands and suppresses at 20 Hz
 FINGERS = ("l_gripper_l_finger_joint", "l_gripper_r_finger_joint", "r_gripper_l_finger_joint",
            "r_gripper_r_finger_joint")
+
+
+class TouchesNothing:
+    @staticmethod
+    def contact(joint_names, q):
+        return None
 
 
 def own_contacts(lab):
@@ -79,6 +85,19 @@ def test_distance_and_closing_speed_are_those_of_the_geometry(robot, side):
             near = avoidance.field(one, *chain.joint_frames(q), rates).near
             assert near == ((name,) if distance < avoidance.FIELD_M else ())
     assert checked > 10
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_ik_leaves_out_the_postures_in_which_the_field_holds_an_arm(robot, side):
+    """Inverse kinematics knows the field without its speeds."""
+    guards, chain = guards_of(robot), Chain.from_robot(robot, tip=tip_of(side))
+    body = OwnBody(chain, avoided_balls(robot), avoidance.FIRST_JOINT, TouchesNothing())
+    held = 0
+    for q in np.random.default_rng(6).uniform(chain.lower, chain.upper, (500, 7)):
+        _, nearest, _ = avoidance._distances(guards.centres, guards.radii, *chain.joint_frames(q), np.zeros(7))
+        assert body(q) == (nearest >= 0.0)
+        held += nearest < 0.0
+    assert 20 < held < 400
 
 
 @pytest.mark.parametrize("kinds", [(), (collision.AVOIDANCE,), (collision.BODY_AVOIDANCE,)])

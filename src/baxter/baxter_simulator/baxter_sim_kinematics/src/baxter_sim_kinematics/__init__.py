@@ -4,7 +4,7 @@
 from baxter_sim_kinematics.batch import BatchResult, solve_batch
 from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.chain import Chain, wrench_from_torques
-from baxter_sim_kinematics.collision import CollisionChecker, Touch
+from baxter_sim_kinematics.collision import CollisionChecker, OwnBody, Touch
 from baxter_sim_kinematics.errors import ChainError, InvalidPosture, InvalidTarget, KinematicsError, NoSolution, Reason
 from baxter_sim_kinematics.ik import Several, solve, solve_all, solve_as_vendor, warm_up
 from baxter_sim_kinematics.posture_map import PostureMap
@@ -22,6 +22,7 @@ __all__ = [
     "InvalidTarget",
     "KinematicsError",
     "NoSolution",
+    "OwnBody",
     "PostureMap",
     "Reason",
     "Several",

@@ -5,6 +5,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from baxter_sim_kinematics.chain import Chain
 from baxter_sim_kinematics.errors import Attempt, NoSolution, Reason
 from baxter_sim_kinematics.search import Collection, IkResult
 
@@ -26,6 +27,32 @@ class CollisionChecker(Protocol):
 
     def contact(self, joint_names, q):
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+
+
+class OwnBody:
+    """Whether a robot can be in a posture, as far as its own body is concerned: nothing of it touches, and it is not
+    where its own collision avoidance holds the arm.
+
+    chain: of the arm; balls: [(link, centre (3,) [m], distance [m])] as of ``baxter_model.description.avoided_balls``;
+    first: joint from which on the arm's middle line is kept so far from the centres, counted from 0; checker: a
+    CollisionChecker.
+    """
+
+    def __init__(self, chain: Chain, balls: list, first: int, checker: CollisionChecker) -> None:
+        self._chain, self._first, self._checker = chain, first, checker
+        self._centres = np.array([centre for _, centre, _ in balls]).reshape(-1, 1, 3)
+        self._distances = np.array([distance for _, _, distance in balls])
+
+    def __call__(self, q: np.ndarray) -> bool:
+        return not self._is_held(q) and self._checker.contact(self._chain.joint_names, q) is None
+
+    def _is_held(self, q: np.ndarray) -> bool:
+        origins = self._chain.joint_frames(q)[1][self._first:]
+        begins, steps = origins[:-1], np.diff(origins, axis=0)
+        lengths = np.maximum((steps ** 2).sum(axis=1), 1e-12)
+        shares = np.clip(((self._centres - begins) * steps).sum(axis=2) / lengths, 0.0, 1.0)
+        gaps = np.linalg.norm(begins + shares[..., None] * steps - self._centres, axis=2).min(axis=1, initial=np.inf)
+        return bool((gaps < self._distances).any())
 
 
 def first_free(search, found, checker):

@@ -135,6 +135,14 @@ class PositionKinematics(unittest.TestCase):
             # How the vendor's clients read it.
             self.assertEqual(struct.unpack("<%dB" % len(answer.result_type), answer.result_type), (1,))
 
+    def test_answer_is_a_posture_in_which_the_robot_can_be(self):
+        # Newton's steps lead to s0 = -1.05, the upper arm within the field of the head and the elbow in the torso.
+        begin = (0.0329, -0.6053, -0.1102, 0.634, 0.0752, 1.3591, 0.0256)
+        high = ((0.6, 0.3, 0.3), (0.0, 1.0, 0.0, 0.0))
+        answer = self.ask("left", [pose(*high)], [seed("left", begin)])
+        self.assert_solved("left", answer, 0, *high, 1)
+        self.assertAlmostEqual(answer.joints[0].position[0], -0.272, delta=0.01)
+
     def test_seed_modes_start_where_they_say(self):
         tip = self.chains["left"].fk(CURRENT)
         here = pose(tip[:3, 3], quaternion_from_matrix(tip))

@@ -5,7 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Chain
+from baxter_model.description import avoided_balls
+from baxter_model.self_collision import FIRST_AVOIDING
+from baxter_sim_kinematics import Chain, OwnBody
+from baxter_sim_kinematics.bullet_checker import self_checker
+from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 from urdf_model.transforms import rigid
 
@@ -31,6 +35,14 @@ def side(request):
 @pytest.fixture(scope="session")
 def chain(robot, side):
     return Chain.from_robot(robot, "base", side + "_gripper")
+
+
+@pytest.fixture
+def own_body(robot, chain):
+    """Whether the robot can be in a posture of the arm, as the service asks it."""
+    checker = self_checker(robot, ResourceFinder())
+    yield OwnBody(chain, avoided_balls(robot), FIRST_AVOIDING, checker)
+    checker.close()
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,10 @@ NEUTRAL = np.array([0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0])
 LAB_POSE = pose_from_quaternion((0.644, 0.0, 0.066), (-0.381, 0.923, -0.015, 0.052))
 LAB_ANGLES = np.array([-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.7033657530084771,
                        0.3050684684989051, 0.8610601980794869, -1.4742358938106646])
+# A pose above the shoulder, from a posture near neutral: Newton's steps lead the upper arm to the head, and the elbow
+# into the torso.
+HIGH_POSE = pose_from_quaternion((0.6, 0.3, 0.3), (0.0, 1.0, 0.0, 0.0))
+HIGH_SEED = np.array([0.0329, -0.6053, -0.1102, 0.634, 0.0752, 1.3591, 0.0256])
 # Ends the search where the vendor's steps end: any posture is exact enough.
 AS_IT_ARRIVES = Budget(tolerance_m=1.0, tolerance_rad=1.0)
 MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
@@ -95,15 +99,52 @@ def test_steps_lead_where_kdls_do(chain, kdl_solve):
 
 
 def test_answers_are_exact_whether_the_steps_arrive_or_not(chain):
-    arrived = 0
+    arrived, round_about = 0, 0
     for q in np.random.default_rng(8).uniform(chain.lower, chain.upper, (200, 7)):
         target = Target.of(chain.fk(q))
         result = solve_as_vendor(chain, target, NEUTRAL)
         assert_exact(chain, result.q, target.pose)
-        found = Search(chain, target, NEUTRAL, None, Budget()).newton()
+        found, nearest = Search(chain, target, NEUTRAL, None, Budget()).newton(), solve(chain, target, NEUTRAL).q
+        is_near = (np.abs(found.q - NEUTRAL) - np.abs(nearest - NEUTRAL)).max() <= np.pi / 2
         arrived += found.arrived
-        np.testing.assert_array_equal(result.q, found.q if found.arrived else solve(chain, target, NEUTRAL).q)
-    assert 80 < arrived < 150
+        round_about += found.arrived and not is_near
+        np.testing.assert_array_equal(result.q, found.q if found.arrived and is_near else nearest)
+    assert 80 < arrived < 150 and 20 < round_about < 0.6 * arrived
+
+
+def test_answers_near_the_seed_are_the_vendors(chain):
+    """Poses as programs ask for them: nineteen of twenty times, Newton's steps lead to the nearest configuration."""
+    around = np.clip(NEUTRAL + np.random.default_rng(4).uniform(-0.8, 0.8, (200, 7)), chain.lower, chain.upper)
+    found = [Search(chain, Target.of(pose), NEUTRAL, None, Budget()).newton() for pose in map(chain.fk, around)]
+    kept = [np.array_equal(solve_as_vendor(chain, chain.fk(q), NEUTRAL).q, one.q)
+            for q, one in zip(around, found, strict=True) if one.arrived]
+    assert len(kept) >= 180 and sum(kept) >= 0.9 * len(kept)
+
+
+def test_posture_in_which_the_robot_cannot_be_is_not_the_answer(chain, side, own_body):
+    pose, seed = (HIGH_POSE, HIGH_SEED) if side == "left" else (MIRROR @ HIGH_POSE @ MIRROR, SIGNS * HIGH_SEED)
+    newton = solve_as_vendor(chain, pose, seed).q
+    # Either would hold the arm: the field around the head, and the torso.
+    assert not own_body(newton) and own_body._is_held(newton)
+    assert own_body._checker.contact(chain.joint_names, newton) is not None
+    answer = solve_as_vendor(chain, pose, seed, is_possible=own_body).q
+    np.testing.assert_array_equal(answer, solve(chain, pose, seed).q)
+    assert own_body(answer)
+    lab_pose = LAB_POSE if side == "left" else MIRROR @ LAB_POSE @ MIRROR
+    np.testing.assert_array_equal(solve_as_vendor(chain, lab_pose, NEUTRAL, is_possible=own_body).q,
+                                  solve_as_vendor(chain, lab_pose, NEUTRAL).q)
+
+
+def test_no_answer_is_impossible_where_the_nearest_solution_is_possible(chain, own_body):
+    refused, saved = 0, 0
+    for q in np.random.default_rng(11).uniform(chain.lower, chain.upper, (200, 7)):
+        pose = chain.fk(q)
+        answer, nearest = (own_body(one.q) for one in (
+            solve_as_vendor(chain, pose, NEUTRAL, is_possible=own_body), solve(chain, pose, NEUTRAL)))
+        assert answer or not nearest
+        saved += answer and not nearest
+        refused += nearest and not own_body(solve_as_vendor(chain, pose, NEUTRAL).q)
+    assert refused > 0 and saved > 0
 
 
 def test_near_the_seed_the_answer_is_nearly_the_nearest(chain):

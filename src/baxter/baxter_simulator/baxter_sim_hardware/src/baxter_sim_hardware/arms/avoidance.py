@@ -12,17 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from baxter_model import self_collision
 from numba_cache import compiler
 
-_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
+_compiled = compiler("baxter_sim_hardware", [__file__, self_collision.__file__], error_model="numpy")
 
 # [s] The approach speed is at most the gap divided by this time: an elbow at 1 m/s is slowed from 0.15 m on, by less
 # than the set-points' own deceleration.
 CLOSING_S = 0.15
 FIELD_M = 0.03  # within this distance of a guard, an arm counts as being in the field
-# The first joint of an arm whose link comes near the head: e0, the elbow's. The links from there on are the chain of
-# capsules.
-FIRST_JOINT = 2
+# The links from this joint on are the chain of capsules.
+FIRST_JOINT = self_collision.FIRST_AVOIDING
 
 
 class Guards(NamedTuple):

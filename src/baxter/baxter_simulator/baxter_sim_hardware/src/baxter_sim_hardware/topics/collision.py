@@ -5,7 +5,7 @@ from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionStat
 from std_msgs.msg import Header
 
 from baxter_model import BASE_FRAME, SIDES
-from baxter_model.description import arm_radius, head_guards
+from baxter_model.description import avoided_balls
 from baxter_model.readiness import UNFOLD
 from baxter_model.self_collision import BODY
 from baxter_sim_hardware.arms import avoidance, collision, safety
@@ -31,10 +31,10 @@ def _near(field):
 
 def guards_of(robot):
     """`avoidance.Guards` of an urdf_model.Robot."""
-    balls = head_guards(robot)
+    balls = avoided_balls(robot)
     return avoidance.Guards(tuple(name for name, _, _ in balls),
                             np.array([centre for _, centre, _ in balls]).reshape(-1, 3),
-                            np.array([radius for _, _, radius in balls]) + arm_radius(robot))
+                            np.array([radius for _, _, radius in balls]))
 
 
 class CollisionTopics(Part):
