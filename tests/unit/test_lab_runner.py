@@ -301,6 +301,13 @@ def test_a_run_counts_everything(tmp_path, fake_rostest, words):
     assert done.returncode == 1 and "test_one.py::test_skipped_without_a_reason: skipped without" in done.stdout
 
 
+def test_an_error_of_pytest_itself_fails_the_run(tmp_path):
+    (tmp_path / "test_one.py").write_text("def test_one(): pass")
+    (tmp_path / "conftest.py").write_text("def pytest_runtest_logfinish(): raise RuntimeError('broken')")
+    done = run_pytest(tmp_path)
+    assert done.returncode != 0 and done.stdout.splitlines()[-1].startswith("1 passed, 1 failed")
+
+
 def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path):
     (tmp_path / "test_one.py").write_text(UNIT % False)
     done = run_pytest(tmp_path, "-k", "leaves or comma")

@@ -204,7 +204,7 @@ class Controller:
     """In the process that the user started: which worker runs what, the counts, the last line."""
 
     def __init__(self, config):
-        self._folder = work_folder(config)
+        self._config, self._folder = config, work_folder(config)
         self._total = Tally()
         self._took: dict[str, list[float]] = {}
 
@@ -217,6 +217,12 @@ class Controller:
         properties = dict(report.user_properties)
         if report.when == "teardown":
             took[1] += properties.get("processor_s", 0.0)
+        is_rostest = report.when == "call" and report.nodeid.endswith(".test::rostest")
+        if report.failed or is_rostest:
+            # pytest itself tells failures at the end; a whole run is long.
+            terminal = self._config.pluginmanager.get_plugin("terminalreporter")
+            terminal.ensure_newline()
+            terminal.write_line(f"{report.outcome.upper()} {report.nodeid} ({report.duration:.0f} s)")
         if report.failed:
             self._total.failed += max(1, properties.get("failed", 1) if report.when == "call" else 1)
             self._total.details.append(f"{report.nodeid}\n{report.longreprtext}")
@@ -250,6 +256,9 @@ class Controller:
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session):
         self._total.refuse_bare_skips()
+        ordinary = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+        if session.exitstatus not in ordinary and not self._total.failed:
+            self._fail(f"pytest ended with exit code {int(session.exitstatus)}")
         if self._total.failed or not self._total.passed:
             session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
         took = {file: round(both[0], 1) for file, both in self._took.items() if both[0] >= MIN_DURATION_S}
