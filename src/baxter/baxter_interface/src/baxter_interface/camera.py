@@ -12,6 +12,8 @@ from .camera_settings import AUTO, CONTROLS, MODES, CameraSettings
 from .services import call_service, wait_for_service
 
 LIST_TIMEOUT_S = 10.0
+# So many of a physical robot's three cameras have power at a time; a simulated one may power them all.
+MAX_POWERED = 2
 # Mounted upside down behind the screen.
 TURNED_CAMERA = "head_camera"
 
@@ -43,9 +45,10 @@ class CameraController:
         self._id = name
         names = list_cameras()
         if name not in names:
-            raise UnknownCamera("there is no camera %r: those with power are %s. At most two of the three are on at a "
-                                 "time; closing one may power another"
-                                 % (name, ", ".join(map(repr, names)) or "none"))
+            more = "" if len(names) > MAX_POWERED else (
+                ". At most two of the three are on at a time; closing one may power another")
+            raise UnknownCamera("there is no camera %r: those with power are %s%s"
+                                % (name, ", ".join(map(repr, names)) or "none", more))
         for service in ("/cameras/open", "/cameras/close"):
             wait_for_service(service, LIST_TIMEOUT_S)
         self._settings = CameraSettings()

@@ -50,9 +50,9 @@ def run(node_name, body, **options):
         return 1 if rospy.is_shutdown() else 0
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
     except (OSError, ValueError, rospy.ROSException) as error:
+        if getattr(error, "errno", None) == errno.EPIPE:
+            raise  # of the standard output: lab_environment ends the program without a word
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1
     finally:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera settings: what is taken, and what is refused with which text."""
+"""Cameras and their settings: what is taken, and what is refused with which text."""
 import pytest
 
+from baxter_interface import camera
 from baxter_interface.camera_settings import AUTO, MODES, CameraSettings
 
 
@@ -56,3 +57,13 @@ def test_window_stays_on_the_sensor():
 def test_rate_is_a_positive_number(fps):
     with pytest.raises(ValueError, match="above 0"):
         CameraSettings().set_fps(fps)
+
+
+@pytest.mark.parametrize(("names", "may_lack_power"), [
+    (["left_hand_camera", "right_hand_camera", "head_camera"], False), (["left_hand_camera", "head_camera"], True)])
+def test_unknown_camera_is_answered_by_those_that_are_there(monkeypatch, names, may_lack_power):
+    monkeypatch.setattr(camera, "list_cameras", lambda: names)
+    with pytest.raises(camera.UnknownCamera) as caught:
+        camera.CameraController("left_hand")
+    text = str(caught.value)
+    assert all(name in text for name in names) and ("closing" in text) is may_lack_power

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A program's message when its robot is disabled or stopped meanwhile."""
+"""How a program ends, also when its robot is disabled or stopped meanwhile."""
+import errno
+import signal
 import types
 
 import pytest
 
+from baxter_interface import programs
 from baxter_interface.programs import EnabledRobot, ProgramFailed, RobotLost
 
 
@@ -50,3 +53,28 @@ def test_a_robot_that_was_disabled_before_is_disabled_again(robot):
     with robot:
         assert robot.is_enabled()
     assert not robot.is_enabled()
+
+
+@pytest.fixture
+def ending(monkeypatch):
+    """Runs a program that ends with an error while it works; returns its exit code."""
+    def run(error):
+        def body():
+            raise error
+        return programs.run("tuck", body)
+
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr(programs.startup, "init_node", lambda *_, **__: None)
+    monkeypatch.setattr(programs.rospy, "signal_shutdown", lambda reason: None)
+    return run
+
+
+def test_shutdown_during_a_wait_is_one_line(ending, capsys):
+    assert ending(OSError(errno.ESHUTDOWN, "was waiting for a robot")) == 1
+    said = capsys.readouterr().err
+    assert said.endswith(": was waiting for a robot\n") and said.count("\n") == 1
+
+
+def test_lost_reader_of_the_output_is_left_to_the_environment(ending):
+    with pytest.raises(BrokenPipeError):
+        ending(OSError(errno.EPIPE, "Broken pipe"))
