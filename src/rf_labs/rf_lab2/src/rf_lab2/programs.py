@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Start and end of the lab's programs."""
+import errno
 import os
 import sys
 
@@ -23,7 +24,9 @@ def run(node_name, body):
         body()
     except rospy.ROSInterruptException:
         return 130
-    except BrokenPipeError:
+    except BrokenPipeError as error:
+        if error.errno == errno.ESHUTDOWN:  # Ctrl-C while the SDK waited
+            return 130
         raise  # of the standard output: lab_environment ends the program without a word
     except (ProgramFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)

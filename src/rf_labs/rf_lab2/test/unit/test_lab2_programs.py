@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How the lab's programs end."""
+import errno
+
 import pytest
 import rospy
 
@@ -17,7 +19,8 @@ def without_a_robot(monkeypatch):
     monkeypatch.setattr(programs.startup, "init_node", lambda name: None)
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), rospy.ROSInterruptException("ROS shutdown request")])
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), rospy.ROSInterruptException("ROS shutdown request"),
+                                   OSError(errno.ESHUTDOWN, "ROS is shutting down; was waiting for a robot")])
 def test_ctrl_c_ends_a_program_without_a_word(error, capsys):
     assert programs.run("wave", raising(error)) == 130
     assert capsys.readouterr().err == ""
