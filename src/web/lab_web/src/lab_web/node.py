@@ -19,6 +19,7 @@ from urllib.parse import quote
 import rosgraph
 import rospkg
 import rospy
+from tornado import netutil
 
 from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
@@ -147,6 +148,9 @@ def serve(options, page, libraries):
     tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
     if tokens[0] == tokens[1]:
         raise Failure("--token and --view-token are the same; pages that only watch need another one")
+    port, network = _port(options), "" if options.public else "127.0.0.1"
+    # Before the node, whose name ends the page that has the port.
+    _require_free(port, network)
     return_large_blocks()
     limit_ports()
     end_on_signals()
@@ -183,9 +187,9 @@ def serve(options, page, libraries):
                                       *_notebook_routes(notebooks, access),
                                       (r"/snapshot", SnapshotHandler, {"server": video}))
     try:
-        serving = Serving(loop_thread, application, _port(options), "" if options.public else "127.0.0.1")
+        serving = Serving(loop_thread, application, port, network)
     except OSError as error:
-        raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
+        raise _no_port(port, error) from None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
         ("the robot's states", watch), *equipment.loops.items())]
     for thread in threads:
@@ -301,6 +305,19 @@ def _port(options):
         return ports.free_port(range(FIRST_PORT, FIRST_PORT + 100))
     except OSError as error:
         raise Failure(error.strerror) from None
+
+
+def _require_free(port: int, network: str) -> None:
+    """Raises Failure where the port is taken."""
+    try:
+        for opened in netutil.bind_sockets(port, network):
+            opened.close()
+    except OSError as error:
+        raise _no_port(port, error) from None
+
+
+def _no_port(port, error):
+    return Failure("port %d cannot be opened: %s; name another one by --port" % (port, error))
 
 
 def _announce(port, tokens, public):

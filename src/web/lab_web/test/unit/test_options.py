@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Options of ./baxter.sh web, and the addresses that it prints."""
+import socket
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -34,3 +35,11 @@ def test_the_operators_address_is_the_last_line_alone(port, is_launched):
     assert text.splitlines()[-1].strip() == "http://localhost:8090/?token=a" and "token=b" in text
     # Ctrl-C in roslaunch's terminal ends the lab.
     assert ("Ctrl-C" in text) is not is_launched and ("every machine" in text) is (port is not None)
+
+
+def test_a_taken_port_is_refused_before_the_node_ends_the_page_that_has_it(monkeypatch):
+    monkeypatch.setattr(node.rospy, "init_node", lambda *_, **__: pytest.fail("became a node"))
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(node.Failure, match=str(port)):
+            node.serve(node._parser().parse_args(["--port", str(port)]), None, None)
