@@ -10,6 +10,7 @@ those that come meanwhile with it. A node that starts before its master still wa
 import contextlib
 import functools
 import http.client
+import sys
 import threading
 import time
 import xml.parsers.expat
@@ -76,13 +77,13 @@ class _Registrar:
             except _NO_ANSWER as error:
                 if not self._has_answered and not is_told:
                     is_told = True
-                    self._rospy.logerr("the ROS master at %s does not answer (%s); this program waits for it",
-                                       self._manager.master_uri, error)
+                    self._say("the ROS master at %s does not answer (%s); this program waits for it"
+                              % (self._manager.master_uri, error))
                 if not self._has_answered or time.monotonic() < end_s:
                     time.sleep(RETRY_S)
                     continue
-                self._rospy.logerr("%s: the ROS master at %s does not answer (%s); it is asked again and again",
-                                   what[1], self._manager.master_uri, error)
+                self._say("%s: the ROS master at %s does not answer (%s); it is asked again and again"
+                          % (what[1], self._manager.master_uri, error))
             with self._lock:
                 self._late.append(what)
             threading.Thread(target=self._try_again, name="late registrations", daemon=True).start()
@@ -140,12 +141,19 @@ class _Registrar:
             self._manager.publisher_update(name, publishers)
 
     def _unregister(self, method, name, data):
-        rospy = self._rospy
         address = data if method == "Service" else self._manager.uri
         try:
-            getattr(self._proxy(), "unregister" + method)(rospy.get_caller_id(), name, address)
+            getattr(self._proxy(), "unregister" + method)(self._rospy.get_caller_id(), name, address)
         except (*_REFUSALS, *_NO_ANSWER) as error:
-            rospy.logwarn("%s is still registered, the ROS master does not answer: %s", ascii(name)[1:-1], error)
+            self._say("%s is still registered, the ROS master does not answer: %s" % (ascii(name)[1:-1], error))
+
+    def _say(self, line):
+        """Write to the log file and the terminal alone: for a line on /rosout, rospy may ask the master for a parameter
+        first, and wait for its answer without end.
+        """
+        self._manager.logger.error(line)
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            print(line, file=sys.stderr, flush=True)
 
     def _proxy(self):
         return master_calls.proxy(self._manager.master_uri, ANSWER_S)

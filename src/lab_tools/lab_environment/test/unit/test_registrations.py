@@ -68,8 +68,9 @@ def node(master, monkeypatch):
         registrations.amend(module)
     node = module.RegManager(SimpleNamespace(done=False))
     node.master_uri, node.uri, node.lines, node.ended = master.uri, "http://me", [], threading.Event()
-    for level in ("logerr", "logwarn"):
-        setattr(module, level, lambda text, *words: node.lines.append(text % words))
+    node.on_rosout = []
+    module.logerr = lambda text, *words: [told.append(text % words) for told in (node.lines, node.on_rosout)]
+    monkeypatch.setattr(node.logger, "error", node.lines.append)
     module.is_shutdown = node.ended.is_set
     node.publish = lambda name: node.reg_added(name, "std_msgs/Bool", module.Registration.PUB)
     node.withdraw = lambda name: node.reg_removed(name, "std_msgs/Bool", module.Registration.PUB)
@@ -100,6 +101,7 @@ def test_a_master_that_says_nothing_gets_all_of_them_when_it_answers_again(node,
         node.subscribe("/heard")
         assert any("/one" in line and master.uri in line for line in node.lines)
         assert not set(master.names()) & {"/two", "/three"}
+        assert not node.on_rosout  # rospy would ask the master for a parameter first
         master.answers.set()
     wait_until(lambda: {"/one", "/two", "/three"} <= set(master.names()), "the late registrations")
     wait_until(lambda: ("/heard", ["http://talker"]) in node.updates, "the publishers of the late subscription")
