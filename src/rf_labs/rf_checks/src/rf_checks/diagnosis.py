@@ -54,7 +54,7 @@ def check_syntax(source, name):
     except (RecursionError, MemoryError):
         return Fault("syntax", "Python cannot read the file: an expression in it is nested too deeply", 0.0)
     if not ast.parse(text).body:
-        return Fault("empty", "the file is empty, or holds nothing but remarks: was another one saved?", 0.0)
+        return Fault("empty", "the file is empty, or holds nothing but remarks: perhaps another one was saved", 0.0)
     return None
 
 
@@ -164,8 +164,8 @@ def behaviour(run, sides, limit_s):
         return Fault("requests", "the program asked the lab's nodes, as the IK service, for more than a minute of "
                      "computing and was stopped: ask for the poses that are needed, each once", 0.0)
     if run.ended == "memory":
-        return Fault("memory", "the program took more than 2 GB of memory and was stopped: does a list grow for ever?",
-                     0.0)
+        return Fault("memory", "the program took more than 2 GB of memory and was stopped: perhaps a list grows for "
+                     "ever", 0.0)
     if run.ended == "flood" or is_flood(run.recording.command_counts()):
         return Fault("flood", "joint commands came faster than %d a second: the robot reads some 100; end the loop "
                      "with rate.sleep() of a rospy.Rate(100)" % FLOOD_COMMANDS, 0.4)

@@ -68,7 +68,9 @@ def choose(lab, name, file_name, text):
     exercise's programs contain.
     """
     if lab not in LABS:
-        raise UnknownExercise("there is no lab '%s'; labs are %s%s" % (lab, ", ".join(LABS), did_you_mean(lab, LABS)))
+        owner = next((one.lab for one in EXERCISES if one.name == lab), None)
+        hint = "; '%s' is an exercise of %s" % (lab, owner) if owner else did_you_mean(lab, LABS)
+        raise UnknownExercise("there is no lab '%s'; labs are %s%s" % (lab, ", ".join(LABS), hint))
     of_lab = {exercise.name: exercise for exercise in EXERCISES if exercise.lab == lab}
     mark = _MARK.search(text)
     for asked, source in ((name, "on the command line"),

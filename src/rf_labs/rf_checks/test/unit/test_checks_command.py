@@ -51,6 +51,7 @@ def test_a_skeleton_is_copied_once_and_knows_its_exercise(name, capsys):
     (["wave.py"], "./baxter.sh check lab2 wave.py?"), (["plan_around"], "./baxter.sh check moveit plan_around.py?"),
     (["my_node.py", "lab2"], "expected LAB [EXERCISE] PROGRAM"),
     (["lab2", "."], "is a folder"), (["lab7", "my_node.py"], "no lab 'lab7'"),
+    (["plan_around", "my_node.py"], "is an exercise of moveit"),
     (["lab2", "wav", "my_node.py"], "no exercise 'wav'"), (["lab2", "my_node.py"], "lab2 wave my_node.py"),
     (["lab2", "wave", "my_node.py", "--seed", "-1"], "--seed: expected a whole number from 0"),
     (["lab2", "wave", "my_node.py", "--serial", "-1"], "--serial: expected a whole number from 0"),

@@ -158,6 +158,8 @@ def test_files_as_editors_on_windows_save_them_are_read(source):
 def test_an_empty_file_is_told(source):
     fault = diagnosis.check_syntax(source, "me.py")
     assert (fault.key, fault.cap) == ("empty", 0.0) and "empty" in fault.sentence
+    # The report sets the full stop.
+    assert fault.sentence[-1].isalnum()
 
 
 def test_the_sheets_quaternion_that_is_a_message_is_told():
