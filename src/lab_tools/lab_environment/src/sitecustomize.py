@@ -15,6 +15,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "rospy.impl.masterslave": "lab_environment.one_connection",
            "rospy.impl.registration": "lab_environment.registrations",
+           "rospy.impl.statistics": "lab_environment.registrations",
            "rospy.impl.tcpros_pubsub": "lab_environment.late_subscribers",
            "rospy.topics": "lab_environment.signals lab_environment.closed_connections",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",

@@ -27,9 +27,35 @@ ANSWER_S, RETRY_S = 5.0, 0.2
 _REFUSALS = (xmlrpc.client.Fault, xml.parsers.expat.ExpatError, ValueError, TypeError, OverflowError)
 _NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.ProtocolError)
 
+#: Set while the master does not answer.
+_silent = threading.Event()
 
-def amend(registration):
-    """Give the registrations of rospy.impl.registration's nodes a deadline."""
+
+def amend(module):
+    """Give the registrations of rospy.impl.registration's nodes a deadline, and the question of each subscriber of
+    rospy.impl.statistics, whether it shall keep statistics: it has the locks of all topics meanwhile, too.
+    """
+    if hasattr(module, "SubscriberStatisticsLogger"):
+        module.SubscriberStatisticsLogger.is_enabled = staticmethod(_keeps_statistics)
+    else:
+        _amend_registrations(module)
+
+
+def _keeps_statistics():
+    import rosgraph
+    import rospy
+
+    if _silent.is_set():
+        return False
+    try:
+        code, _, value = master_calls.proxy(rosgraph.get_master_uri(), ANSWER_S).getParam(
+            rospy.get_caller_id(), "/enable_statistics")
+    except (*_REFUSALS, *_NO_ANSWER):
+        return False
+    return code == 1 and value
+
+
+def _amend_registrations(registration):
     manager, kinds = registration.RegManager, registration.Registration
     added, removed = manager.reg_added, manager.reg_removed
     methods = {kinds.PUB: "Publisher", kinds.SUB: "Subscriber", kinds.SRV: "Service"}
@@ -130,10 +156,14 @@ class _Registrar:
                                                                           self._manager.uri)
         except _REFUSALS as error:
             code, text, publishers = 0, error, []
+        except _NO_ANSWER:
+            _silent.set()
+            raise
         finally:
             if is_free:
                 self._is_calling.release()
         self._has_answered = True
+        _silent.clear()
         if code != 1:
             rospy.logerr("%s is not registered, the ROS master refuses it: %s. Names have letters, digits, _ and /, "
                          "and begin with a letter, / or ~", ascii(name)[1:-1], text)

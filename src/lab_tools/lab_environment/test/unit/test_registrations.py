@@ -140,3 +140,22 @@ def test_what_is_registered_is_withdrawn(node, master):
     node.publish("/talk")
     node.withdraw("/talk")
     assert master.calls == [("registerPublisher", "/talk"), ("unregisterPublisher", "/talk")]
+
+
+def test_a_subscriber_does_not_ask_a_silent_master_for_its_statistics(node, master, monkeypatch):
+    statistics = SimpleNamespace(SubscriberStatisticsLogger=type("Logger", (), {}))
+    registrations.amend(statistics)
+    is_enabled = statistics.SubscriberStatisticsLogger.is_enabled
+    monkeypatch.setenv("ROS_MASTER_URI", master.uri)
+    asked = []
+    master.listener.register_function(lambda caller, name: asked.append(name) or (1, "", True), "getParam")
+    node.publish("/rosout")
+    assert is_enabled() and asked == ["/enable_statistics"]
+    master.answers.clear()
+    with socket.create_connection(master.listener.server_address):  # the request that it waits in
+        node.publish("/talk")
+        assert not is_enabled()
+    master.answers.set()
+    wait_until(lambda: "/talk" in master.names(), "the late registration")
+    wait_until(is_enabled, "statistics again")
+    assert set(asked) == {"/enable_statistics"}
