@@ -33,7 +33,7 @@ _silent = threading.Event()
 
 def amend(module):
     """Give the registrations of rospy.impl.registration's nodes a deadline, and the question of each subscriber of
-    rospy.impl.statistics, whether it shall keep statistics: it has the locks of all topics meanwhile, too.
+    rospy.impl.statistics, whether to keep statistics: it has the locks of all topics meanwhile, too.
     """
     if hasattr(module, "SubscriberStatisticsLogger"):
         module.SubscriberStatisticsLogger.is_enabled = staticmethod(_keeps_statistics)
