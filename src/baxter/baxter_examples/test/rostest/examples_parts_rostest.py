@@ -69,7 +69,7 @@ class ChannelsTest(ExamplesTest):
             ("analog_io_rampup.py",), ("digital_io_blink.py", "_component_id:=" + LIGHT), ("navigator_io.py", "-b"),
             ("xdisplay_image.py", "-f", picture), ("ik_service_client.py", "-l", "left"))}
         missing = [(self.start(name, *options), text) for name, options, text in (
-            ("xdisplay_image.py", ("-f", "/none.png"), "there is no such file"),
+            ("xdisplay_image.py", ("-f", "/none.png"), "No such file"),
             ("joint_position_file_playback.py", ("-f", "/none.csv"), "No such file"),
             ("digital_io_blink.py", ("-c", "no_light"), "/robot/digital_io/no_light/state"),
             ("gripper_action_client.py", ("-g", "right"), "rosrun baxter_interface gripper_action_server.py"))]
