@@ -47,9 +47,9 @@ def _add_shape(element, shape):
     if isinstance(geometry, Box):
         etree.SubElement(holder, "box", size=_words(geometry.size))
     elif isinstance(geometry, Cylinder):
-        etree.SubElement(holder, "cylinder", radius=repr(geometry.radius), length=repr(geometry.length))
+        etree.SubElement(holder, "cylinder", radius=_words([geometry.radius]), length=_words([geometry.length]))
     elif isinstance(geometry, Sphere):
-        etree.SubElement(holder, "sphere", radius=repr(geometry.radius))
+        etree.SubElement(holder, "sphere", radius=_words([geometry.radius]))
     elif isinstance(geometry, Mesh):
         mesh = etree.SubElement(holder, "mesh", filename=geometry.filename, scale=_words(geometry.scale))
         if geometry.submesh:
@@ -72,7 +72,7 @@ def _add_finish(material, finish):
     if any(finish.emission):
         etree.SubElement(material, "emission", rgb=_words(finish.emission))
     if finish.gloss is not None:
-        etree.SubElement(material, "gloss", value=repr(float(finish.gloss)))
+        etree.SubElement(material, "gloss", value=_words([finish.gloss]))
 
 
 def _add_origin(element, matrix):
@@ -80,4 +80,5 @@ def _add_origin(element, matrix):
 
 
 def _words(values):
+    # numpy 2 writes its own numbers as np.float64(0.1).
     return " ".join(repr(float(value)) for value in values)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from urdf_model import Finish, UrdfError, drawing_urdf, merge_fixed, parse_urdf
+from urdf_model import Cylinder, Finish, Sphere, UrdfError, drawing_urdf, merge_fixed, parse_urdf
 
 ROBOT = """<robot name="r">%s<link name="base"><visual><geometry><box size="1 2 3"/></geometry>%s</visual></link>
 <link name="tip"><visual><geometry><sphere radius="1"/></geometry><material name="wood"/></visual></link>
@@ -38,6 +38,13 @@ def test_the_drawing_keeps_everything():
     again = parse_urdf(drawing_urdf(merge_fixed(robot))).links["base"].visuals
     assert [shape.finish for shape in again] == [finish, None]
     assert again[0].geometry.size == (1.0, 2.0, 3.0) and np.allclose(again[0].origin, np.eye(4))
+
+
+@pytest.mark.parametrize("geometry", [Sphere(np.float64(0.1)), Cylinder(np.float64(0.1), np.float64(0.3))])
+def test_a_drawing_takes_numbers_of_numpy(geometry):
+    robot = parse_urdf(ROBOT % ("", "", ""))
+    robot.links["base"].visuals[0].geometry = geometry
+    assert parse_urdf(drawing_urdf(merge_fixed(robot))).links["base"].visuals[0].geometry == geometry
 
 
 @pytest.mark.parametrize(("material", "text"), [

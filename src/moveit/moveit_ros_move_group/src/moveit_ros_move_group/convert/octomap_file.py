@@ -21,7 +21,7 @@ def file_of(octree, resolution):
     data = b"" if octree is None else occupied_tree(octree).tobytes()
     # Two bytes for each inner node; leaves are told by their parents.
     size = len(data) // 2 + int(_OCCUPIED[np.frombuffer(data, np.uint8)].sum())
-    head = b"%s\nid OcTree\nsize %d\nres %s" % (_FIRST, size, repr(resolution).encode())
+    head = b"%s\nid OcTree\nsize %d\nres %s" % (_FIRST, size, repr(float(resolution)).encode())
     return head + _DATA + data
 
 
