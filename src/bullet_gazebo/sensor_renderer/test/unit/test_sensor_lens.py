@@ -113,7 +113,9 @@ def test_camera_info_says_within_a_tenth_of_a_pixel_where_points_are_seen(tmp_pa
 def test_opencv_finds_a_tag_where_it_is(tmp_path, distortion):
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
     pixels = np.full((200, 200), 255, dtype=np.uint8)
-    pixels[20:180, 20:180] = cv2.aruco.drawMarker(dictionary, 7, 160)
+    # OpenCV 4.7 has renamed it.
+    draw = getattr(cv2.aruco, "generateImageMarker", None) or cv2.aruco.drawMarker
+    pixels[20:180, 20:180] = draw(dictionary, 7, 160)
     writer = PictureWriter(tmp_path / "tag", 200, 200)
     writer.show(np.repeat(pixels[:, :, None], 3, axis=2))
     side = TAG_M * 200 / 160
@@ -130,7 +132,7 @@ def test_opencv_finds_a_tag_where_it_is(tmp_path, distortion):
         picture, _ = renderer.render(mirror, lens.ideal if lens else PINHOLE, pose)
         picture = lens.picture(picture) if lens else picture
         grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-        corners, names, _ = cv2.aruco.detectMarkers(grey, dictionary, parameters=_refined())
+        corners, names = _found(grey, dictionary)
         assert names is not None and names.ravel().tolist() == [7]
         half = TAG_M / 2.0
         square = np.array([(-half, half, 0), (half, half, 0), (half, -half, 0), (-half, -half, 0)])
@@ -143,7 +145,11 @@ def test_opencv_finds_a_tag_where_it_is(tmp_path, distortion):
     writer.close()
 
 
-def _refined():
-    parameters = cv2.aruco.DetectorParameters_create()
+def _found(grey, dictionary):
+    """(corners, numbers) of the tags, by OpenCV of before and after its detector became a class (4.7)."""
+    is_class = hasattr(cv2.aruco, "ArucoDetector")
+    parameters = cv2.aruco.DetectorParameters() if is_class else cv2.aruco.DetectorParameters_create()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_APRILTAG
-    return parameters
+    if is_class:
+        return cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(grey)[:2]
+    return cv2.aruco.detectMarkers(grey, dictionary, parameters=parameters)[:2]
