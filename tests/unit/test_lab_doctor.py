@@ -47,7 +47,7 @@ HEALTHY_LAB = Facts(
     topics=Topics(clock_messages=900, clock_advanced=True, robot_state=ENABLED),
     is_built=True,
     is_fresh=True,
-    python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "1.24.2"}),
+    python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "1.26.4"}, debian_numpy="1.24.2"),
     listeners=[],
     display=":0",
 )
@@ -101,9 +101,13 @@ SICK = {
         replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {}, {"rospy": "ImportError: gone"})),
         "python", "cannot import rospy: ImportError: gone", "setup",
     ),
-    "numpy 2": (
-        replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "2.1.0"})),
+    "numpy 2 on Debian 12": (
+        replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "2.1.0"}, debian_numpy="1.24.2")),
         "python", "numpy is 2.1.0", "uninstall numpy",
+    ),
+    "numpy 1 on Debian 13": (
+        replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "1.26.4"}, debian_numpy="2.2.4")),
+        "python", "2.2.4", "uninstall numpy",
     ),
     "mangled uri": (with_variables(HEALTHY_LAB, ROS_MASTER_URI="localhost:11311"), "network", "http://HOST", "export"),
     "no port": (with_variables(HEALTHY_LAB, ROS_MASTER_URI="http://robot"), "network", "http://HOST", "export"),

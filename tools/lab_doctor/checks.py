@@ -77,8 +77,8 @@ def check_python(facts):
     for module, error in python.errors.items():
         yield Finding("python", Level.WRONG, f"cannot import {module}: {error}", "./baxter.sh setup")
     numpy = python.versions.get("numpy", "")
-    if numpy and int(numpy.split(".")[0]) >= 2:
-        what = f"numpy is {numpy}; cv_bridge, transforms3d and pybullet here need numpy 1"
+    if numpy and python.debian_numpy and numpy.split(".")[0] != python.debian_numpy.split(".")[0]:
+        what = f"numpy is {numpy}; cv_bridge here is compiled for Debian's own, {python.debian_numpy}"
         yield Finding("python", Level.WRONG, what, "pip uninstall numpy, then ./baxter.sh setup")
     elif not python.errors:
         yield Finding("python", Level.OK, f"{expected}, numpy {numpy}")

@@ -72,6 +72,7 @@ class PythonFacts:
     executable: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     errors: dict[str, str] = field(default_factory=dict)
+    debian_numpy: str = ""  # the version of Debian's own
 
 
 @dataclass(frozen=True)

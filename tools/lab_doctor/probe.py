@@ -43,6 +43,7 @@ LOG_TAIL_BYTES, LINE_LENGTH = 4096, 100
 ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2?|rviz|robot_state_publisher|rosout)")
 # A node with this service is a move_group.
 SCENE_SERVICE = "get_planning_scene"
+DEBIAN_PYTHON = "/usr/lib/python3/dist-packages"
 MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 
 
@@ -354,11 +355,12 @@ def ask_python() -> PythonFacts:
         "    rospkg.RosPack().get_path('rospy')\n"
         "except Exception as error:\n"
         "    errors['rospkg'] = f'it finds no ROS packages ({type(error).__name__})'\n"
-        "print(json.dumps([versions, errors]))\n"
+        "import importlib.metadata\n"
+        f"debian = importlib.metadata.distributions(name='numpy', path=[{DEBIAN_PYTHON!r}])\n"
+        "print(json.dumps([versions, errors, next((found.version for found in debian), '')]))\n"
     )
     done = subprocess.run([executable, "-c", program], capture_output=True, text=True, timeout=DEADLINE_S)
-    versions, errors = json.loads(done.stdout.splitlines()[-1])
-    return PythonFacts(executable, versions, errors)
+    return PythonFacts(executable, *json.loads(done.stdout.splitlines()[-1]))
 
 
 def list_listeners() -> list[Listener]:
