@@ -109,6 +109,13 @@ def test_merge_keeps_mass_moments_and_frames():
     np.testing.assert_allclose(merged.links["upper"].collisions[1].origin, frame.offset)
 
 
+def test_merge_turns_the_moments_of_a_turned_part():
+    """The tool is turned by 90 degrees about y: its z moment is about the body's x axis, on which both centres lie."""
+    turned = ARM.replace('rpy="0 1.5 0"', 'rpy="0 1.5707963267948966 0"').replace(
+        'ixx="0.01" iyy="0.01" izz="0.01"', 'ixx="4" iyy="5" izz="6"')
+    assert merge_fixed(parse_urdf(turned)).links["upper"].inertial.inertia[0, 0] == pytest.approx(2.0 + 6.0)
+
+
 point_masses = st.tuples(st.floats(0.01, 10), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
 
 
