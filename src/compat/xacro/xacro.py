@@ -11,4 +11,7 @@ sys.path[:] = [folder for folder in sys.path if os.path.realpath(folder) != HERE
 from xacro import main  # noqa: E402
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:  # where it was in the file is of no use to anyone
+        sys.exit(130)

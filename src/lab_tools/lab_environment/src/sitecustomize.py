@@ -5,6 +5,7 @@ program whose output nobody reads any more end without an error. Debian's Python
 It imports only what Python has loaded or built in, so other programs are not slowed down. docs/decisions/0008 says why
 it is done this way.
 """
+import _signal
 import atexit
 import os
 import site
@@ -24,7 +25,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
            "rosgraph.roslogging": "lab_environment.full_disk",
            "roslaunch.config": "lab_environment.hidden_tokens",
-           "roslaunch.parent": "lab_environment.launch_guard"}
+           "roslaunch.parent": "lab_environment.launch_guard lab_environment.launch_end"}
 
 #: Folders of the system's programs.
 SYSTEM_FOLDERS = ("/usr/bin/", "/usr/sbin/", "/usr/lib/", "/usr/share/", "/bin/", "/sbin/", "/opt/ros/")
@@ -119,7 +120,12 @@ def _report(kind, error, trace):
 
 
 def _is_starting(trace):
-    """Whether a program was interrupted while it imported a module, or in rospy.init_node."""
+    """Whether a program was interrupted before it had begun: while it imported a module, or, if it has imported rospy,
+    before its node was ready. The system's programs have no line of their user's to tell at all."""
+    core = sys.modules.get("rospy.core")
+    program = getattr(sys.modules.get("__main__"), "__file__", None) or ""
+    if program.startswith(SYSTEM_FOLDERS) or (hasattr(core, "is_initialized") and not core.is_initialized()):
+        return True
     while trace is not None:
         code, name = trace.tb_frame.f_code, trace.tb_frame.f_globals.get("__name__", "")
         # Python leaves its own frames of an import out of most traces; the module's remains.
@@ -145,9 +151,20 @@ def _flush():
         pass  # there is none, or it is closed; Python itself reports what else is wrong with it
 
 
+def _let_ctrl_c_through():
+    """Ctrl-C in Python's start is told as a fatal error, so a roslaunch of the lab's (launch_end) holds it back until
+    now. If it has come, the process ends as other programs do."""
+    if _signal.SIGINT in _signal.sigpending() and _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+    _signal.pthread_sigmask(_signal.SIG_UNBLOCK, {_signal.SIGINT})
+
+
 _add_the_workspaces_packages()
 sys.meta_path.insert(0, AmendingFinder)
 sys.excepthook = _report
 # The first function that is registered is the last one that runs.
 atexit.register(_flush)
-_run_the_next()
+try:
+    _run_the_next()
+finally:
+    _let_ctrl_c_through()

@@ -135,9 +135,25 @@ def test_ctrl_c_before_a_program_has_begun_leaves_no_traceback(tmp_path):
     (tmp_path / "nodes.py").write_text("def init_node():\n    " + wait.replace("\n", "\n    "))
     for program in ("import slow", "import nodes; nodes.init_node()"):
         assert interrupted(program, tmp_path) == (-signal.SIGINT, "")
+    # A program that has imported rospy, before its node is ready.
+    core = "import sys, types; sys.modules['rospy.core'] = types.SimpleNamespace(is_initialized=lambda: %s)\n"
+    assert interrupted(core % False + wait) == (-signal.SIGINT, "")
+    assert "KeyboardInterrupt" in interrupted(core % True + wait)[1]
+    # A program of the system's, such as roslaunch while it reads its files.
+    assert interrupted("__file__ = '/usr/bin/roslaunch'\n" + wait) == (-signal.SIGINT, "")
     # In the program itself the line where it was is of use.
     code, errors = interrupted(wait)
     assert code == -signal.SIGINT and "KeyboardInterrupt" in errors
+
+
+def test_ctrl_c_that_was_held_back_in_pythons_start_ends_it_then(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text("import os; os.kill(os.getpid(), 2)")
+    prefix = ("import signal, subprocess, sys; signal.signal(2, signal.default_int_handler); "
+              "signal.pthread_sigmask(signal.SIG_BLOCK, {2}); print(subprocess.run([sys.executable, '-c', 'print(1)'], "
+              "env={'PYTHONPATH': %r}))")
+    done = subprocess.run([sys.executable, "-I", "-c", prefix % ("%s:%s" % (OURS, tmp_path))], capture_output=True,
+                          text=True)
+    assert "returncode=-2" in done.stdout and done.stderr == ""
 
 
 def test_a_closed_output_is_no_error():
