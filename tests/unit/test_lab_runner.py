@@ -202,6 +202,7 @@ case $1 in
     *leaves.test) setsid sleep 60 & ;;
     *hangs.test) sleep 60 ;;
     *dies.test) exit 1 ;;
+    *as_usual.test) [[ -z $LEFT_BY_A_UNIT_TEST && $LC_ALL != de_DE* ]] || exit 1 ;;
 esac
 echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESULTS_DIR/T.xml
 """
@@ -229,7 +230,7 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, fake_rostest, monkeypatch,
     monkeypatch.setattr(rostests, "LEFTOVER_GRACE_S", 0.2)
     path = tmp_path / f"{name}.test"
     path.write_text("<launch/>")
-    tally = rostests.run(path, tmp_path / "work", time_limit_s=limit_s)
+    tally = rostests.run(path, tmp_path / "work", dict(os.environ), time_limit_s=limit_s)
     assert (tally.passed, tally.failed) == (passed, failed)
     assert detail is None or detail in tally.details[0]
 
@@ -285,7 +286,7 @@ def run_pytest(folder, *words):
     files = sorted(str(path) for path in folder.rglob("*") if path.name.startswith("test_") or path.suffix == ".test")
     return subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.plugin", "-c", ROOT / "pytest.ini",
                            "--rootdir", folder, *words, *files], capture_output=True, text=True, cwd=folder,
-                          env={**os.environ, **ENVIRONMENT})
+                          env={**os.environ, **ENVIRONMENT, "LC_ALL": "C.UTF-8"})
 
 
 @pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
@@ -306,6 +307,13 @@ def test_an_error_of_pytest_itself_fails_the_run(tmp_path):
     (tmp_path / "conftest.py").write_text("def pytest_runtest_logfinish(): raise RuntimeError('broken')")
     done = run_pytest(tmp_path)
     assert done.returncode != 0 and done.stdout.splitlines()[-1].startswith("1 passed, 1 failed")
+
+
+def test_rostests_have_the_environment_of_the_command(tmp_path, fake_rostest):
+    (tmp_path / "test_one.py").write_text("import os\nos.environ['LEFT_BY_A_UNIT_TEST'] = '1'\ndef test_one(): pass")
+    (tmp_path / "rostest").mkdir()
+    (tmp_path / "rostest/z_as_usual.test").write_text("<launch/>")
+    assert run_pytest(tmp_path).stdout.splitlines()[-1].startswith("2 passed, 0 failed")
 
 
 def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path):

@@ -9,7 +9,6 @@ import subprocess
 from pathlib import Path
 
 NAME = "de_DE.UTF-8"
-VARIABLES = ("LOCPATH", "LC_ALL")
 
 
 def variables(folder: Path) -> dict[str, str]:

@@ -75,7 +75,8 @@ class Rostest(pytest.Item):
 
     def runtest(self):
         folder = work_folder(self.config) / f"{package_of(self.path, self.config.rootpath)}-{self.path.stem}"
-        tally = rostests.run(self.path, folder, stretch=self.config.option.stretch)
+        environment = self.config.pluginmanager.get_plugin("lab worker").environment
+        tally = rostests.run(self.path, folder, environment, stretch=self.config.option.stretch)
         tally.refuse_bare_skips()
         self.user_properties += [("passed", tally.passed), ("failed", tally.failed), ("skips", tally.skips)]
         if tally.failed:
@@ -151,33 +152,19 @@ class Worker:
 
     def __init__(self, config):
         self._config = config
-        self._usual = {name: os.environ.get(name) for name in comma_locale.VARIABLES}
-        self._comma = comma_locale.variables(LOCALE_FOLDER)
-        self._set_locale(self._comma)
-        self._machine = open(work_folder(config) / "machine.lock", "w")
-
-    @staticmethod
-    def _set_locale(variables):
-        for name, value in variables.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        # For programs outside of this process: unit tests change variables, some of them when they are imported.
+        self.environment = dict(os.environ)
+        os.environ.update(comma_locale.variables(LOCALE_FOLDER))
         locale.setlocale(locale.LC_ALL, "")
+        self._machine = open(work_folder(config) / "machine.lock", "w")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
-        is_rostest = isinstance(item, Rostest)
-        whole = is_rostest and is_whole_machine(item.path)
-        fcntl.flock(self._machine, fcntl.LOCK_EX if whole else fcntl.LOCK_SH)
-        if is_rostest:
-            self._set_locale(self._usual)
+        fcntl.flock(self._machine, fcntl.LOCK_EX if is_whole_machine(item.path) else fcntl.LOCK_SH)
         self._before_s = _processor_s()
         try:
             return (yield)
         finally:
-            if is_rostest:
-                self._set_locale(self._comma)
             fcntl.flock(self._machine, fcntl.LOCK_UN)
 
     @pytest.hookimpl(tryfirst=True)
@@ -191,7 +178,9 @@ class Worker:
             _tell(self._config, "left_threads", names)
 
     def pytest_unconfigure(self):
-        self._set_locale(self._usual)
+        os.environ.clear()
+        os.environ.update(self.environment)
+        locale.setlocale(locale.LC_ALL, "")
         self._machine.close()
 
 

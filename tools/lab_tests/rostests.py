@@ -32,8 +32,10 @@ def declared_s(path: Path) -> float:
     return 60.0 + sum(float(test.get("time-limit", 60.0)) for test in ElementTree.parse(path).getroot().iter("test"))
 
 
-def run(path: Path, work_folder: Path, time_limit_s: float | None = None, stretch: float = 1.0) -> Tally:
-    """Run it and count. work_folder is emptied first; logs and results stay in it.
+def run(
+    path: Path, work_folder: Path, environment: dict[str, str], time_limit_s: float | None = None, stretch: float = 1.0
+) -> Tally:
+    """Run it and count. work_folder is emptied first; logs and results stay in it. environment: of all its processes.
 
     stretch: factor of all time limits, including those in the file, when the processes get only a part of the machine.
     """
@@ -43,7 +45,7 @@ def run(path: Path, work_folder: Path, time_limit_s: float | None = None, stretc
     (work_folder / "results").mkdir(parents=True)
     run_id = uuid.uuid4().hex
     environment = {
-        **os.environ,
+        **environment,
         processes.MARKER: run_id,
         # rostest opens a master on a free port of its own. Nothing answers at this one, so that a process that ignores
         # rostest's setting finds no master, instead of a running lab of the user.
