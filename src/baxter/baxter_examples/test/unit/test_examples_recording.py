@@ -56,7 +56,7 @@ def test_bad_file_is_refused_with_its_line(tmp_path, text, says):
 
 @pytest.mark.parametrize(("make", "says"), [
     (lambda path: path.symlink_to("/dev/zero"), "a device"), (lambda path: path.touch(), "empty"),
-    (lambda path: path.mkdir(), "directory|folder")])
+    (lambda path: path.mkdir(), "a folder")])
 def test_what_is_no_file_is_not_waited_for(tmp_path, make, says):
     make(tmp_path / "motion.csv")
     with pytest.raises(OSError, match=says):

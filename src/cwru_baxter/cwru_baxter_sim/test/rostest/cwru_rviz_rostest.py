@@ -42,7 +42,7 @@ class CwruRvizTest(unittest.TestCase):
 
     def test_table_and_can_are_in_front_of_the_robot(self):
         try:
-            wait_until(lambda: self.counts().is_full(), lambda: "a full picture; pixels of each: %s" % self.counts(),
+            wait_until(lambda: self.counts().is_full(), lambda: "a full picture; pixels of each: %s" % (self.counts(),),
                        timeout_s=200.0, interval_s=0.5)
         finally:
             self.keep(self.screen.picture())

@@ -29,6 +29,8 @@ def read_file(
     """
     # Neither opening nor reading a pipe without a writer waits.
     flags = os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY | (0 if follow_links else os.O_NOFOLLOW)
+    if os.path.isdir(path):
+        raise OSError(errno.EISDIR, "it is a folder, not a file", str(path))
     with open(path, "rb", opener=lambda name, mode: os.open(name, mode | flags)) as file:
         status = os.fstat(file.fileno())
         if stat.S_ISFIFO(status.st_mode) and pipe_wait_s > 0.0:

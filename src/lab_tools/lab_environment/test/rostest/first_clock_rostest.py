@@ -99,7 +99,7 @@ class FirstClockTest(unittest.TestCase):
 
     def test_program_started_before_the_master_takes_simulated_time(self):
         client = self.start(sys.executable, str(CLIENT))
-        self.wait_for_text(client, "Will keep trying")
+        self.wait_for_text(client, "waits for it")
         self.start_master(use_sim_time=False)
         wait_until(lambda: self.master.getSystemState()[2], "the client's registration", DEADLINE_S)
         self.master.setParam("/use_sim_time", True)
