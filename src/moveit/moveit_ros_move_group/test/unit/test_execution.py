@@ -15,7 +15,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from lab_testing.waiting import wait_until
 from moveit_ros_move_group import handles, node
 from moveit_ros_move_group.controllers import read_list
-from moveit_ros_move_group.execution import ExecutionSettings, Executor
+from moveit_ros_move_group.execution import ExecutionSettings, Executor, part_of
 
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 90.0
@@ -127,6 +127,13 @@ def test_each_controller_gets_its_joints():
         assert len(lab.handles[joint].sent[0].points[1].positions) == 1
         lab.handles[joint].end()
     assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_a_part_has_everything_of_its_joints_alone():
+    whole = trajectory(2.0, velocities=[1.0, 2.0], accelerations=[3.0, 4.0], effort=[5.0, 6.0]).joint_trajectory
+    point = part_of(whole, ["reach"]).points[1]
+    assert (point.positions, point.velocities, point.accelerations, point.effort) == ([0.5], [2.0], [4.0], [6.0])
+    assert point.time_from_start == rospy.Duration(2.0)
 
 
 def test_the_first_execution_waits_for_the_first_joint_state():
