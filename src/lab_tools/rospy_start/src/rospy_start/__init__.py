@@ -37,9 +37,12 @@ def end_on_signals():
     """End the node on Ctrl-C and SIGTERM; for nodes that call ``rospy.init_node`` with ``disable_signals``.
 
     From a separate thread: where the main thread is interrupted it may hold a lock of rospy's that the shutdown waits
-    for, and rospy's own handler would then wait for ever.
+    for, and rospy's own handler would then wait for ever. Before ``rospy.init_node`` has made the node, the signal ends
+    the program.
     """
     def end(number, _frame):
+        if not rospy.core.is_initialized():  # init_node would tell of an error, or go on
+            raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
         threading.Thread(target=rospy.signal_shutdown, args=("signal %d" % number,)).start()
 
     for number in (signal.SIGINT, signal.SIGTERM):

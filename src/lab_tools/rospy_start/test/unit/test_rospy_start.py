@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A node waits for what comes later, and ends when it is told to."""
+import signal
 import subprocess
 import sys
 
@@ -56,6 +57,7 @@ def shutdown(reason):
     ended.set()
 
 rospy.signal_shutdown = shutdown
+rospy.core.set_initialized(True)
 rospy_start.end_on_signals()
 with lock:
     os.kill(os.getpid(), signal.%s)
@@ -63,3 +65,10 @@ assert ended.wait(60.0)
 """ % number
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stdout.startswith("signal ")) == (0, True), done.stderr
+
+
+@pytest.mark.parametrize("number, code", [("SIGINT", -signal.SIGINT), ("SIGTERM", 128 + signal.SIGTERM)])
+def test_a_signal_before_there_is_a_node_ends_the_program(number, code):
+    program = "import os, signal, rospy, rospy_start; rospy_start.end_on_signals(); os.kill(os.getpid(), signal.%s)"
+    done = subprocess.run([sys.executable, "-c", program % number], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (code, "")
