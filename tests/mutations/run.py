@@ -31,7 +31,7 @@ from lab_tests import processes  # noqa: E402  (found by the line above)
 from lab_tests.discovery import SelectionError, select, take_inventory  # noqa: E402
 
 FOUND, SURVIVED, UNCLEAR, NOT_RUN = "found", "survived", "unclear", "not run"
-# Longest run of one fault's tests [s]; one that takes longer counts as found.
+# Longest run of one fault's tests [s]; one that takes longer counts as found if they do not without the fault.
 LIMIT_S = 3600.0
 # Time for a run to end its processes [s].
 STOP_S = 30.0
@@ -98,7 +98,7 @@ class Trial:
             outcome, failing = NOT_RUN, str(error)
         else:
             outcome, failing = self._run_tests(fault, list(fault.tests))
-            if outcome == FOUND and self._fails_without(failing):
+            if outcome == FOUND and self._fails_without(fault, failing):
                 outcome = UNCLEAR
         return Result(fault.id, fault.kind, fault.by, fault.file, outcome, round(time.monotonic() - began, 1), failing)
 
@@ -119,11 +119,11 @@ class Trial:
         # Of a .test file, the first line of the text behind it names the test in it.
         return FOUND, f"{name} {inner}" if name.endswith(".test::rostest") else name
 
-    def _fails_without(self, failing: str) -> bool:
+    def _fails_without(self, fault: Fault, failing: str) -> bool:
+        """Whether the file of the failing test, or else all tests of the fault, fail without it, too."""
         file = failing.partition("::")[0]
-        if not (self._root / file).is_file():
-            return False
-        return self._run_tests(None, [f"{file}::rostest" if file.endswith(".test") else file])[0] != SURVIVED
+        names = [f"{file}::rostest" if file.endswith(".test") else file]
+        return self._run_tests(None, names if (self._root / file).is_file() else list(fault.tests))[0] != SURVIVED
 
     def _in_overlay(self, fault: Fault | None, command: list[str]) -> tuple[int, str]:
         """(exit code, output) of a command at the workspace's path. Raises subprocess.TimeoutExpired."""
@@ -217,7 +217,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--out", metavar="FILE", type=Path, help="a CSV file for the results; faults that have a row in "
                                                                "it are not run again")
     made.add_argument("--limit", metavar="SECONDS", type=float, default=LIMIT_S,
-                      help=f"a fault whose tests take longer counts as found; default {LIMIT_S:g}")
+                      help=f"a fault whose tests take longer counts as found, if they do not without it; "
+                           f"default {LIMIT_S:g}")
     made.add_argument("--faults", metavar="FILE", type=Path, default=FAULTS, help="another list of faults")
     made.add_argument("--root", metavar="FOLDER", type=Path, default=ROOT, help="another workspace")
     return made

@@ -140,13 +140,16 @@ def test_tests_that_print_no_counts_have_not_run(workspace, trial):
     assert (result.outcome, result.failing_test) == (run.NOT_RUN, "no such package")
 
 
-def test_a_fault_that_hangs_is_found_and_its_processes_end(workspace, trial, monkeypatch):
+@pytest.mark.parametrize(("always", "outcome"), [(False, run.FOUND), (True, run.UNCLEAR)])
+def test_a_fault_that_hangs_is_found_and_its_processes_end(workspace, trial, monkeypatch, always, outcome):
     (workspace / "tools/run_tests.py").write_text(
         "import subprocess, sys, time\n"
-        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'], start_new_session=True)\n"
-        "time.sleep(600)\n")
+        f"if {always} or 'x - x' in open('src/alpha/code_of_alpha.py').read():\n"
+        "    subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'], start_new_session=True)\n"
+        "    time.sleep(600)\n"
+        "print('1 passed, 0 failed, 0 skipped, 0 long not run')\n")
     monkeypatch.setenv("PROBE_OF_THIS_TEST", str(workspace))
-    assert run.Trial(workspace, limit_s=2.0).run(WRONG_SIGN).outcome == run.FOUND
+    assert run.Trial(workspace, limit_s=4.0).run(WRONG_SIGN).outcome == outcome
     assert run.processes.marked(str(workspace), "PROBE_OF_THIS_TEST") == {}
 
 
