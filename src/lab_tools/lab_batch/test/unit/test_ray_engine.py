@@ -124,6 +124,8 @@ def run(name, count, **parameters):
     return {seed: [result, error] for seed, result, error in lines}, addresses, left
 
 
+# Ray is downloaded for it, and gives its own processes half a minute to start, whatever else runs.
+@pytest.mark.long
 def test_ray_gives_what_processes_give_and_a_killed_worker_costs_its_episode_only(tmp_path, monkeypatch):
     """One start of Ray for all of it: it takes 10 s and more."""
     found, addresses, left = run("small_jobs:Trouble", 8, dies_once=[2], dies=[5], raises=[3], folder=str(tmp_path))
