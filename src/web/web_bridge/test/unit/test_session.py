@@ -141,7 +141,7 @@ def test_a_service_that_never_answers_holds_up_nothing(lab):
 def test_calls_of_a_client_that_has_gone_take_no_place(lab):
     client, release = lab.connect(), threading.Event()
     asked = []
-    lab.graph.services["/slow"] = ("std_srvs/SetBool", lambda request: asked.append(1) or release.wait(60))
+    lab.graph.services["/slow"] = ("std_srvs/SetBool", lambda request: asked.append(1) or release.wait(6000))
     for number in range(MOST_AT_ONCE + 1):
         client.send("call_service", service="/slow", id=number)
     wait_until(lambda: len(asked) == MOST_AT_ONCE, "the calls")
