@@ -10,9 +10,9 @@ platform_line() {
     name=$(sed -n 's/^PRETTY_NAME=//p' "$1" 2>/dev/null | tr -d '"')
     case $(sed -n 's/^\(ID\|VERSION_ID\)=//p' "$1" 2>/dev/null | tr -d '"' | sort -r | paste -sd ' ') in
         "debian 12") verdict="supported and tested" ;;
-        "debian 13") verdict="tried, not in the regular tests; pybullet and numpy are compiled, which takes minutes" ;;
+        "debian 13") verdict="tried, not in the regular tests" ;;
         "ubuntu 22.04") verdict="tried, not in the regular tests; ROS 1 has to come from Ubuntu's own packages" ;;
-        "ubuntu 24.04") verdict="untested; ROS 1 has to come from Ubuntu's own packages, and pybullet is compiled" ;;
+        "ubuntu 24.04" | "ubuntu 26.04") verdict="not supported: it has no ROS 1 packages; use the container" ;;
         "ubuntu 20.04")
             verdict="not supported: its Python is 3.8, the pinned packages need $OLDEST_PYTHON"
             if [[ -f $2 ]]; then verdict+="; ros-noetic is installed and not used"; fi

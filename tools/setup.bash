@@ -140,7 +140,7 @@ make_venv() {
 }
 
 step_pip() {
-    local key
+    local key wheels_only=()
     key=$(hash_of requirements.txt requirements-nodeps.txt)
     if [[ $cut_off_step == pip ]]; then make_venv; fi
     # A user's own `pip install` may bring it, and it hides Debian's: requirements-nodeps.txt says what breaks.
@@ -151,8 +151,10 @@ step_pip() {
         note="all there"
         return
     fi
-    run "$VENV/bin/python3" -m pip install --progress-bar off -r requirements.txt
-    run "$VENV/bin/python3" -m pip install --progress-bar off --no-deps -r requirements-nodeps.txt
+    # Wheels exist for all; without one, compiling takes minutes to hours. Other processors have no wheel of pybullet.
+    if [[ $(uname -m) == x86_64 ]]; then wheels_only=(--only-binary :all:); fi
+    run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" -r requirements.txt
+    run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" --no-deps -r requirements-nodeps.txt
     # PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
     if [[ -f src/compat/xacro/xacro ]]; then
         run ln -sf ../../src/compat/xacro/xacro "$VENV/bin/xacro"
