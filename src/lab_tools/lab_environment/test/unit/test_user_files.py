@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import errno
 import os
 import struct
 import threading
@@ -15,7 +16,7 @@ from lab_environment.user_files import check_file, check_picture, read_file, rea
     (lambda path: path.mkdir(), "Is a directory|a folder"),
     (lambda path: path.write_bytes(b""), "it is empty"),
     (lambda path: path.write_bytes(b"a" * 11), "11 bytes, expected at most 10"),
-    (lambda path: None, "No such file"),
+    (lambda path: None, os.strerror(errno.ENOENT)),
 ])
 def test_only_files_are_read_and_no_more_of_them_than_expected(tmp_path, make, message):
     make(tmp_path / "thing")
