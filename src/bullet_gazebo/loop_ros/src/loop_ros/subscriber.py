@@ -152,7 +152,7 @@ class SubscriberHub:
                  if entry.revents]
         more = ready
         while more:
-            more = [connection for connection in more if self._read(connection)]
+            more = [connection for connection in more if _survive(connection, connection.read, self._buffer)]
             if self._clock() - now >= BUDGET_S:
                 break
         if any(connection.ended.is_set() for connection in ready):
@@ -165,9 +165,6 @@ class SubscriberHub:
         for connection in self._connections:
             connection.end()
         self._follow([])
-
-    def _read(self, connection):
-        return _survive(connection, connection.read, self._buffer)
 
     def _take_new(self):
         connections = self._connections
