@@ -8,6 +8,7 @@ the end has come and interrupts the start; whatever the reason of an end, roslau
 """
 import contextlib
 import functools
+import inspect
 import os
 import re
 import signal
@@ -77,13 +78,17 @@ class _End:
 
     def _is_in_start(self, frame) -> bool:
         """Whether the start may be interrupted here: not within logging, which the monitor needs, too, nor between a
-        process's begin and its entry in the books. There the next step of the start ends it."""
+        process's begin and its entry in the books, nor where Python would print an exception and drop it, as in a
+        generator that is thrown away. There the next step of the start ends it."""
         is_start = False
         while frame is not None:
             name = frame.f_globals.get("__name__", "")
-            if frame.f_code in self.not_in or name.partition(".")[0] == "logging" or name == "rosgraph.roslogging":
+            code = frame.f_code
+            if code.co_flags & inspect.CO_GENERATOR or code.co_name == "__del__":
                 return False
-            is_start = is_start or frame.f_code in self.starts
+            if code in self.not_in or name.partition(".")[0] == "logging" or name == "rosgraph.roslogging":
+                return False
+            is_start = is_start or code in self.starts
             frame = frame.f_back
         return is_start
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from rosmaster.master import Master
 
+from lab_environment import launch_end
 from lab_environment.ports import free_port
 
 OURS = Path(__file__).resolve().parents[2] / "src"
@@ -154,3 +155,20 @@ def test_errors_of_the_start_are_told_and_leave_no_process(start, earlier_master
     """A required node ends before the last one begins."""
     (code, _, text), = start(["node", 'short required="true"', "node"], [[None, 0]], earlier_master)
     assert code == 1 and "REQUIRED process [n1" in text
+
+
+def test_a_generator_is_not_interrupted():
+    """Python prints and drops an exception in one that is being thrown away."""
+    end, seen = launch_end._End(None), []
+
+    def look():
+        seen.append(end._is_in_start(sys._getframe()))
+        return True
+
+    def start():
+        look()
+        all(look() for _ in range(1))
+
+    end.starts = {start.__code__}
+    start()
+    assert seen == [True, False]
