@@ -117,7 +117,9 @@ class _End:
                 is_started = start(process)  # with these signals held back
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
-            if any(monitor.is_shutdown for monitor in list(self._pmon._pmons)):
+            # Monitors of earlier launches of this process stay in the list: rostest has a launch for each test.
+            monitors = list(self._pmon._pmons)
+            if self._pmon._shutting_down or (monitors and all(monitor.is_shutdown for monitor in monitors)):
                 process.stop([])
             return is_started
         return started

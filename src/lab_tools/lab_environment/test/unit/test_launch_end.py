@@ -7,6 +7,7 @@ import subprocess
 import sys
 import uuid
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from rosmaster.master import Master
@@ -172,3 +173,14 @@ def test_a_generator_is_not_interrupted():
     end.starts = {start.__code__}
     start()
     assert seen == [True, False]
+
+
+@pytest.mark.parametrize(("monitors", "is_signalled", "is_stopped"), [
+    ([False], False, False), ([True], False, True), ([False], True, True),
+    ([True, False], False, False)])  # an earlier launch has ended, as that of a rostest's first test
+def test_a_process_that_begins_after_the_end_of_its_launch_is_stopped(monitors, is_signalled, is_stopped):
+    pmon = SimpleNamespace(_pmons=[SimpleNamespace(is_shutdown=one) for one in monitors], _shutting_down=is_signalled)
+    stops = []
+    process = SimpleNamespace(env={}, args=["/bin/true"], stop=stops.append)
+    assert launch_end._End(pmon).of_process(lambda process: True)(process)
+    assert bool(stops) == is_stopped
