@@ -22,6 +22,10 @@ class Connection(Transport):
     def fileno(self):
         return self.number
 
+    def close(self):
+        if not self.done:  # as TCPROSTransport; without it the topic's callback closes it again, without end
+            super().close()
+
 
 class Watched:
     """The descriptors that a topic watches; ``broken``: those that it is told to be broken."""
