@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.once
-
 PROGRAM = Path(__file__).resolve().parents[1] / "torture" / "torture.py"
 
 

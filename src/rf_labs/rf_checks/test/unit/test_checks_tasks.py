@@ -13,8 +13,6 @@ from rf_checks.lab import robot_description
 from rf_checks.recording import Recording, Run
 from rf_checks.robot import Robot
 
-pytestmark = pytest.mark.once
-
 # All joints that the simulated robot has.
 OTHERS = ("head_pan", *("%s_gripper_%s_finger_joint" % pair for pair in itertools.product("lr", "lr")))
 JOINTS = (*OTHERS, *joint_names("left"), *joint_names("right"))

@@ -4,13 +4,11 @@ import base64
 
 import cv2
 import numpy as np
-import pytest
 from page_server import CAMERA, NUMBERS
 
 from lab_testing.waiting import wait_until
 from lab_web.clouds import packed
 
-pytestmark = pytest.mark.once
 IS_DRAWN = """(() => {
     const canvas = document.getElementById("%s");
     const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;

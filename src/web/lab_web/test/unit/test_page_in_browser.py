@@ -12,8 +12,6 @@ from websocket import create_connection
 
 from lab_testing.waiting import stretched, wait_until
 
-pytestmark = pytest.mark.once
-
 
 def hand(browser, side):
     """(does the arm get there, what the page says, its joints {name: [rad]}, the numbers x y z [m], roll pitch yaw)."""

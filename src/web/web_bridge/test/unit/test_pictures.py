@@ -13,8 +13,6 @@ from sensor_msgs.msg import CompressedImage, Image
 from web_bridge import pictures
 from web_bridge.pictures import Form, Picture, PictureError, content_type, decoded, encode
 
-pytestmark = pytest.mark.once
-
 # Red, green above blue, white; wide enough that a Bayer pattern and a pair of pixels share a colour.
 RED, GREEN, BLUE, WHITE = (0, 0, 255), (0, 255, 0), (255, 0, 0), (255, 255, 255)
 
