@@ -81,8 +81,9 @@ def test_each_package_lies_where_the_architecture_page_says():
 
 def test_each_package_has_a_row_on_the_architecture_page():
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    named = [name for row in re.findall(r"^\| ([\w, ]+) \|", page, flags=re.MULTILINE) for name in row.split(", ")]
-    assert set(packages()) - set(named) == set()
+    rows = re.findall(r"^\| (\[.*?\)) \|", page, flags=re.MULTILINE)
+    linked = {name: Path(folder) for row in rows for name, folder in re.findall(r"\[(\w+)\]\(\.\./([^)]+)\)", row)}
+    assert {name: linked.get(name) for name in packages()} == packages()
 
 
 def test_compat_holds_stand_ins_alone():
