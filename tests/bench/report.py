@@ -118,7 +118,7 @@ def table(rows):
 
 
 def markdown(rows):
-    """Return the rows as lines of a Markdown table, for docs/performance.md."""
+    """Return the rows as lines of a Markdown table."""
     lines = ["| figure | ours | spread | samples | peer | peer's | ratio | spread | goal |",
              "|---|---|---|---|---|---|---|---|---|"]
     suite = None

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import pages
 from lab_tests import page_blocks
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -169,3 +170,55 @@ def test_the_page_of_switches_has_every_environment_variable():
         used |= set(re.findall(r"""["']((?:LAB|IK|BULLET|BENCH|TORTURE)_[A-Z_]+)["']""",
                                (ROOT / path).read_text(encoding="utf-8")))
     assert used - set(listed) == set()
+
+
+@pytest.mark.parametrize("page", sorted(pages.DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_tables_are_those_of_the_data(page):
+    text = page.read_text(encoding="utf-8")
+    assert pages.with_tables(text, pages.DOCS) == text, "tools/pages.py writes them"
+
+
+def test_figures_name_their_run_and_lines_are_short():
+    figures, runs = pages.rows_of(pages.FIGURES), {row["run"] for row in pages.rows_of(pages.RUNS)}
+    assert all(row["here"] and row["run"] in runs for row in figures)
+    keys = [row["bench"] for row in figures if row["bench"]]
+    assert len(keys) == len(set(keys))
+    for name in ("performance.md",):
+        assert max(map(len, (pages.DOCS / name).read_text(encoding="utf-8").splitlines())) <= 200, name
+
+
+def test_a_table_without_rows_or_with_an_unknown_column_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("kind,name\nx,one\ny,two\n")
+    page = "<!-- table of a.csv, kind = %s: %s -->\nold\n<!-- end of table -->"
+    assert "| name |\n|---|\n| two |\n<" in pages.with_tables(page % ("y", "name"), tmp_path)
+    with pytest.raises(ValueError, match="'z'"):
+        pages.with_tables(page % ("z", "name"), tmp_path)
+    with pytest.raises(KeyError, match="size"):
+        pages.with_tables(page % ("x", "size"), tmp_path)
+    (tmp_path / "a.csv").write_text("kind,name\nx\n")
+    with pytest.raises(ValueError, match="row 1"):
+        pages.with_tables(page % ("x", "name"), tmp_path)
+
+
+def test_the_figures_of_a_bench_are_taken():
+    def of_bench(what, figure, ratio, met, **goal):
+        return {"suite": "ik", "what": what, "unit": "ms", "figure": figure, "peer_name": "TRAC-IK", "ratio": ratio,
+                "met": met, "goal": goal}
+    machine = {"quick": False, "date": "2027-01-02 10:00 UTC", "cpu": "EPYC", "cores": 2, "load_before": "0.10 0.2 0.3",
+               "rounds": 5}
+    bench = {"machine": machine, "rows": [of_bench("mean", 0.02345, 0.0712, True, ratio_most=0.1),
+                                          of_bench("p99", 1.5, None, False, most=1.0),
+                                          of_bench("median", 0.1, None, None)]}
+    figures = [{"figure": name, "here": "", "beside": "", "goal": "", "run": "old", "bench": f"ik: {name}"}
+               for name in ("mean", "p99")]
+    runs = [{"run": "old", "date": "", "machine": "", "command": ""}]
+    assert pages.take(bench, "new", figures, runs) == ["ik: median"]
+    assert [(row["here"], row["beside"], row["goal"], row["run"]) for row in figures] == [
+        ("0.0234 ms", "TRAC-IK: 0.0712 times", "0.1 times", "new"), ("1.5 ms", "TRAC-IK", "1 ms: **not kept**", "new")]
+    assert [(row["run"], row["date"], row["command"]) for row in runs] == [
+        ("new", "2027-01-02", "`bench ik --rounds 5`")]
+    with pytest.raises(ValueError, match="'new'"):
+        pages.take(bench, "new", figures, runs)
+    machine["quick"] = True
+    with pytest.raises(ValueError, match="--quick"):
+        pages.take(bench, "other", figures, runs)

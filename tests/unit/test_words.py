@@ -20,7 +20,7 @@ OF_OTHERS = {
     "tests/bench/recordings/LICENSE.klampt-examples": {"shall"},
 }
 #: Historical texts keep their old names.
-HISTORY = ("CHANGELOG.rst", "docs/performance_archive.md", "docs/decisions/")
+HISTORY = ("CHANGELOG.rst", "docs/decisions/")
 BINARY = (".png", ".dae", ".stl", ".svg", ".jpg", ".json", ".bag", ".rest")
 
 
