@@ -13,6 +13,11 @@ from .errors import UrdfError
 MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
 
 
+def is_true(text: str | None) -> bool:
+    """Return whether a flag of Gazebo's, of which ``text`` is the content, is set."""
+    return (text or "").strip().lower() in ("true", "yes", "1")
+
+
 @dataclass(frozen=True)
 class Box:
     size: tuple[float, float, float]

@@ -7,9 +7,8 @@ import numpy as np
 
 from . import bounds
 from .errors import UrdfError
-from .materials import GLOWS, MATERIALS
+from .gazebo_blocks import read_joint_block, read_link_block
 from .model import (
-    MAY_BE_INFINITE,
     MOVABLE_TYPES,
     Box,
     Cylinder,
@@ -23,23 +22,24 @@ from .model import (
     Robot,
     Shape,
     Sphere,
-    Surface,
     Transmission,
     TransmissionJoint,
+    is_true,
 )
 from .transforms import pose_matrix
 from .xml_text import XmlRefused, parse_xml
 
 JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
+_MOMENTS = (((0, 0), "ixx"), ((0, 1), "ixy"), ((0, 2), "ixz"), ((1, 1), "iyy"), ((1, 2), "iyz"), ((2, 2), "izz"))
 
 
 def parse_urdf(xml, source="robot_description"):
     """Return the Robot that ``xml`` (str or bytes) describes. ``source`` names it in messages.
 
-    Things that can be repaired (an impossible inertia, a joint type that nothing drives) are listed in
-    ``Robot.warnings``. Raises UrdfError for all others: malformed XML, another root element, duplicate or unknown
-    names, a tree with no or several roots, numbers that are not finite or out of bounds (``bounds``), more than a
-    description may hold.
+    What urdfdom, the reader of Gazebo and rviz, accepts is accepted, with its repairs: they are listed in
+    ``Robot.warnings``, each with its line. Raises UrdfError for all others: malformed XML, another root element,
+    duplicate names, unknown links, a tree with no or several roots, joints with numbers that are none, numbers out of
+    bounds (``bounds``), more than a description may hold.
     """
     robot = _Reader(xml, source).robot()
     try:
@@ -60,14 +60,15 @@ class _Reader:
         if self.root is None or self.root.tag != "robot":
             found = "nothing" if self.root is None else "<%s>" % self.root.tag
             raise UrdfError("%s is not a URDF: its root element is %s, expected <robot>" % (source, found))
-        if any(isinstance(e.tag, str) and "xacro" in e.tag for e in self.root.iterchildren()):
-            raise self.error(self.root, "it still holds xacro elements; run it through xacro first")
 
     def error(self, element, text):
         return UrdfError("%s, line %s: %s" % (self.source, element.sourceline, text))
 
     def warn(self, element, text):
-        self.warnings.append("%s, line %s: %s" % (self.source, element.sourceline, text))
+        self.warn_at(element.sourceline, text)
+
+    def warn_at(self, line, text):
+        self.warnings.append("%s, line %s: %s" % (self.source, line, text))
 
     # -- whole --------------------------------------------------------------------------------------------------
 
@@ -75,6 +76,10 @@ class _Reader:
         name = self.root.get("name") or "robot"
         looks = self.looks()
         links, joints = {}, {}
+        left_over = [e for e in self.root.iterchildren("{*}*") if "xacro" in "%s %s" % (e.prefix, e.tag)]
+        if left_over:
+            self.warn(left_over[0], "%d xacro element%s did nothing, from here on; run the file through xacro first"
+                      % (len(left_over), "s"[:len(left_over) > 1]))
         for element in self.root.iterchildren("link"):
             link = self.link(element, looks)
             self.add_unique(links, link, element, "link")
@@ -82,21 +87,20 @@ class _Reader:
             joint = self.joint(element)
             self.add_unique(joints, joint, element, "joint")
         if not links:
-            raise self.error(self.root, "robot '%s' has no <link>" % name)
+            raise self.error(self.root, "robot '%s' has no <link>%s" % (
+                name, "; it still holds xacro elements: run it through xacro first" if left_over else ""))
         root = self.tree_root(name, links, joints)
         for joint in joints.values():
             if joint.mimic is not None and joint.mimic.joint not in joints:
-                raise UrdfError(
-                    "%s, line %s: joint '%s' mimics '%s', which does not exist; joints: %s"
-                    % (self.source, joint.line, joint.name, joint.mimic.joint, ", ".join(joints))
-                )
+                self.warn_at(joint.line, "joint '%s' mimics '%s', which does not exist, and so mimics none; joints: %s"
+                             % (joint.name, joint.mimic.joint, ", ".join(joints)))
+                joint.mimic = None
         transmissions = [self.transmission(e) for e in self.root.iterchildren("transmission")]
         for element in self.root.iterchildren("gazebo"):
             if element.get("reference") in links:
-                self.gazebo_reference(element, links[element.get("reference")])
+                read_link_block(element, links[element.get("reference")], self.warn)
             elif element.get("reference") in joints:
-                joints[element.get("reference")].implicit_damping |= any(
-                    _is_true(element.findtext(tag)) for tag in ("implicitSpringDamper", "cfmDamping"))
+                read_joint_block(element, joints[element.get("reference")])
         return Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
 
     def add_unique(self, table, item, element, kind):
@@ -107,6 +111,7 @@ class _Reader:
         table[item.name] = item
 
     def tree_root(self, name, links, joints):
+        """Return the root link's name. Joints and links that are no part of its tree are removed, with a warning."""
         parent_of = {}
         for joint in joints.values():
             for role in ("parent", "child"):
@@ -115,11 +120,13 @@ class _Reader:
                         "%s, line %s: joint '%s' names %s link '%s', which does not exist"
                         % (self.source, joint.line, joint.name, role, getattr(joint, role))
                     )
+        # Of several joints with the same child, the last one in the order of their names counts.
+        for joint in sorted(joints.values(), key=lambda one: one.name):
             if joint.child in parent_of:
-                raise UrdfError(
-                    "%s, line %s: link '%s' is the child of two joints, '%s' and '%s'; a URDF is a tree"
-                    % (self.source, joint.line, joint.child, parent_of[joint.child].name, joint.name)
-                )
+                other = parent_of[joint.child]
+                self.warn_at(other.line, "link '%s' is the child of two joints; '%s' is left out, '%s' counts"
+                             % (joint.child, other.name, joint.name))
+                del joints[other.name]
             parent_of[joint.child] = joint
         roots = [link for link in links if link not in parent_of]
         if len(roots) != 1:
@@ -137,66 +144,88 @@ class _Reader:
             link = stack.pop()
             reached.add(link)
             stack.extend(below.get(link, ()))
-        if len(reached) != len(links):
-            raise UrdfError(
-                "%s: links not connected to root '%s' (a loop of joints): %s"
-                % (self.source, roots[0], ", ".join(sorted(set(links) - reached)))
-            )
+        for link in [link for link in links if link not in reached]:
+            joint = parent_of[link]
+            self.warn_at(joint.line, "joint '%s' is part of a loop that root '%s' does not reach; it and link '%s' are "
+                         "left out" % (joint.name, roots[0], link))
+            del links[link], joints[joint.name]
         return roots[0]
 
     # -- elements -----------------------------------------------------------------------------------------------
 
     def link(self, element, looks):
-        name = self.name(element)
-        inertial = element.find("inertial")
-        return Link(
-            name,
-            None if inertial is None else self.inertial(inertial, name),
-            [self.shape(e, looks, name) for e in element.iterchildren("visual")],
-            [self.shape(e, looks, name) for e in element.iterchildren("collision")],
-            element.sourceline,
-        )
+        """Return the Link. As urdfdom does, what follows the first part that cannot be read is left out: parts are
+        read in the order inertial, visuals, collisions."""
+        link = Link(self.name(element), line=element.sourceline)
+        inertials = [*element.iterchildren("inertial")]
+        parts = [*inertials[:1], *element.iterchildren("visual"), *element.iterchildren("collision")]
+        for further in inertials[1:]:
+            self.warn(further, "link '%s' has an <inertial> already; this one is ignored" % link.name)
+        for count, part in enumerate(parts):
+            try:
+                if part.tag == "inertial":
+                    link.inertial = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
+                    self.inertial(part, link)
+                    continue
+                shape = self.shape(part, looks, link.name)
+            except UrdfError as error:
+                left = [one.tag for one in parts[count:]]
+                said = ["%d <%s>" % (left.count(tag), tag) for tag in ("visual", "collision") if tag in left]
+                if part.tag == "inertial":
+                    said.insert(0, "its mass is %g kg" % link.inertial.mass)
+                self.warnings.append("%s. Link '%s' is read as by urdfdom, up to there: %s%s"
+                                     % (error, link.name, ", ".join(said), " left out" if len(left) > 1 or
+                                        part.tag != "inertial" else ""))
+                break
+            if shape is not None:
+                (link.visuals if part.tag == "visual" else link.collisions).append(shape)
+        return link
 
     def inertial(self, element, link):
+        """Read an <inertial> into ``link``."""
         origin = self.origin(element)
         mass = self.child(element, "mass")
         value = self.number(mass, "value", required=True)
         if value < 0.0:
-            raise self.error(mass, "mass of link '%s' is %g kg; expected a positive number" % (link, value))
+            self.warn(mass, "mass of link '%s' is %g kg; 0 is assumed" % (link.name, value))
+        link.inertial.mass = max(value, 0.0)
+        link.inertial.centre = origin[:3, 3].copy()
         matrix = np.zeros((3, 3))
         inertia = element.find("inertia")
+        missing = [key for _, key in _MOMENTS if inertia is None or inertia.get(key) is None]
+        if missing:
+            self.warn(element, "inertia of link '%s' has no %s; 0 is assumed (for urdfdom, such a link has no shapes)"
+                      % (link.name, ", ".join(missing)))
         if inertia is None:
-            self.warn(element, "link '%s' has no <inertia>; zero is assumed" % link)
-        else:
-            for (i, j), key in (
-                ((0, 0), "ixx"),
-                ((0, 1), "ixy"),
-                ((0, 2), "ixz"),
-                ((1, 1), "iyy"),
-                ((1, 2), "iyz"),
-                ((2, 2), "izz"),
-            ):
-                matrix[i, j] = matrix[j, i] = self.number(inertia, key, default=0.0)
-            smallest = float(np.linalg.eigvalsh(matrix)[0])
-            if smallest < -1e-9 * max(1e-9, float(np.abs(matrix).max())):
-                self.warn(
-                    inertia,
-                    "inertia of link '%s' has the negative principal moment %g kg m^2; no body has that"
-                    % (link, smallest),
-                )
+            return
+        for (i, j), key in _MOMENTS:
+            matrix[i, j] = matrix[j, i] = self.number(inertia, key, default=0.0)
+        smallest = float(np.linalg.eigvalsh(matrix)[0])
+        if smallest < -1e-9 * max(1e-9, float(np.abs(matrix).max())):
+            self.warn(
+                inertia,
+                "inertia of link '%s' has the negative principal moment %g kg m^2; no body has that"
+                % (link.name, smallest),
+            )
         rotation = origin[:3, :3]
-        return Inertial(value, origin[:3, 3].copy(), rotation @ matrix @ rotation.T)
+        link.inertial.inertia = rotation @ matrix @ rotation.T
 
     def shape(self, element, looks, link):
+        """Return the Shape of a <visual> or <collision>; None for a mesh whose name is empty."""
+        origin = self.origin(element)
         geometry = self.child(element, "geometry")
         shapes = [e for e in geometry if isinstance(e.tag, str)]
-        if len(shapes) != 1:
-            raise self.error(geometry, "<geometry> of link '%s' holds %d shapes, expected one" % (link, len(shapes)))
+        if not shapes:
+            raise self.error(geometry, "<geometry> of link '%s' holds no shape" % link)
+        read = self.geometry(shapes[0], link)
+        for further in shapes[1:]:
+            self.warn(further, "<%s> is ignored: <geometry> of link '%s' holds a <%s> already"
+                      % (further.tag, link, shapes[0].tag))
         material = element.find("material")
+        if material is not None and material.get("name") is None and element.tag == "visual":
+            raise self.error(material, "<material> of link '%s' has no name" % link)
         colour, finish = (None, None) if material is None else self.look(material, looks)
-        return Shape(
-            self.geometry(shapes[0], link), self.origin(element), element.get("name", ""), colour, link, finish
-        )
+        return None if read is None else Shape(read, origin, element.get("name", ""), colour, link, finish)
 
     def geometry(self, element, link):
         if element.tag == "box":
@@ -207,10 +236,13 @@ class _Reader:
             return Sphere(self.positive(element, "radius", 1, link)[0])
         if element.tag == "mesh":
             filename = element.get("filename")
-            if not filename:
+            if filename is None:
                 raise self.error(element, "<mesh> of link '%s' has no filename" % link)
             scale = self.vector(element, "scale", 3, default=(1.0, 1.0, 1.0))
-            return Mesh(filename, tuple(scale), element.get("submesh", ""), _is_true(element.get("centred")))
+            if not filename:
+                self.warn(element, "<mesh> of link '%s' has an empty filename and is left out" % link)
+                return None
+            return Mesh(filename, tuple(scale), element.get("submesh", ""), is_true(element.get("centred")))
         raise self.error(
             element, "link '%s' has a <%s>; known shapes are box, cylinder, sphere and mesh" % (link, element.tag)
         )
@@ -226,7 +258,7 @@ class _Reader:
         length = math.sqrt(sum(a * a for a in axis))
         if length < 1e-9:
             if kind in MOVABLE_TYPES:
-                raise self.error(element, "axis of joint '%s' is zero; expected a direction such as 0 0 1" % name)
+                self.warn(element, "axis of joint '%s' is zero; 1 0 0 is assumed, as ODE does" % name)
             axis, length = (1.0, 0.0, 0.0), 1.0
         if not length <= bounds.NO_LIMIT:
             raise self.error(
@@ -242,10 +274,19 @@ class _Reader:
             np.array(axis) / length,
             self.limit(element, name, kind),
             None if mimic is None else self.mimic(mimic, name),
-            0.0 if dynamics is None else self.number(dynamics, "damping", default=0.0),
-            0.0 if dynamics is None else self.number(dynamics, "friction", default=0.0),
+            *((0.0, 0.0) if dynamics is None else self.dynamics(dynamics, name)),
             element.sourceline,
         )
+
+    def dynamics(self, element, name):
+        """Return damping and friction. Gazebo takes a negative damping for one that it may reduce to keep the joint
+        stable, and no negative friction."""
+        damping, friction = (self.number(element, key, default=0.0) for key in ("damping", "friction"))
+        used = min(abs(damping), bounds.DAMPING.high), min(max(friction, 0.0), bounds.FRICTION.high)
+        for key, number, instead in zip(("damping", "friction"), (damping, friction), used, strict=True):
+            if number != instead:
+                self.warn(element, "%s of joint '%s' is %g; %g is used" % (key, name, number, instead))
+        return used
 
     def limit(self, joint, name, kind):
         element = joint.find("limit")
@@ -263,18 +304,20 @@ class _Reader:
             None if value is not None and value > bounds.NO_LIMIT else value
             for value in (limit.velocity, limit.effort)
         )
-        for value, what in ((limit.velocity, "velocity"), (limit.effort, "effort")):
+        for what in ("velocity", "effort"):
+            value = getattr(limit, what)
             if value is not None and value < 0.0:
-                raise self.error(element, "%s limit of joint '%s' is %g; expected 0 or more" % (what, name, value))
+                self.warn(element, "%s limit of joint '%s' is %g, which means none" % (what, name, value))
+                setattr(limit, what, None)
         if kind in ("revolute", "prismatic"):
             limit.lower, limit.upper = (
                 min(max(self.number(element, key, default=0.0), -bounds.NO_LIMIT), bounds.NO_LIMIT)
                 for key in ("lower", "upper")
             )
             if limit.lower > limit.upper:
-                raise self.error(
-                    element, "joint '%s' has lower limit %g above its upper limit %g" % (name, limit.lower, limit.upper)
-                )
+                self.warn(element, "joint '%s' has lower limit %g above its upper limit %g; it has no limits, as in ODE"
+                          % (name, limit.lower, limit.upper))
+                limit.lower, limit.upper = -bounds.NO_LIMIT, bounds.NO_LIMIT
         return limit
 
     def mimic(self, element, name):
@@ -297,28 +340,6 @@ class _Reader:
             reductions.append(_reduction(actuator.findtext("mechanicalReduction")))
         return Transmission(name, kind, tuple(found), tuple(reductions), tuple(actuators))
 
-    def gazebo_reference(self, element, link):
-        """Apply a <gazebo reference="link">: the link's surface, weight and colour."""
-        found = {}
-        for tag, name in (("mu1", "friction"), ("kp", "stiffness"), ("kd", "damping")):
-            # Both spellings of the first one are in use.
-            part = element.find(tag) if tag != "mu1" or element.find(tag) is not None else element.find("mu")
-            if part is not None:
-                text = (part.text or "").strip() or part.get("value", "")
-                found[name] = self.parse_float(text, part, part.tag, may_be_infinite=name in MAY_BE_INFINITE)
-                if found[name] < 0.0 and name == "friction":
-                    found[name] = math.inf  # as Gazebo takes it
-                elif found[name] < 0.0:
-                    raise self.error(part, "%s of link '%s' is %g; expected 0 or more" % (tag, link.name, found[name]))
-        if found:
-            link.surface = Surface(**found)
-        link.gravity = not _is_true(element.findtext("turnGravityOff"))
-        name = (element.findtext("material") or "").strip()
-        finish = Finish(emission=GLOWS[name]) if name in GLOWS else None
-        for shape in link.visuals:
-            shape.colour = shape.colour or MATERIALS.get(name)
-            shape.finish = shape.finish or finish
-
     # -- pieces -------------------------------------------------------------------------------------------------
 
     def looks(self):
@@ -328,29 +349,59 @@ class _Reader:
             look = self.own_look(element)
             if element.get("name") and look != (None, None):
                 table[element.get("name")] = look
+            else:
+                self.warn(element, "material '%s' lacks a name, or a colour and a texture" % element.get("name", ""))
         return table
 
     def look(self, element, looks):
-        look = self.own_look(element)
+        look, name = self.own_look(element), element.get("name", "")
         if look != (None, None):
             # A material may be defined inside the first visual that uses it and be referred to by name afterwards.
-            looks.setdefault(element.get("name", ""), look)
-            return look
-        return looks.get(element.get("name", ""), look)
+            looks.setdefault(name, look)
+        elif name and name not in looks and element.find("color") is None:
+            self.warn(element, "material '%s' is defined nowhere" % name)
+            looks[name] = look
+        return look if look != (None, None) else looks.get(name, look)
+
+    def colour(self, element, material):
+        """Return the rgba of a <color>, None where it cannot be read."""
+        if element is None:
+            return None
+        try:
+            rgba = self.vector(element, "rgba", None, default=(0.5, 0.5, 0.5, 1.0))
+        except UrdfError as error:
+            self.warnings.append("%s; the colour of material '%s' is left out" % (error, material))
+            return None
+        if any(not 0.0 <= value <= 1.0 for value in rgba):
+            self.warn(element, "the colour of material '%s', %s, is left out; expected numbers from 0 to 1"
+                      % (material, _words(rgba)))
+            return None
+        if len(rgba) != 4:
+            self.warn(element, "the colour of material '%s' has %d numbers, expected 4; urdfdom takes it for black"
+                      % (material, len(rgba)))
+            return (0.0, 0.0, 0.0, 1.0)
+        return tuple(rgba)
 
     def own_look(self, element):
-        colour = element.find("color")
-        rgba = None if colour is None else tuple(self.vector(colour, "rgba", 4, default=(0.5, 0.5, 0.5, 1.0)))
+        rgba = self.colour(element.find("color"), element.get("name", ""))
+        try:
+            return rgba, self.finish(element)
+        except UrdfError as error:
+            self.warnings.append("%s; material '%s' is read without it" % (error, element.get("name", "")))
+            return rgba, None
+
+    def finish(self, element):
+        """Return the Finish of a <material>, None where it has none."""
         texture, emission, gloss = (element.find(tag) for tag in ("texture", "emission", "gloss"))
         if texture is None and emission is None and gloss is None:
-            return rgba, None
+            return None
         none = Finish()
-        return rgba, Finish(
+        return Finish(
             tuple(self.vector(emission, "rgb", 3, default=none.emission)),
             None if gloss is None else self.number(gloss, "value", required=True),
             "" if texture is None else texture.get("filename", ""),
             tuple(self.vector(texture, "repeats", 2, default=none.repeats)),
-            *(texture is not None and _is_true(texture.get(key)) for key in ("cut_out", "two_sided")),
+            *(texture is not None and is_true(texture.get(key)) for key in ("cut_out", "two_sided")),
         )
 
     def origin(self, element):
@@ -380,13 +431,13 @@ class _Reader:
 
     def positive(self, element, key, count, link):
         values = self.vector(element, key, count)
-        if any(value <= 0.0 for value in values):
-            raise self.error(
-                element,
-                "%s of the %s of link '%s' is %s; expected positive numbers"
-                % (key, element.tag, link, _words(values)),
-            )
-        return values
+        if all(value > 0.0 for value in values):
+            return values
+        # A picture of a negative size looks like that of a positive one.
+        used = [max(abs(value), bounds.LENGTH.low) for value in values]
+        self.warn(element, "%s of the %s of link '%s' is %s, expected positive numbers; %s is used"
+                  % (key, element.tag, link, _words(values), _words(used)))
+        return used
 
     def vector(self, element, key, count, default=None):
         text = None if element is None else element.get(key)
@@ -395,7 +446,7 @@ class _Reader:
                 raise self.error(element, "<%s> has no %s" % (element.tag, key))
             return list(default)
         words = text.split()
-        if len(words) != count:
+        if count is not None and len(words) != count:
             raise self.error(element, "%s='%s' holds %d numbers, expected %d" % (key, text, len(words), count))
         return [self.parse_float(word, element, key) for word in words]
 
@@ -407,23 +458,18 @@ class _Reader:
             return default
         return self.parse_float(text, element, key)
 
-    def parse_float(self, text, element, key, may_be_infinite=False):
+    def parse_float(self, text, element, key):
         try:
             value = float(text)
         except ValueError:
             raise self.error(element, "%s='%s' is not a number" % (key, text)) from None
-        if not math.isfinite(value) and not (may_be_infinite and math.isinf(value)):
+        if not math.isfinite(value):
             raise self.error(element, "%s='%s' is not finite" % (key, text))
         return value
 
 
 def _words(values):
     return " ".join("%g" % value for value in values)
-
-
-def _is_true(text):
-    """Whether a flag of Gazebo's, of which ``text`` is the content or None, is set."""
-    return (text or "").strip().lower() in ("true", "1")
 
 
 def _reduction(text):

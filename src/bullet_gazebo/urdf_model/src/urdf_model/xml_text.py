@@ -33,10 +33,12 @@ def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
     try:
         root = etree.fromstring(data.strip(), parser)
     except etree.XMLSyntaxError as error:
-        root, what = (None, "") if repaired is None else _repaired(data.strip(), parser)
+        root = _without_name_spaces(data.strip(), parser)
         if root is None:
-            raise XmlRefused("is not well-formed XML: %s" % error) from None
-        repaired("%s (%s)" % (what, error))
+            root, what = (None, "") if repaired is None else _repaired(data.strip(), parser)
+            if root is None:
+                raise XmlRefused("is not well-formed XML: %s" % error) from None
+            repaired("%s (%s)" % (what, error))
     if root is not None:
         refuse_entities(root)
         count, most = sum(1 for _ in root.iter()), most_bytes // bounds.BYTES_PER_ELEMENT
@@ -48,6 +50,15 @@ def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
 def _parser(recover):
     return etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False,
                            recover=recover)
+
+
+def _without_name_spaces(data, parser):
+    """Return the root element of ``data`` (bytes), on which ``parser`` failed, if all that it lacks is the declaration
+    of a prefix: the readers of Gazebo and ROS know no name spaces, so to them ``a:b`` is a name. Else None."""
+    undeclared = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
+    if {entry.type for entry in parser.error_log} != {undeclared}:
+        return None
+    return etree.fromstring(data, _parser(recover=True))
 
 
 def _repaired(data, parser):

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The <gazebo reference="..."> blocks of a URDF. Several blocks for a link or joint add up; a later element replaces an
+earlier one of its name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from . import bounds
+from .materials import GLOWS, MATERIALS
+from .model import MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
+
+# Element -> field of Surface. Both spellings of the first one are in use.
+_SURFACE = {"mu": "friction", "mu1": "friction", "kp": "stiffness", "kd": "damping"}
+
+
+def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) -> None:
+    """Apply a block that refers to ``link``: its surface, weight and colour.
+
+    ``warn(element, text)`` is called for numbers that cannot be used; they are left out.
+    """
+    found = {}
+    for tag, field in _SURFACE.items():
+        for part in element.iterchildren(tag):
+            value = _number(part, field, link.name, warn)
+            if value is not None:
+                found[field] = value
+    if found:
+        link.surface = replace(link.surface or Surface(), **found)
+    for part in element.iterchildren("turnGravityOff", "gravity"):
+        link.gravity = _has_weight(part)
+    name = (element.findtext("material") or "").strip()
+    finish = Finish(emission=GLOWS[name]) if name in GLOWS else None
+    for shape in link.visuals:
+        shape.colour = shape.colour or MATERIALS.get(name)
+        shape.finish = shape.finish or finish
+
+
+def read_joint_block(element: Any, joint: Joint) -> None:
+    """Apply a block that refers to ``joint``."""
+    for part in element.iterchildren("implicitSpringDamper", "cfmDamping"):
+        joint.implicit_damping = is_true(part.text)
+
+
+def _number(part, field, link, warn):
+    """The number in an element of a surface; None where there is none that means something."""
+    text = (part.text or "").strip() or part.get("value", "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isnan(value) or math.isinf(value) and field not in MAY_BE_INFINITE:
+        warn(part, "<%s> of link '%s' is '%s', which is no number, and is left out" % (part.tag, link, text))
+        return None
+    if field == "friction":
+        return math.inf if value < 0.0 else value  # as Gazebo takes it
+    high = math.inf if field in MAY_BE_INFINITE else bounds.DAMPING.high
+    used = min(max(value, 0.0), high)
+    if used != value:
+        warn(part, "<%s> of link '%s' is %g; %g is used" % (part.tag, link, value, used))
+    return used
+
+
+def _has_weight(part):
+    """Whether a link has weight by this element, whose texts are those of Gazebo's readers."""
+    text = (part.text or "").strip().lower()
+    return text in ("false", "no", "0") if part.tag == "turnGravityOff" else text not in ("false", "0")
