@@ -36,6 +36,9 @@ _DEFAULT_DAMPING = 1.0
 _GAP_M, _GAP_PART = 1e-4, 0.01
 # The part of a wheel's width that touches the floor, and the cosine that an axis along a cylinder has at least.
 _TREAD_PART, _ALONG = 0.05, 0.9999
+# A body that is slower than this for 2 s falls asleep: the square of its speed [m/s] plus that of its turn rate [rad/s],
+# here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
+_ASLEEP_M2_PER_S2 = 1e-6
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8
 
@@ -78,7 +81,8 @@ def build(client, blueprint, pose, shapes, warn):
         "baseInertialFrameOrientation": quaternion_from_matrix(root_offset).tolist(),
         # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
         "flags": (pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
-        | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
+        # Models with joints never sleep, as in Gazebo: a drive would not wake them.
+        | (0 if static or merged.joints else pybullet.URDF_ENABLE_SLEEPING),
     }
     # The first has the root's shape.
     root_shape = shapes.compound(link_collisions(merged, merged.root, static), static, blueprint.mesh_cuts)
@@ -86,7 +90,8 @@ def build(client, blueprint, pose, shapes, warn):
     bodies = [_build_limb(client, blueprint, numbers, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
               for numbers, shape in zip(joints, root_shapes, strict=True)]
     if not static:
-        pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(), physicsClientId=client)
+        pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
+                                sleepThreshold=_ASLEEP_M2_PER_S2, physicsClientId=client)
     pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0), physicsClientId=client)
     return Parts(client, bodies, joints), root_offset
 

@@ -77,7 +77,6 @@ class Model(Body):
         self._zeros = [0.0] * count
         self._gears = {}  # of (joint, other), by index
         self._couplings = {}  # the same -> ratio
-        self._never_sleeps = self.static
         self._damping = JointDamping(self, client, world.time_step_s, {
             index: within(bounds.DAMPING, joint.damping, "the damping of joint '%s'" % joint.name)
             for index, joint in enumerate(joints) if joint.damping > 0.0})
@@ -129,7 +128,6 @@ class Model(Body):
         moving set-point is followed without lag.
         """
         self._drive_otherwise(index)
-        self._stay_awake()
         gains = len(index)
         if velocity is not None:
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
@@ -149,8 +147,6 @@ class Model(Body):
     def drive_velocity(self, index, velocity, max_effort):
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
         self._drive_otherwise(index)
-        if max_effort.any():
-            self._stay_awake()
         velocity = velocity.tolist()
         self._refuse_nan(index, velocity, "velocity")
         self.parts.command(index, pybullet.VELOCITY_CONTROL, targetVelocities=velocity, forces=max_effort.tolist())
@@ -164,7 +160,6 @@ class Model(Body):
         """
         position = position.tolist()
         self._refuse_nan(index, position, "position")
-        self._stay_awake()
         self._drive_otherwise(index)
         velocity = np.zeros(len(index)) if velocity is None else velocity
         speeds = velocity.tolist()
@@ -183,7 +178,6 @@ class Model(Body):
         effort = np.minimum(np.maximum(effort, bounds.EFFORT.low), bounds.EFFORT.high)
         if not self._effort_driven[index].all():
             self.release(index)
-            self._stay_awake()
             self._effort_driven[index] = self._any_effort_driven = True
         self._commanded_effort[index] = effort
         self._reading = None
@@ -412,9 +406,6 @@ class Model(Body):
             if math.isfinite(self.lower[index]) or math.isfinite(self.upper[index]):
                 pybullet.changeDynamics(*parts.places[index], jointLowerLimit=self.lower[index],
                                         jointUpperLimit=self.upper[index], **client)
-        if self._never_sleeps and not self.static:
-            self._never_sleeps = False
-            self._stay_awake()
         if self._all:
             self.release(np.arange(len(self._all)))
             parts.put(np.arange(len(self._all)), joints.tolist(), velocity.tolist())
@@ -442,17 +433,6 @@ class Model(Body):
             self._turned_gravity = None if np.allclose(turned, self._world.gravity, atol=1e-9) else turned.tolist()
             self._gravity_key = key
         return self._turned_gravity
-
-    def _stay_awake(self):
-        """Disable sleeping of a free model once its joints are driven: Bullet's drives would not wake it."""
-        if not self._never_sleeps:
-            self._never_sleeps = True
-            pybullet.changeDynamics(
-                self.body,
-                BASE,
-                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP,
-                physicsClientId=self._client,
-            )
 
     def _drive_otherwise(self, index):
         """Note that joints ``index`` (k,) are no longer driven by efforts."""
