@@ -36,8 +36,8 @@ _DEFAULT_DAMPING = 1.0
 _GAP_M, _GAP_PART = 1e-4, 0.01
 # The part of a wheel's width that touches the floor, and the cosine that an axis along a cylinder has at least.
 _TREAD_PART, _ALONG = 0.05, 0.9999
-# A body that is slower than this for 2 s falls asleep: the square of its speed [m/s] plus that of its turn rate [rad/s],
-# here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
+# A body that is slower than this for 2 s falls asleep: the square of its speed [m/s] plus that of its turn rate
+# [rad/s], here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
 _ASLEEP_M2_PER_S2 = 1e-6
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8

@@ -20,8 +20,9 @@ from .state_watch import StateWatch
 
 # Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.
 SOLVER_ITERATIONS = 20
-# Bullet ends the iterations early where all of them change speeds by less than the root of this [m/s]. With its own 1e-7,
-# friction lets free bodies creep by 0.3 mm/s. A world without free bodies keeps that: driven joints take all iterations.
+# Bullet ends the iterations early where all of them change speeds by less than the root of this [m/s]. With its own
+# 1e-7, friction lets free bodies creep by 0.3 mm/s. A world without free bodies keeps that: driven joints take all
+# iterations.
 _CREEP_M2_PER_S2 = {True: 1e-9, False: 1e-7}
 
 

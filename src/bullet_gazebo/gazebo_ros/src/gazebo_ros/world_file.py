@@ -4,9 +4,9 @@ from pathlib import Path
 
 from sdf_model import SdfError, parse_sdf_world
 
-#: Defaults of a world: gravity [m/s^2], length of a tick [s].
-GRAVITY = (0.0, 0.0, -9.81)
-TIME_STEP_S = 0.002
+#: SDF's defaults of a world: gravity [m/s^2], length of a tick [s].
+GRAVITY = (0.0, 0.0, -9.8)
+TIME_STEP_S = 0.001
 
 
 class WorldFileError(Exception):

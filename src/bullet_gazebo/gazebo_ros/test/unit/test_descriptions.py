@@ -137,9 +137,9 @@ def test_the_empty_world_has_a_floor_and_needs_no_warning():
     assert (world.warning, world.problems) == ("", [])
 
 
-def test_a_world_that_says_nothing_has_the_usual_gravity_and_step(tmp_path):
+def test_a_world_that_says_nothing_has_sdfs_gravity_and_step(tmp_path):
     world = world_file.read_world(write_world(tmp_path, ""), MODELS)
-    assert (world.models, world.gravity, world.time_step_s) == ([], (0.0, 0.0, -9.81), 0.002)
+    assert (world.models, world.gravity, world.time_step_s) == ([], (0.0, 0.0, -9.8), 0.001)
 
 
 def test_gravity_and_step_size_are_taken(tmp_path):

@@ -22,6 +22,7 @@ def test_a_world_is_understood_and_at_rest(path):
     packages = rospkg.RosPack()
     described = read_world(path, ModelFolders(model_folders(packages), model_sizes(packages)))
     assert not described.warning and not described.problems
+    assert (described.time_step_s, described.gravity) == (0.002, (0.0, 0.0, -9.81))
     world = World(time_step_s=described.time_step_s, gravity=described.gravity, warn=pytest.fail, error=pytest.fail)
     try:
         for model in described.models:
