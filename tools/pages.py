@@ -101,7 +101,7 @@ def take(bench: dict[str, Any], run: str, figures: list[dict[str, str]], runs: l
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--take", nargs=2, metavar=("BENCH_JSON", "NAME"), help="take the figures of a bench")
+    parser.add_argument("--take", nargs=2, metavar=("FILE", "NAME"), help="take the figures of a bench")
     options = parser.parse_args()
     if options.take:
         figures, runs = rows_of(FIGURES), rows_of(RUNS)
