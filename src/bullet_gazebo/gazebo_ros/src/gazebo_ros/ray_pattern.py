@@ -23,9 +23,8 @@ class RayPattern:
     """
 
     def __init__(self, ray, what):
-        """``ray``: the element; ``what`` names the sensor in messages. Raises :class:`RayPatternError`."""
-        if ray is None:
-            raise RayPatternError("%s has no <ray> element; expected one, with <scan> and <range>" % what)
+        """``ray``: the element, or None for SDF's defaults; ``what`` names the sensor in messages. Raises
+        :class:`RayPatternError`."""
         self._ray, self._what = ray, what
         self.columns, self.angle_min, self.angle_max = self._span("scan/horizontal", 640)
         self.rows, low, high = self._span("scan/vertical", 1)
@@ -53,7 +52,7 @@ class RayPattern:
         return samples, low, high
 
     def _number(self, path, default):
-        text = (self._ray.findtext(path) or "").strip()
+        text = ("" if self._ray is None else self._ray.findtext(path) or "").strip()
         try:
             value = float(text) if text else float(default)
         except ValueError:

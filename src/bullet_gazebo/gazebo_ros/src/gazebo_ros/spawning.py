@@ -7,6 +7,7 @@ bodies.
 import gc
 import itertools
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -139,7 +140,7 @@ class Spawner:
         """
         self._check_name(name)
         try:
-            start = urdf_extras.start_configuration(robot)
+            start = urdf_extras.start_configuration(robot, self._log.warn)
             plugins, sensors, options = self._plugins(name, robot, namespace)
         except (urdf_extras.ExtrasError, PluginError) as error:
             raise SpawnRefused(str(error)) from error
@@ -281,13 +282,12 @@ class Spawner:
         return picture
 
     def _plugins(self, name, robot, spawn_namespace):
-        found, sensors, options = [], [], {}
+        found, sensors, options, unknown = [], [], {}, Counter()
         for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn)):
             filename = element.get("filename") or ""
             plugin_class = self._library.plugins.find(filename)
             if plugin_class is None:
-                self._log.warn("model plugin '%s' is not known here and is left out; known plugins: %s"
-                               % (filename, ", ".join(self._library.plugins.known)))
+                unknown[filename] += 1
                 continue
             own = ""
             is_a_name = re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name)
@@ -302,6 +302,11 @@ class Spawner:
                 continue
             options.update(plugin_class.spawn_options(robot, element))
             found.append((plugin_class, element, namespace))
+        if unknown:
+            names = ", ".join("'%s'%s" % (plugin, " (%d times)" % count if count > 1 else "")
+                              for plugin, count in unknown.items())
+            self._log.warn("model '%s': plugins that are not known here and are left out: %s; known plugins: %s"
+                           % (name, names, ", ".join(self._library.plugins.known)))
         return found, sensors, options
 
     def _leave_out(self, model_name, error):

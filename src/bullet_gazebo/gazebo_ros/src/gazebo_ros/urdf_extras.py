@@ -53,10 +53,11 @@ def is_static(robot):
     return True if "true" in said or "1" in said else None
 
 
-def start_configuration(robot):
+def start_configuration(robot, warn):
     """Joint positions {name: rad or m} of the model at its start, from ``<gazebo><start_configuration>``.
 
-    Raises :class:`ExtrasError` for unknown or repeated joints and values that are not numbers.
+    As in Gazebo, the last position of a joint counts, and unknown joints are passed over; ``warn(text)`` is called for
+    those. Raises :class:`ExtrasError` for values that are not numbers.
     """
     known = [joint.name for joint in robot.movable_joints()]
     positions = {}
@@ -64,10 +65,9 @@ def start_configuration(robot):
         for element in gazebo.findall("%s/joint" % START_CONFIGURATION):
             name, text = element.get("name"), element.text or ""
             if name not in known:
-                raise ExtrasError("start configuration: joint '%s' is not a movable joint of '%s'; joints: %s"
-                                  % (name, robot.name, ", ".join(known) or "none"))
-            if name in positions:
-                raise ExtrasError("start configuration: joint '%s' is given twice" % name)
+                warn("start configuration: joint '%s' is not a movable joint of '%s' and is passed over; joints: %s"
+                     % (name, robot.name, ", ".join(known) or "none"))
+                continue
             try:
                 positions[name] = float(text)
             except ValueError:

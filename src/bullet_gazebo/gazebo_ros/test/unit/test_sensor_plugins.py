@@ -217,9 +217,12 @@ def test_a_laser_may_look_all_round(lab):
 def test_missing_elements_are_named(lab):
     with pytest.raises(PluginError, match="names no topic; expected <topicName>"):
         lab(BOX % '<gazebo><plugin filename="libgazebo_ros_p3d.so"/></gazebo>', sensor_plugins.PoseSensor)
-    with pytest.raises(PluginError, match="no <ray> element"):
-        lab(BOX % '<gazebo reference="link"><sensor name="s"><plugin filename="x"><topicName>a</topicName></plugin>'
-            '</sensor></gazebo>', sensor_plugins.Laser)
+
+
+def test_without_a_ray_element_it_is_that_of_sdf(lab):
+    plugin = lab(BOX % '<gazebo reference="link"><sensor name="s"><plugin filename="x"><topicName>a</topicName>'
+                 '</plugin></sensor></gazebo>', sensor_plugins.Laser).plugin
+    assert (plugin.pattern.columns, plugin.pattern.rows, plugin.pattern.angle_max) == (640, 1, 0.0)
 
 
 @pytest.mark.parametrize(("reference", "text"), [("nose", "on link 'nose'"), ("turn", "on a joint, 'turn'")])

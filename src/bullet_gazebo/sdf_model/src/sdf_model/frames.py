@@ -10,8 +10,10 @@ OWN = ("", "__model__", "world", "__root__")
 class Frames:
     """Collects named frames, then computes their poses in the frame of the scope."""
 
-    def __init__(self, document):
+    def __init__(self, document, scope=""):
+        """``scope``: the model's name, which may stand in front of the names in it, as ``scope::link``."""
         self._document = document
+        self._scope = scope + "::" if scope else ""
         self._given = {}  # name -> (name of the frame it is given in, 4x4, element)
         self._found = {}
 
@@ -32,13 +34,19 @@ class Frames:
         self.add(name, element, child)
         return name
 
+    def plain(self, name):
+        """Return ``name`` without the scope's name in front of it, if only that is the name of a frame."""
+        rest = name[len(self._scope):]
+        is_scoped = self._scope and name.startswith(self._scope) and name not in self
+        return rest if is_scoped and rest in self else name
+
     def __contains__(self, name):
         return name in OWN or name in self._given
 
     def where(self, name, element):
         """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` refers to it, for the message."""
         # Without recursion: a chain may be as long as the file.
-        chain, asked = [], {}
+        chain, asked, name = [], {}, self.plain(name)
         while name not in OWN and name not in self._found:
             if name in asked:
                 circle = " -> ".join((*asked, name))
@@ -50,6 +58,7 @@ class Frames:
             asked[name] = None
             chain.append((name, self._given[name][1]))
             name, _, element = self._given[name]
+            name = self.plain(name)
         matrix = np.eye(4) if name in OWN else self._found[name]
         for name, pose in reversed(chain):
             matrix = self._found[name] = matrix @ pose

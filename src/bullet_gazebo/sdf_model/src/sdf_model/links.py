@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface
+from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface, bounds
 from urdf_model.model import MAY_BE_INFINITE
 from urdf_model.transforms import pose_matrix
 
@@ -14,6 +14,8 @@ from .materials import read_material
 
 # Elements without an effect on motion or looks here.
 _QUIET = ("enable_wind", "must_be_base_link", "laser_retro", "max_contacts", "cast_shadows", "meta", "velocity_decay")
+# Of a surface.
+_MOST = {"damping": bounds.DAMPING.high, "restitution": 1.0}
 _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 1, 1, 1.0), ("iyz", 1, 2, 0.0))
 _INERTIA += (("izz", 2, 2, 1.0),)
 
@@ -139,7 +141,8 @@ def _surface(document, collision):
                 continue
             if value < 0.0 and name == "friction":
                 value = math.inf  # as Gazebo takes it
-            elif value < 0.0:
-                raise document.error(part, "<%s> is %g, expected 0 or more" % (tag, value))
-            found[name] = value
+            used = min(max(value, 0.0), _MOST.get(name, math.inf))
+            if used != value:
+                document.mend(part, "<%s> of %g, for which %g is used" % (tag, value, used))
+            found[name] = used
     return Surface(**found) if found else None

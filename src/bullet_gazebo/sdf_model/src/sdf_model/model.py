@@ -146,9 +146,9 @@ class ModelReader:
             document.note(element.find("self_collide"))
         if element.get("placement_frame"):
             document.note(element, "placement_frame of model '%s'" % element.get("name"))
-        parts = Parts(static=document.flag(element, "static"))
-        frames = Frames(document)
-        self._nested(document, element, parts, frames, depth)
+        parts = Parts()
+        frames = Frames(document, element.get("name", "").strip())
+        held = self._nested(document, element, parts, frames, depth)
         for link in element.iterchildren("link"):
             frames.add(document.name(link), link)
         for frame in element.iterchildren("frame"):
@@ -163,9 +163,14 @@ class ModelReader:
             parts.gazebo += _sensors_and_lights(document, link, name)
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))
+        if held and len(held) == len(parts.links):
+            _say_static(parts, True)
+        elif held and not parts.static:
+            document.note(element, "static of the models in '%s', beside links that are not" % element.get("name"))
         names = {joint.name for joint in parts.joints}
         for joint in element.iterchildren("joint"):
             read = _joint(document, joint, frames, frame_of[joint])
+            read.parent, read.child = frames.plain(read.parent), frames.plain(read.child)
             if read.name in names:
                 raise document.error(joint, "joint '%s' appears twice" % read.name)
             names.add(read.name)
@@ -187,8 +192,17 @@ class ModelReader:
                           % document.name(link))
 
     def _nested(self, document, element, parts, frames, depth):
-        """Add the parts of models inside this one to ``parts`` and their frames to ``frames``."""
-        for child in element.iterchildren("model", "include"):
+        """Add the parts of models inside this one to ``parts`` and their frames to ``frames``.
+
+        An included model becomes a part of this one: its <static> is one of this model, of which the first counts.
+        Returns the names of the links of other static models in it.
+        """
+        held = []
+        names = {child.get("name") for child in element.iterchildren("model")}
+        for child in element.iterchildren("static", "model", "include"):
+            if child.tag == "static":
+                _say_static(parts, document.flag(element, "static"))
+                continue
             if child.tag == "model":
                 inner, model, name = document, child, document.name(child)
                 frames.add(name, child)
@@ -197,10 +211,17 @@ class ModelReader:
                 if model is None:
                     document.note(child, "lights inside of a model")
                     continue
-                name = document.text(child, "name", "") or inner.name(model)
+                name = document.text(child, "name", "") or unused(inner.name(model), names)
+                names.add(name)
                 frames.add(name, child, pose=None if child.find("pose") is not None else inner.pose(model))
             origin = frames.where(name, child)
             below = self._parts(inner, model, name + "::", origin, depth + 1)
+            if child.tag == "include":
+                said = document.flag(child, "static", below.static)
+                if below.static_is_said or child.find("static") is not None:
+                    _say_static(parts, said)
+            elif below.static:
+                held += below.links
             for link_name, (_, frame) in below.links.items():
                 frames.add(link_name, child, pose=frame)
             parts.links.update(below.links)
@@ -208,6 +229,20 @@ class ModelReader:
                 raise document.error(child, "more than %d links in one model" % bounds.LINKS)
             parts.joints += below.joints
             parts.gazebo += below.gazebo
+        return held
+
+
+def _say_static(parts, static):
+    if not parts.static_is_said:
+        parts.static, parts.static_is_said = static, True
+
+
+def unused(name, names):
+    """Return ``name``, or the first of name_0, name_1, ... that is not in ``names`` if it is."""
+    found, number = name, 0
+    while found in names:
+        found, number = "%s_%d" % (name, number), number + 1
+    return found
 
 
 def _moved(parts, prefix, origin):
@@ -224,7 +259,7 @@ def _moved(parts, prefix, origin):
     for said in parts.gazebo:
         if said.get("reference"):
             said.set("reference", prefix + said.get("reference"))
-    return Parts(links, parts.joints, parts.gazebo, parts.static)
+    return Parts(links, parts.joints, parts.gazebo, parts.static, parts.static_is_said)
 
 
 def _sensors_and_lights(document, link, name):
@@ -250,6 +285,14 @@ def _plugins(document, element):
     return [holder]
 
 
+def _bounded(document, element, tag, value, bound):
+    """Return ``value`` within ``bound``, which is noted where it makes a difference."""
+    used = min(max(value, bound.low), bound.high)
+    if used != value:
+        document.mend(element, "<%s> of %g, for which %g is used" % (tag, value, used))
+    return used
+
+
 def _end(document, joint, role):
     element = joint.find(role)
     if element is not None and element.get("link"):
@@ -272,8 +315,10 @@ def _joint(document, element, frames, own_frame):
         kind, limit = _limit(document, given, name, kind)
         dynamics = given.find("dynamics")
         if dynamics is not None:
-            damping = document.number(dynamics, "damping", 0.0)
-            friction = document.number(dynamics, "friction", 0.0)
+            # Gazebo takes a negative damping for one that it may reduce.
+            damping, friction = (_bounded(document, dynamics, tag, take(document.number(dynamics, tag, 0.0)), bound)
+                                 for tag, take, bound in (("damping", abs, bounds.DAMPING),
+                                                          ("friction", float, bounds.FRICTION)))
     elif kind != "fixed":
         if not kind:
             raise document.error(element, "joint '%s' has no type; known: %s, fixed" % (name, ", ".join(_MOVABLE)))
@@ -290,7 +335,8 @@ def _axis(document, given, name, frame, frames):
     axis = np.array(document.vector(given, "xyz", (0.0, 0.0, 1.0)))
     length = np.linalg.norm(axis)
     if length < 1e-9:
-        raise document.error(element, "axis of joint '%s' is zero; expected a direction such as 0 0 1" % name)
+        document.mend(element, "axis of joint '%s', which is zero: 1 0 0, as for ODE" % name)
+        axis, length = np.array([1.0, 0.0, 0.0]), 1.0
     axis = axis / length
     expressed_in = None if element is None else element.get("expressed_in")
     if expressed_in:
@@ -310,7 +356,9 @@ def _limit(document, given, name, kind):
     lower = document.number(element, "lower", -math.inf)
     upper = document.number(element, "upper", math.inf)
     if lower > upper:
-        raise document.error(element, "joint '%s' has lower limit %g above its upper limit %g" % (name, lower, upper))
+        document.mend(element, "joint '%s' with lower limit %g above its upper limit %g: no limits, as for ODE"
+                      % (name, lower, upper))
+        lower, upper = -math.inf, math.inf
     # In SDF, a negative limit means unlimited.
     values = (document.number(element, tag, -1.0) for tag in ("effort", "velocity"))
     effort, velocity = (value if 0.0 <= value <= bounds.NO_LIMIT else None for value in values)

@@ -38,6 +38,7 @@ class Parts:
     joints: list = field(default_factory=list)
     gazebo: list = field(default_factory=list)  # <gazebo> elements, as urdf_model.Robot has them
     static: bool = False
+    static_is_said: bool = False  # whether an element says so
 
 
 def build_robot(document, name, parts):

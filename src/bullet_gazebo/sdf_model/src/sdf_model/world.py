@@ -14,7 +14,7 @@ from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
 from .lights import Light, Scene, read_light, read_scene
-from .model import ModelReader, SdfModel
+from .model import ModelReader, SdfModel, unused
 
 # Elements about windows, sound, weather and other solvers: ignored.
 _QUIET = ("gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
@@ -97,7 +97,10 @@ class _WorldReader:
         step = element.find("max_step_size")
         if step is not None:
             (value,) = document.numbers(step, 1)
-            self._world.time_step_s = self._bounded(bounds.TIME_STEP, value, step)
+            used = min(max(value, bounds.TIME_STEP.low), bounds.TIME_STEP.high)
+            if used != value:
+                document.mend(step, "<max_step_size> of %g s, for which %g s is used" % (value, used))
+            self._world.time_step_s = used
         if element.find("gravity") is not None:  # where older files have it
             self._world.gravity = self._gravity(element)
         factor = document.number(element, "real_time_factor", 1.0)
@@ -125,6 +128,8 @@ class _WorldReader:
             model = self._models.model(document, element)
         else:
             model = self._models.included(document, element, 0)
+            if isinstance(model, SdfModel) and not document.text(element, "name", ""):
+                model.name = model.robot.name = unused(model.name, {other.name for other in world.models})
         if not isinstance(model, SdfModel):
             world.lights += model.lights
             return

@@ -286,7 +286,7 @@ def test_plugins_of_models_and_includes_are_kept(tmp_path, shelf):
 def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
     found = world(tmp_path, """<include><uri>model://castle</uri></include>
 <include><uri>model://can</uri></include>
-<include><uri>model://can</uri></include>
+<include><uri>model://can</uri><name>can</name></include>
 <model name="bad"><link name="l"><inertial><mass>0</mass></inertial></link></model>""", shelf)
     assert [model.name for model in found.models] == ["can"]
     missing, twice, massless = found.problems
@@ -331,6 +331,52 @@ def test_a_joint_may_have_the_name_of_a_link():
     np.testing.assert_allclose(model.robot.joints["wheel"].origin[:3, 3], (-1, 2, 0.5), atol=1e-12)
 
 
+def test_an_include_that_is_static_makes_the_model_around_it_static(tmp_path, shelf):
+    def static(content):
+        found = world(tmp_path, '<model name="m">%s</model>' % content, shelf)
+        assert found.problems == []
+        return found.models[0].static
+
+    shelf.find("model://can").write_text(sdf('<static>true</static><link name="l"/>', name="can"))
+    include = "<include><uri>model://can</uri>%s</include>"
+    assert static(include % "")
+    assert static("<model name='n'>%s</model>" % (include % ""))
+    assert not static("<link name='k'/><model name='n'>%s</model>" % (include % ""))
+    assert static(include % "" + "<static>false</static>")  # the first one counts
+    assert not static("<static>false</static>" + include % "")
+    assert not static(include % "<static>false</static>")
+
+
+def test_includes_without_a_name_get_a_number(tmp_path, shelf):
+    found = world(tmp_path, 3 * "<include><uri>model://can</uri></include>", shelf)
+    assert [model.name for model in found.models] == [model.robot.name for model in found.models] == [
+        "can", "can_0", "can_1"]
+    found = world(tmp_path, '<model name="m">%s</model>' % (2 * "<include><uri>model://can</uri></include>"), shelf)
+    assert list(found.models[0].robot.links) == ["can::l", "can_0::l"]
+
+
+def test_names_may_have_the_models_own_in_front():
+    model = read('<link name="a"><pose>1 0 0 0 0 0</pose></link>'
+                 '<link name="b"><pose relative_to="m::a">0 2 0 0 0 0</pose></link>' + joint("j", "m::a", "m::b"))
+    assert where(model.robot)["b"][:3, 3].tolist() == [1, 2, 0] and model.robot.joints["j"].parent == "a"
+
+
+def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
+    found = world(tmp_path, """<physics><max_step_size>0.1</max_step_size></physics>
+<model name="m"><link name="a"><collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry><surface>
+<contact><ode><kp>-1</kp><kd>1e13</kd></ode></contact><bounce><restitution_coefficient>2</restitution_coefficient>
+</bounce></surface></collision></link><link name="b"/>%s</model>""" % joint(
+        "j", "a", "b", axis="<axis><xyz>0 0 0</xyz><limit><lower>1</lower><upper>-1</upper></limit>"
+                            "<dynamics><damping>-0.5</damping><friction>-1</friction></dynamics></axis>"))
+    assert found.problems == [] and found.time_step_s == 0.05
+    for said in ("<max_step_size> of 0.1", "<kd> of 1e+13", "<kp> of -1", "of 2,", "zero", "lower limit 1", "of -1,"):
+        assert said in found.warning
+    robot = found.models[0].robot
+    surface, hinge = robot.links["a"].surface, robot.joints["j"]
+    assert (surface.stiffness, surface.damping, surface.restitution) == (0.0, 1e12, 1.0)
+    assert (hinge.type, hinge.axis.tolist(), hinge.damping, hinge.friction) == ("continuous", [1, 0, 0], 0.5, 0.0)
+
+
 # -- errors ----------------------------------------------------------------------------------------
 
 
@@ -351,7 +397,6 @@ def test_a_joint_may_have_the_name_of_a_link():
     (sdf('<link name="a"><visual name="c"><geometry><box/></geometry></visual></link>'), "<box> has no <size>"),
     (sdf('<link name="a"/>' + joint("j", "a", "b", "fixed")), "frame 'b' does not exist; frames: a, j"),
     (sdf('<link name="a"/>' + joint("j", "b", "a", "fixed")), "'j' names link 'b', which does not exist; links: a"),
-    (sdf('<link name="a"/><link name="b"/>' + joint("j", "a", "b", axis="<axis><xyz>0 0 0</xyz></axis>")), "is zero"),
     (sdf('<link name="a"><pose relative_to="b"/></link><link name="b"><pose relative_to="a">1 0 0 0 0 0</pose></link>'),
      "given relative to itself"),
 ])

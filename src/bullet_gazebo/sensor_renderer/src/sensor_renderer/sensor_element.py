@@ -108,11 +108,9 @@ class SensorEntry:
         return value
 
     def cameras(self):
-        """The list of :class:`CameraElement`; raises :class:`SensorError` for none and for impossible ones."""
-        found = self.element.findall("camera")
-        if not found:
-            raise SensorError("%s has no <camera> element; expected one, with <horizontal_fov>, <image> and <clip>"
-                              % self)
+        """The list of :class:`CameraElement`, one with SDF's defaults where no <camera> is; raises :class:`SensorError`
+        for impossible ones."""
+        found = self.element.findall("camera") or [etree.Element("camera")]
         return [self._camera(camera, number) for number, camera in enumerate(found)]
 
     def _camera(self, camera, number):

@@ -36,8 +36,13 @@ def test_a_camera_as_it_is_written():
     assert entry(own_rate="25").rate == 25.0
 
 
+def test_without_a_camera_element_it_is_that_of_sdf():
+    pinhole = entry(camera="").cameras()[0].pinhole
+    assert (pinhole.width, pinhole.height, pinhole.near, pinhole.far) == (320, 240, 0.1, 100)
+    assert 2.0 * np.arctan(160.0 / pinhole.fx) == pytest.approx(1.047)
+
+
 @pytest.mark.parametrize(("options", "text"), [
-    ({"camera": ""}, "sensor 'eye' of model 'robot' has no <camera> element"),
     ({"camera": CAMERA % ("999999", "R8G8B8")}, "999999 x 48 pixels"),
     ({"camera": CAMERA % ("wide", "R8G8B8")}, "<image/width> is 'wide', expected a number"),
     ({"camera": CAMERA % ("64", "BAYER_XYZ")}, "format 'BAYER_XYZ' is not known"),
