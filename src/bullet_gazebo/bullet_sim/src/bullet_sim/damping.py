@@ -91,9 +91,13 @@ class JointDamping:
                 pass
         return mass_matrix_of(self._model)
 
-    def _stable(self):
-        """(n,) The largest damping of each joint that is certainly stable at the position of the first call."""
+    def felt_inertia(self):
+        """(n,) The inertia that each joint feels when the others, and a free root, can give way, at the position of the
+        first call [kg m^2 or kg]."""
         if self._felt is None:
-            # The inertia that a joint feels when the others, and a free root, can give way is 1 / (M^-1)_ii.
             self._felt = 1.0 / np.diag(np.linalg.inv(self._inertia()))[:len(self.values)]
-        return _MARGIN * self._felt / self._time_step_s
+        return self._felt
+
+    def _stable(self):
+        """(n,) The largest damping of each joint that is certainly stable."""
+        return _MARGIN * self.felt_inertia() / self._time_step_s

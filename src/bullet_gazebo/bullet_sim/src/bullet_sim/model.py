@@ -14,6 +14,7 @@ from .damping import JointDamping
 from .errors import BulletSimError, within
 from .pose import Pose
 from .quiet_pybullet import pybullet
+from .springs import JointSprings
 from .state_watch import Fault, out_of_bounds
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
@@ -80,6 +81,11 @@ class Model(Body):
         self._damping = JointDamping(self, client, world.time_step_s, {
             index: within(bounds.DAMPING, joint.damping, "the damping of joint '%s'" % joint.name)
             for index, joint in enumerate(joints) if joint.damping > 0.0})
+        self._friction = np.array([joint.friction for joint in joints])
+        #: None, or the springs of its joints; the world lets them act in each step.
+        self.springs = None
+        if any(joint.spring_stiffness for joint in joints):
+            self.springs = JointSprings(self, joints, self._damping.felt_inertia(), world.time_step_s)
         if count:
             self.release(np.arange(count))
         self.mark_start()
@@ -192,6 +198,13 @@ class Model(Body):
         self.wake()
         self.parts.command(index, pybullet.TORQUE_CONTROL, forces=effort.tolist())
 
+    def limited_effort(self, index, effort):
+        """Return ``effort`` (k,) on joints ``index`` (k,) as Gazebo cuts it: to the effort limits, and to nothing
+        where it would speed up a joint that is beyond its velocity limit."""
+        speed = self.read_joints()[1][index]
+        too_fast = (np.abs(speed) > self.max_velocity[index]) & (effort * speed > 0.0)
+        return np.where(too_fast, 0.0, np.clip(effort, -self.max_effort[index], self.max_effort[index]))
+
     def set_damping(self, index, damping):
         """Set the viscous damping of joint ``index`` [Nm s/rad or N s/m], as far as the tick's length allows it.
 
@@ -213,6 +226,8 @@ class Model(Body):
     def step_changed(self):
         """For World: the length of a tick has changed."""
         self._damping.step_changed(self._world.time_step_s)
+        if self.springs is not None:
+            self.springs.step_changed(self._world.time_step_s)
 
     def set_limits(self, index, lower, upper):
         """Set the limits of joint ``index`` [rad or m]. Raises BulletSimError if ``lower`` is not below ``upper``."""
@@ -248,9 +263,14 @@ class Model(Body):
         )
 
     def release(self, index):
-        """Switch the motors of joints ``index`` (k,) off."""
-        self._drive_otherwise(index)
-        self.drive_velocity(index, np.zeros(len(index)), np.zeros(len(index)))
+        """Switch the motors of joints ``index`` (k,) off; the joints' friction (Coulomb's) remains."""
+        friction = self._friction[index]
+        self.drive_velocity(index, np.zeros(len(index)), friction)
+        if friction.any():
+            # Bullet's reading of its motor is the friction, which no drive applies.
+            rough = index[friction > 0.0]
+            self._effort_driven[rough] = self._any_effort_driven = True
+            self._commanded_effort[rough], self._reading = 0.0, None
 
     def set_joint_positions(self, index, position):
         """Put joints ``index`` (k,) at ``position`` (k,), at rest, at once. Nothing in between is simulated.

@@ -90,6 +90,7 @@ class World:
         self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
         self._sliding = {}  # model -> its SlidingWheels
+        self._springs = {}  # model -> its JointSprings
         self._watch = StateWatch(self, error)
         self._touched = []  # models that were touched since the last step, perhaps asleep
         self._placed = []  # free models that were put somewhere since the last step
@@ -189,6 +190,11 @@ class World:
         wheels = [] if static else fixed_wheels(merged.joints.values())
         if wheels:
             self._sliding[model] = SlidingWheels(self._client, model, wheels)
+        if model.springs is not None:
+            self._springs[model] = model.springs
+            for joint, stiffness in model.springs.bounded().items():
+                self._warn("model '%s': the spring of joint '%s' has a stiffness of %g; %g is used, which is stable at "
+                           "a step of %g s" % (name, joint, *stiffness, self.time_step_s))
         self._models_changed()
         return model
 
@@ -213,6 +219,7 @@ class World:
         model.remove()
         del self.models[name]
         self._sliding.pop(model, None)
+        self._springs.pop(model, None)
         self._models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
@@ -262,6 +269,8 @@ class World:
             model.cancel_weight()
         for wheels in self._sliding.values():
             wheels.correct()
+        for springs in self._springs.values():
+            springs.push()
         pybullet.stepSimulation(physicsClientId=self._client)
         self.tick += 1
         self.steps += 1

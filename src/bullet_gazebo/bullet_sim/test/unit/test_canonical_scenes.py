@@ -36,8 +36,9 @@ CART = """<robot name="cart"><link name="base"><inertial><mass value="5"/><inert
 </inertial></link>%s</robot>""" % "".join(WHEEL % {"n": "%s%s" % (end, side), "x": x, "y": y}
                                          for end, x in (("front", 0.2), ("rear", -0.2))
                                          for side, y in (("left", 0.15), ("right", -0.15)))
-
-
+SLIDER = """<robot name="slider"><link name="world"/><link name="it"><inertial><mass value="2"/><inertia ixx="0.02"
+iyy="0.02" izz="0.02"/></inertial></link><joint name="rail" type="prismatic"><parent link="world"/><child link="it"/>
+<axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="5" velocity="3"/><dynamics friction="%g"/></joint></robot>"""
 TWO_WHEELER = """<robot name="two_wheeler"><link name="base"><inertial><origin xyz="0 0 0.1"/><mass value="15"/>
 <inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>%s</link>%s</robot>""" % (
     "".join('<collision><origin xyz="%g 0 -0.05"/><geometry><sphere radius="0.05"/></geometry></collision>' % x
@@ -179,6 +180,49 @@ def test_a_pendulum_has_its_period_and_keeps_its_energy(world):
     position, velocity, _ = pendulum.read_joints()
     energy = 0.5 * inertia * velocity[0] ** 2 + G * (1.0 - math.cos(position[0]))
     assert energy == pytest.approx(G * (1.0 - math.cos(amplitude)), rel=0.02)
+
+
+def test_friction_in_a_joint_stops_it_and_holds_it(world):
+    it, rail = world.spawn(parse_urdf(SLIDER % 1.0), "slider"), np.arange(1)
+    it.parts.put(rail, [0.0], [1.0])
+    run(world, 4.0)
+    # 1 N against 2 kg at 1 m/s.
+    assert it.read_joints()[0][0] == pytest.approx(1.0, abs=2.0 * world.time_step_s)
+    assert [reading[0] for reading in it.read_joints()[1:]] == pytest.approx([0.0, 0.0], abs=1e-9), "no drive works"
+    run(world, 1.0, lambda time_s: it.drive_effort(rail, np.array([0.99])))
+    assert it.read_joints()[0][0] == pytest.approx(1.0, abs=2.0 * world.time_step_s)
+    run(world, 1.0, lambda time_s: it.add_effort(rail, np.array([-2.0])))
+    assert it.read_joints()[1][0] == pytest.approx(-0.5, rel=0.01)
+
+
+def test_a_spring_in_a_joint_swings(world):
+    robot = parse_urdf(SLIDER % 0.0)
+    robot.joints["rail"].spring_stiffness, robot.joints["rail"].spring_reference = 50.0, 0.2
+    it, way = world.spawn(robot, "slider"), []
+    run(world, 10.0, lambda time_s: way.append(it.read_joints()[0][0]))
+    assert (min(way), max(way)) == pytest.approx((0.0, 0.4), abs=0.002)
+    middle = np.flatnonzero((np.array(way[:-1]) < 0.2) & (np.array(way[1:]) >= 0.2))
+    assert np.diff(middle).mean() * world.time_step_s == pytest.approx(2.0 * math.pi * math.sqrt(2.0 / 50.0), rel=0.005)
+
+
+def test_a_spring_too_stiff_for_the_step_is_bounded():
+    told = []
+    world = World(time_step_s=0.001, warn=told.append)
+    robot = parse_urdf(SLIDER % 0.0)
+    robot.joints["rail"].spring_stiffness, robot.joints["rail"].spring_reference = 1e9, 0.1
+    it = world.spawn(robot, "slider")
+    run(world, 1.0)
+    assert abs(it.read_joints()[0][0]) < 0.3
+    assert len(told) == 1 and "1e+09" in told[0] and "2e+06" in told[0]
+    world.close()
+
+
+def test_efforts_are_cut_to_the_limits_of_the_joint(world):
+    it, rail = world.spawn(parse_urdf(SLIDER % 0.0), "slider"), np.arange(1)
+    assert it.limited_effort(rail, np.array([-8.0])) == pytest.approx([-5.0])
+    it.carry(rail, np.zeros(1), np.array([3.1]))
+    world.step()
+    assert [it.limited_effort(rail, np.array([effort]))[0] for effort in (4.0, -4.0)] == [0.0, -4.0]
 
 
 def test_a_stack_of_ten_boxes_stands_for_a_minute(world):

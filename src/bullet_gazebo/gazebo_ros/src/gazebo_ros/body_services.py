@@ -136,7 +136,8 @@ class BodyServices:
 
     def _push_joint(self, model_name, joint, effort):
         model = self._world.models[model_name]
-        model.add_effort(model.index([joint]), np.array([effort]))
+        index = model.index([joint])
+        model.add_effort(index, model.limited_effort(index, np.array([effort])))
 
     def forget(self, model_name=None):
         """Drop the wrenches, efforts and pulls of a model that is gone, or all."""

@@ -149,6 +149,8 @@ def _check_joint(joint):
         raise OutOfBounds("the axis of %s is %s; expected a direction such as 0 0 1" % (where, joint.axis))
     DAMPING.check(joint.damping, "the damping of %s" % where)
     FRICTION.check(joint.friction, "the friction of %s" % where)
+    DAMPING.check(joint.spring_stiffness, "the stiffness of the spring of %s" % where)
+    POSITION.check(joint.spring_reference, "the reference of the spring of %s" % where)
     for field in ("lower", "upper", "velocity", "effort"):
         value = getattr(joint.limit, field)
         if value is not None and not abs(value) <= NO_LIMIT:

@@ -25,7 +25,7 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
     found = {}
     for tag, field in _SURFACE.items():
         for part in element.iterchildren(tag):
-            value = _number(part, field, link.name, warn)
+            value = _of_surface(part, field, link.name, warn)
             if value is not None:
                 found[field] = value
     if found:
@@ -39,28 +39,49 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
         shape.finish = shape.finish or finish
 
 
-def read_joint_block(element: Any, joint: Joint) -> None:
-    """Apply a block that refers to ``joint``."""
+def read_joint_block(element: Any, joint: Joint, warn: Callable[[Any, str], None]) -> None:
+    """Apply a block that refers to ``joint``; ``warn``: as for :func:`read_link_block`."""
+    what = "joint '%s'" % joint.name
     for part in element.iterchildren("implicitSpringDamper", "cfmDamping"):
         joint.implicit_damping = is_true(part.text)
+    for part in element.iterchildren("springStiffness"):
+        value = _number(part, what, False, warn)
+        if value is not None:  # Gazebo takes a negative stiffness for one that it may reduce
+            joint.spring_stiffness = abs(_within(part, what, value, bounds.DAMPING.high, warn, -bounds.DAMPING.high))
+    for part in element.iterchildren("springReference"):
+        value = _number(part, what, False, warn)
+        if value is not None:
+            joint.spring_reference = _within(part, what, value, bounds.POSITION.high, warn, bounds.POSITION.low)
 
 
-def _number(part, field, link, warn):
+def _of_surface(part, field, link, warn):
     """The number in an element of a surface; None where there is none that means something."""
+    what = "link '%s'" % link
+    value = _number(part, what, field in MAY_BE_INFINITE, warn)
+    if value is None:
+        return None
+    if field == "friction":
+        return math.inf if value < 0.0 else value  # as Gazebo takes it
+    return _within(part, what, value, math.inf if field in MAY_BE_INFINITE else bounds.DAMPING.high, warn)
+
+
+def _number(part, what, may_be_infinite, warn):
+    """The number in an element about ``what``, or None, with a warning."""
     text = (part.text or "").strip() or part.get("value", "")
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if math.isnan(value) or math.isinf(value) and field not in MAY_BE_INFINITE:
-        warn(part, "<%s> of link '%s' is '%s', which is no number, and is left out" % (part.tag, link, text))
+    if math.isnan(value) or math.isinf(value) and not may_be_infinite:
+        warn(part, "<%s> of %s is '%s', which is no number, and is left out" % (part.tag, what, text))
         return None
-    if field == "friction":
-        return math.inf if value < 0.0 else value  # as Gazebo takes it
-    high = math.inf if field in MAY_BE_INFINITE else bounds.DAMPING.high
-    used = min(max(value, 0.0), high)
+    return value
+
+
+def _within(part, what, value, high, warn, low=0.0):
+    used = min(max(value, low), high)
     if used != value:
-        warn(part, "<%s> of link '%s' is %g; %g is used" % (part.tag, link, value, used))
+        warn(part, "<%s> of %s is %g; %g is used" % (part.tag, what, value, used))
     return used
 
 

@@ -144,6 +144,8 @@ class Joint:
     implicit_damping: bool = False
     # 4x4, the child's frame in the joint's. In a URDF they are one; an SDF joint may sit elsewhere in its child.
     child_offset: np.ndarray = field(default_factory=lambda: np.eye(4))
+    spring_stiffness: float = 0.0  # N m/rad or N/m
+    spring_reference: float = 0.0  # rad or m, the position without a spring's effort
 
     @property
     def movable(self):

@@ -100,7 +100,7 @@ class _Reader:
             if element.get("reference") in links:
                 read_link_block(element, links[element.get("reference")], self.warn)
             elif element.get("reference") in joints:
-                read_joint_block(element, joints[element.get("reference")])
+                read_joint_block(element, joints[element.get("reference")], self.warn)
         return Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
 
     def add_unique(self, table, item, element, kind):

@@ -238,6 +238,14 @@ def test_damping_may_be_implicit(flag, implicit):
     assert merge_fixed(robot).joints["j"].implicit_damping is implicit
 
 
+def test_a_joint_may_have_a_spring():
+    robot = parse_urdf("""<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+    <parent link="a"/><child link="b"/></joint><gazebo reference="j"><springStiffness>12</springStiffness>
+    <springReference>-0.4</springReference></gazebo></robot>""")
+    joint = merge_fixed(robot).joints["j"]
+    assert (joint.spring_stiffness, joint.spring_reference, robot.warnings) == (12.0, -0.4, [])
+
+
 @pytest.mark.parametrize("mu", ["inf", "Inf", "-1"])
 def test_a_friction_without_a_bound_is_infinite(mu):
     robot = parse_urdf('<robot name="r"><link name="l"/><gazebo reference="l"><mu1>%s</mu1></gazebo></robot>' % mu)
