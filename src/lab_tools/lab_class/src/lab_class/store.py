@@ -38,8 +38,7 @@ class Options:
     front door, without a slash at the end, or "".
     """
 
-    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=100",
-                     "light_tf:=true")
+    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=100")
     port: int = 8100
     public: bool = False
     trusted: bool = False

@@ -13,15 +13,17 @@ class MissingParameter(Exception):
     """A parameter that did not come; the text names it and says what sets it."""
 
 
-def wait_for_param(name, timeout_s):
-    """Return a parameter that may be set a little later than this node starts.
+def wait_for_param(name, timeout_s, search=False):
+    """Return a parameter that may be set a little later than this node starts; with ``search`` also that of a namespace
+    above, the nearest one.
 
     Waits for ``timeout_s`` of wall time at most. Raises MissingParameter after that, and where the node is ended.
     """
     begin = told = time.monotonic()
     while not rospy.is_shutdown():
-        if rospy.has_param(name):
-            return rospy.get_param(name)
+        found = rospy.search_param(name) if search else name
+        if found and rospy.has_param(found):
+            return rospy.get_param(found)
         now = time.monotonic()
         if now - begin > timeout_s:
             break

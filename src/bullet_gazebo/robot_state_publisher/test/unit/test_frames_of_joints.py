@@ -2,10 +2,11 @@
 """The frames of /tf from joint positions: against the product of the description's matrices."""
 import numpy as np
 import pytest
+import rospkg
 from tf2_msgs.msg import TFMessage
 
 import xacro
-from baxter_sim_hardware.joint_frames import Due, JointFrames
+from robot_state_publisher.frames import Due, JointFrames, tf_name
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
 
@@ -71,28 +72,58 @@ def test_fixed_joints(robot):
     np.testing.assert_allclose(found["d", "é"], robot.joints["stays"].origin, atol=1e-12)
 
 
-def test_every_link_of_baxter_has_one_frame(robot_file):
-    baxter = parse_urdf(xacro.process_file(robot_file).toxml())
+def test_every_link_of_baxter_has_one_frame():
+    description = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+    baxter = parse_urdf(xacro.process_file(description).toxml())
     frames, names = JointFrames(baxter), [joint.name for joint in baxter.movable_joints()]
     found = [*read(frames.moving(names, np.zeros(len(names)), TIME_NS)), *read(frames.fixed(0), 0)]
     assert sorted(child for _, child in found) == sorted(set(baxter.links) - {baxter.root})
 
 
+def test_the_order_is_that_of_names_and_a_repeated_name_counts_once(robot):
+    message = TFMessage().deserialize(JointFrames(robot).moving(["turns", "slides", "turns"], [0.1, 0.2, 9.0], 0))
+    assert [one.child_frame_id for one in message.transforms] == ["d", "c", "b"]
+    assert message == TFMessage().deserialize(JointFrames(robot).moving(["slides", "turns"], [0.2, 0.1], 0))
+
+
+def test_a_joint_that_mimics_one_that_mimics_another():
+    """As in the original, which goes by the order of names: ``b`` follows ``a``, and ``c`` follows ``b``."""
+    joint = ('<joint name="%s" type="continuous"><parent link="l%d"/><child link="l%d"/><axis xyz="0 0 1"/>%s</joint>')
+    mimic = '<mimic joint="%s" multiplier="2" offset="0.1"/>'
+    text = "".join('<link name="l%d"/>' % number for number in range(4)) + joint % ("a", 0, 1, "") + joint % (
+        "b", 1, 2, mimic % "a") + joint % ("c", 2, 3, mimic % "b")
+    found = read(JointFrames(parse_urdf("<robot name='r'>%s</robot>" % text)).moving(["a"], [0.3], TIME_NS))
+    for frames, angle in ((("l0", "l1"), 0.3), (("l1", "l2"), 0.7), (("l2", "l3"), 1.5)):
+        turned = rigid(axis_rotation([0, 0, 1], angle)[:3, :3], np.zeros(3))
+        np.testing.assert_allclose(found[frames], turned, atol=1e-12)
+
+
+@pytest.mark.parametrize("prefix, frame, name", [
+    ("", "base", "base"), ("left", "base", "left/base"), ("/left", "base", "left/base"), ("left", "/base", "base")])
+def test_a_prefix(prefix, frame, name):
+    assert tf_name(prefix, frame) == name
+
+
+MS = 1_000_000
+
+
 def test_states_are_sent_on_at_the_rate_and_again_when_time_goes_back():
-    due = Due(20)
-    assert [time for time in (5, 6, 24, 25, 40, 45, 90, 3, 4, 23) if due(["a"], time)] == [5, 25, 45, 90, 3, 23]
+    due = Due(20 * MS)
+    times = [time for time in (5, 20, 24, 39, 40, 39, 60, 300, 30, 49, 50, 90) if due(["a"], time * MS)]
+    assert times == [20, 40, 60, 300, 30, 50, 90]
 
 
-def test_fingers_in_a_message_of_their_own_are_sent_on_as_often_as_the_arms():
-    due = Due(20)
-    sent = [(names, time) for time in (0, 10, 20, 30, 40) for names in ("arms", "fingers") if due([names], time)]
-    assert sent == [(names, time) for time in (0, 20, 40) for names in ("arms", "fingers")]
+def test_a_state_is_due_where_one_of_its_joints_is():
+    due = Due(20 * MS)
+    sent = [(names, time) for time in (20, 30, 40, 50) for names in ("ab", "bc", "x") if due(names, time * MS)]
+    assert sent == [(names, time) for time in (20, 40) for names in ("ab", "bc", "x")]
+    assert due("bd", 51 * MS)
 
 
-def test_who_sends_other_names_in_each_message_does_not_fill_the_memory(robot):
-    frames, due = JointFrames(robot), Due(20)
+def test_a_publisher_of_other_names_in_each_message_does_not_fill_the_memory(robot):
+    frames = JointFrames(robot)
     for number in range(1000):
-        names = ["slides", "x%d" % number]
-        assert due(names, 0)
-        assert read(frames.moving(names, [0.2, 0.0], TIME_NS)).keys() == {("b", "c")}
-    assert len(due._last_ns) < 10 and len(frames._groups) < 10
+        names = ["slides", "stays", "x%d" % number]
+        assert frames.known(names) == ["slides"] and frames.unknown(names) == names[2:]
+        assert read(frames.moving(names, [0.2, 0.0, 0.0], TIME_NS)).keys() == {("b", "c")}
+    assert len(frames._groups) < 10
