@@ -17,7 +17,7 @@ from .frames import Frames
 from .lights import Light, read_light
 from .links import read_link
 from .materials import MaterialScripts
-from .tree import Parts, SdfJoint, build_robot
+from .tree import Dynamics, Parts, SdfJoint, build_robot
 
 _QUIET = ("enable_wind", "allow_auto_disable", "meta")
 _MOVABLE = ("revolute", "continuous", "prismatic")
@@ -303,7 +303,7 @@ def _end(document, joint, role):
 def _joint(document, element, frames, own_frame):
     name, kind = document.name(element), element.get("type", "")
     document.note_unknown(element, ("parent", "child", "pose", "axis", "physics", "meta"))
-    axis, limit, damping, friction = np.array([0.0, 0.0, 1.0]), Limit(), 0.0, 0.0
+    axis, limit, dynamics = np.array([0.0, 0.0, 1.0]), Limit(), Dynamics()
     frame = frames.where(own_frame, element)
     if kind in _MOVABLE:
         given = element.find("axis")
@@ -313,12 +313,7 @@ def _joint(document, element, frames, own_frame):
         document.note_unknown(given, ("xyz", "limit", "dynamics", "use_parent_model_frame"))
         axis = _axis(document, given, name, frame, frames)
         kind, limit = _limit(document, given, name, kind)
-        dynamics = given.find("dynamics")
-        if dynamics is not None:
-            # Gazebo takes a negative damping for one that it may reduce.
-            damping, friction = (_bounded(document, dynamics, tag, take(document.number(dynamics, tag, 0.0)), bound)
-                                 for tag, take, bound in (("damping", abs, bounds.DAMPING),
-                                                          ("friction", float, bounds.FRICTION)))
+        dynamics = _dynamics(document, given)
     elif kind != "fixed":
         if not kind:
             raise document.error(element, "joint '%s' has no type; known: %s, fixed" % (name, ", ".join(_MOVABLE)))
@@ -326,7 +321,18 @@ def _joint(document, element, frames, own_frame):
         kind = "fixed"
     ends = (_end(document, element, role) for role in ("parent", "child"))
     implicit = any(document.flag(element, "physics/ode/" + tag) for tag in ("implicit_spring_damper", "cfm_damping"))
-    return SdfJoint(name, kind, *ends, frame, axis, limit, damping, friction, implicit, element)
+    return SdfJoint(name, kind, *ends, frame, axis, limit, dynamics, implicit, element)
+
+
+def _dynamics(document, axis):
+    element = axis.find("dynamics")
+    if element is None:
+        return Dynamics()
+    # Gazebo takes a negative damping or stiffness for one that it may reduce.
+    return Dynamics(*(_bounded(document, element, tag, take(document.number(element, tag, 0.0)), bound)
+                      for tag, take, bound in (("damping", abs, bounds.DAMPING), ("friction", float, bounds.FRICTION),
+                                               ("spring_stiffness", abs, bounds.DAMPING),
+                                               ("spring_reference", float, bounds.POSITION))))
 
 
 def _axis(document, given, name, frame, frames):

@@ -14,6 +14,16 @@ WORLD = "world"
 
 
 @dataclass
+class Dynamics:
+    """The <dynamics> of a joint, as ``urdf_model.Joint`` has them."""
+
+    damping: float = 0.0
+    friction: float = 0.0
+    spring_stiffness: float = 0.0
+    spring_reference: float = 0.0
+
+
+@dataclass
 class SdfJoint:
     """A joint as written; frames in the model."""
 
@@ -24,8 +34,7 @@ class SdfJoint:
     frame: np.ndarray  # 4x4
     axis: np.ndarray  # (3,), unit, in the joint's frame
     limit: Limit
-    damping: float
-    friction: float
+    dynamics: Dynamics
     implicit_damping: bool
     element: Any
 
@@ -137,8 +146,7 @@ def _joint(links, joint, parent, child):
         inverse(links[parent][1]) @ joint.frame,
         -joint.axis if turned else joint.axis,
         joint.limit,
-        damping=joint.damping,
-        friction=joint.friction,
+        **vars(joint.dynamics),
         implicit_damping=joint.implicit_damping,
         line=joint.element.sourceline,
         child_offset=inverse(joint.frame) @ links[child][1],

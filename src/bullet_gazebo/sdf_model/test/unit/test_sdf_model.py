@@ -301,7 +301,7 @@ def test_what_is_not_understood_is_one_warning_with_file_and_lines(tmp_path, she
     can.write_text(sdf('<link name="l">\n<audio_sink name="s" type="ray"/></link>', name="can"))
     found = world(tmp_path, "<population/>\n<actor name='walker'/>\n<population/>\n<include><uri>model://can</uri></include>\n"
                             "<scene/><gui/>", shelf)
-    assert found.warning.count("not understood") == 1
+    assert found.warning.count("not understood") == found.warning.count("without an effect") == 1
     assert "population (%s line 3, 5)" % (tmp_path / "a.world") in found.warning
     assert "actor 'walker' (" in found.warning
     assert "audio_sink (%s line 4)" % can in found.warning and "scene" not in found.warning
@@ -377,6 +377,15 @@ def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
     assert (hinge.type, hinge.axis.tolist(), hinge.damping, hinge.friction) == ("continuous", [1, 0, 0], 0.5, 0.0)
 
 
+def test_a_joint_may_have_a_spring():
+    dynamics = ("<dynamics><friction>0.3</friction><spring_stiffness>12</spring_stiffness>"
+                "<spring_reference>-0.4</spring_reference></dynamics>")
+    found = parse_sdf_model(sdf('<link name="a"/><link name="b"/>' + joint(
+        "j", "a", "b", axis="<axis><xyz>0 0 1</xyz>%s</axis>" % dynamics)), "m.sdf")
+    hinge = found.robot.joints["j"]
+    assert (hinge.friction, hinge.spring_stiffness, hinge.spring_reference, found.warning) == (0.3, 12.0, -0.4, "")
+
+
 # -- errors ----------------------------------------------------------------------------------------
 
 
@@ -421,7 +430,7 @@ def test_core_loads_without_ros():
 
 def test_a_heightmap_is_a_mesh_of_its_size_at_its_place():
     model = read("""<link name="l"><pose>0 0 2 0 0 0</pose><collision name="c"><geometry><heightmap>
-<uri>model://hills/hills.png</uri><size>129 64 10</size><pos>1 2 3</pos><texture><size>10</size></texture></heightmap>
+<uri>model://hills/hills.png</uri><size>129 64 10</size><pos>1 2 3</pos></heightmap>
 </geometry></collision></link>""")
     shape, = model.robot.links["l"].collisions
     assert shape.geometry == Mesh("model://hills/hills.png", (129, 64, 10)) and model.warning == ""
