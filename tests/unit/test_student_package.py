@@ -50,6 +50,9 @@ def run(script, cwd, shell="bash", **variables):
 def workspace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("student")
     shutil.copytree(ROOT / "src/lab_tools/lab_environment", folder / "src/lab_tools/lab_environment")
+    (folder / "tools").mkdir()
+    for name in ("tools/setup.bash", "tools/apt_packages.txt", "requirements.txt"):
+        (folder / name).touch()
     (folder / ".venv").symlink_to(ROOT / ".venv")
     configure = f"catkin_make -DPYTHON_EXECUTABLE={folder}/.venv/bin/python3"
     session = f"""
@@ -124,6 +127,42 @@ PACKAGE = """<package format="2"><name>{0}</name><version>0.1.0</version><descri
 <depend>{1}</depend></package>"""
 
 
+def catkin_make_leaves_the_lab_alone(workspace):
+    """The lab's catkin_make in the workspace: what it builds itself, and what it leaves to catkin's own."""
+    for name in ("catkin_make", "environment.bash", "own_packages.py"):
+        shutil.copy(ROOT / "tools" / name, workspace / "tools" / name)
+    state = workspace / ".baxter"
+    (state / "build.stamp").touch()
+    catkins_own = workspace / "catkins_own" / "catkin_make"
+    catkins_own.parent.mkdir()
+    catkins_own.write_text('#!/bin/sh\necho catkins own: "$*"\n')
+    catkins_own.chmod(0o755)
+    before = (f"source devel/setup.bash; PATH={catkins_own.parent}:$PATH LAB_ROOT={workspace}; "
+              "source tools/environment.bash; fingerprint >.baxter/done; ")
+
+    def said(command):
+        return run(f"{before}{command} 2>&1", workspace)
+
+    everything = said("tools/catkin_make -j1")
+    assert "building mine_msgs" in everything and "building mine_a" in everything and "catkins own" not in everything
+    assert everything.count("Configuring done") == 1, "only foo has not been built before"
+    assert (state / "own_done").read_text() == said("own_fingerprint")
+    (workspace / "src/mine_msgs/msg/Bar.msg").write_text("float64 x\nfloat64 y\n")
+    one = said("tools/catkin_make --pkg mine_msgs")
+    assert "building mine_msgs" in one and "mine_a" not in one
+    for words in ("-DX=1", "--pkg lab_environment", "install", "--pkg mine_a install --force-cmake"):
+        assert said(f"tools/catkin_make {words}") == f"catkins own: {words}\n"
+    assert said("cd src && ../tools/catkin_make") == "catkins own: \n"
+    package = workspace / "src/lab_tools/lab_environment"
+    changed = package / "new.cpp"
+    changed.touch()
+    assert said("tools/catkin_make") == "catkins own: \n"
+    changed.unlink()
+    changed = package / "env-hooks" / "new"
+    assert said(f"touch {changed}; tools/catkin_make") == "catkins own: \n"
+    changed.unlink()
+
+
 def test_own_packages_are_built_alone_in_their_order(workspace):
     """mine_a needs the messages of mine_msgs; a second run has nothing to do, and a broken one is named."""
     messages = "\nadd_message_files(FILES Bar.msg)\ngenerate_messages()"
@@ -144,6 +183,7 @@ def test_own_packages_are_built_alone_in_their_order(workspace):
     assert {file: file.read_bytes() for file in space} == space
     use = "source devel/setup.bash && python3 -c 'from mine_msgs.msg import Bar; print(Bar(x=2.0))'"
     assert run(use, workspace) == "x: 2.0\n"
+    catkin_make_leaves_the_lab_alone(workspace)
     (workspace / "src/mine_a/CMakeLists.txt").write_text("nonsense(\n")
     said = run(f"source devel/setup.bash; {tool} 2>&1; echo $?", workspace)
     assert "the package mine_a does not build" in said and said.endswith("\n1\n") and "own-mine_a.log" in said
