@@ -206,7 +206,11 @@ main() {
             # The build's hooks set it; without a build one fault is enough.
             if [[ -z ${ROS_MASTER_URI:-} ]]; then use_loopback; fi
             if ! command -v python3 >/dev/null; then
-                echo "There is no python3 on this machine yet. fix: ./baxter.sh setup"
+                if [[ -f $LAB_ROOT/.baxter/lock ]] && ! flock -n "$LAB_ROOT/.baxter/lock" true; then
+                    echo "Set-up is running$(set_up_progress), and has not installed python3 yet. fix: wait until it has ended"
+                else
+                    echo "There is no python3 on this machine yet. fix: ./baxter.sh setup"
+                fi
                 exit 1
             fi
             exec python3 "$LAB_ROOT/tools/doctor.py"

@@ -132,6 +132,13 @@ is_set_up() {
     [[ ! -f $state/at_work ]] || ! flock -n "$state/lock" true
 }
 
+# set_up_progress: where the running set-up is, as ", in step 6 of 9 (catkin_make) since 40 s"; nothing if that is unknown
+set_up_progress() {
+    local since place title
+    IFS=$'\t' read -r since place title 2>/dev/null <"$LAB_ROOT/.baxter/progress" || return 0
+    echo ", in step $place ($title) since $(($(date +%s) - since)) s"
+}
+
 # bring_up_to_date [--strict] [COMMAND…]: build everything that COMMAND needs, of the lab and of the user's own
 # packages.
 bring_up_to_date() {

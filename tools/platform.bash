@@ -22,3 +22,45 @@ platform_line() {
     if [[ $3 != x86_64 ]]; then verdict+="; on $3 untested: pybullet has no wheel for it and is compiled"; fi
     echo "System: ${name:-unknown}: $verdict (docs/platforms.md)"
 }
+
+# Room that a first set-up takes [MB], by folder: Debian's packages, their archives while they are unpacked, and the workspace.
+ROOM_MB_USR=2000 ROOM_MB_VAR=400 ROOM_MB_WORKSPACE=1600
+
+# missing_space FOLDER MB [FOLDER MB]…: a sentence about each file system that has less room than the folders on it need
+missing_space() {
+    local folder free_mb mount
+    local -A need=() free=()
+    while [[ $# -gt 1 ]]; do
+        folder=$1
+        while [[ ! -e $folder && $folder == */* ]]; do folder=${folder%/*}; done
+        read -r free_mb mount < <(df -Pm "${folder:-/}" 2>/dev/null | awk 'NR == 2 { print $4, $6 }')
+        if [[ -n $mount ]]; then
+            need[$mount]=$((${need[$mount]:-0} + $2)) free[$mount]=$free_mb
+        fi
+        shift 2
+    done
+    for mount in "${!need[@]}"; do
+        if [[ ${free[$mount]} -lt ${need[$mount]} ]]; then
+            echo "too little disk: $mount has ${free[$mount]} MB free, and a first set-up takes ${need[$mount]} MB there (df -h $mount)"
+        fi
+    done
+}
+
+# unreachable_archive FILE…: a sentence if not one host of apt's sources, in these files, has an address. Silent where a proxy looks
+# names up, and where some source needs no network.
+unreachable_archive() {
+    local address host hosts=() proxies=${http_proxy:-}${HTTP_PROXY:-}${https_proxy:-}${HTTPS_PROXY:-}${all_proxy:-}${ALL_PROXY:-}
+    if [[ -n $proxies ]] || apt-config dump 2>/dev/null | grep -qi '^acquire::.*proxy'; then return; fi
+    while read -r address; do
+        case $address in http://* | https://*) ;; *) return ;; esac
+        host=${address#*://}
+        host=${host%%[:/]*}
+        if [[ " ${hosts[*]:-} " != *" $host "* ]]; then hosts+=("$host"); fi
+    done < <(sed 's/#.*//' "$@" 2>/dev/null | grep -oE '[a-z+-]+:/[^] ]*')
+    for host in ${hosts[@]+"${hosts[@]}"}; do
+        if timeout 10 getent ahosts "$host" >/dev/null; then return; fi
+    done
+    if [[ ${#hosts[@]} -gt 0 ]]; then
+        echo "the network cannot be reached: this machine finds no address of ${hosts[*]} (cable, Wi-Fi, name server, proxy?)"
+    fi
+}

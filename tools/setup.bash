@@ -71,14 +71,27 @@ require_python() {
         refuse "the packages in requirements.txt need Python $OLDEST_PYTHON or newer; this is $(/usr/bin/python3 --version)"
 }
 
+# require_space PACKAGES: refuse what cannot fit, before anything is fetched
+require_space() {
+    local room=() too_little
+    # Without most of the packages of the list, the machine is fresh.
+    if [[ $1 -gt $(($(grep -vc '^#' tools/apt_packages.txt) / 2)) ]]; then room+=(/usr "$ROOM_MB_USR" /var/cache "$ROOM_MB_VAR"); fi
+    if [[ ! -d $VENV ]]; then room+=("$LAB_ROOT" "$ROOM_MB_WORKSPACE"); fi
+    too_little=$(missing_space "${room[@]}")
+    [[ -z $too_little ]] || refuse "$too_little"
+}
+
 step_apt() {
-    local missing as_root=()
+    local missing unreachable as_root=()
     if [[ -x /usr/bin/python3 ]]; then require_python; fi
     mapfile -t missing < <(missing_packages)
+    require_space "${#missing[@]}"
     if [[ ${#missing[@]} -eq 0 ]]; then
         note="all there"
         return
     fi
+    unreachable=$(unreachable_archive /etc/apt/sources.list /etc/apt/sources.list.d/*)
+    [[ -z $unreachable ]] || refuse "$unreachable"
     command -v apt-get >/dev/null || refuse "this machine has no apt-get; install these yourself: ${missing[*]}"
     if [[ $EUID -ne 0 ]]; then
         command -v sudo >/dev/null || refuse "not root, and no sudo. As root: apt-get install ${missing[*]}"
@@ -227,6 +240,8 @@ step_build() {
     key="$LAB_ROOT $ROS_LANG_DISABLE $(cd src && find -L . -mindepth 2 \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
+    # First in PATH, before catkin's own.
+    run ln -sfn ../../tools/catkin_make "$VENV/bin/catkin_make"
     # make takes a file that a killed compiler has half written as finished.
     if was_cut_off build; then
         run rm -rf build devel

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # How set-up runs the commands of its steps: output to the step's log, errors in words, and repair of steps that an
-# interrupted run left incomplete. Sourced by setup.bash; LAB_ROOT, STATE and TITLES are its.
+# interrupted run left incomplete. Sourced by setup.bash; LAB_ROOT, STATE, STEPS and TITLES are its.
 
 LOGS=$STATE/logs
 # Below this free space [kB] the disk counts as full.
@@ -18,8 +18,7 @@ start_run() {
     # A launch and a node started together on a fresh clone must not both build. The commands of the steps inherit the
     # lock: set-up waits for commands that outlive a killed set-up.
     if ! flock -n 9; then
-        echo "another set-up is running in this workspace; waiting for it to finish"
-        flock 9
+        wait_for_other_set_up
         if [[ -f $STATE/done && $(<"$STATE/done") == "$(fingerprint)" ]]; then exit 0; fi
     fi
     if [[ -f $STATE/at_work ]]; then
@@ -28,7 +27,21 @@ start_run() {
         echo "The set-up before this one was cut off in step '${TITLES[$cut_off_step]:-unknown}'; this step is" \
              "repeated."
     fi
+    rm -f "$STATE/failure"
     trap interrupted INT
+}
+
+# wait_for_other_set_up: take its lock when it has ended; each step of it is told.
+wait_for_other_set_up() {
+    local told="" now
+    until flock -n 9; do
+        now=place:$(cut -f 2 "$STATE/progress" 2>/dev/null)
+        if [[ $now != "$told" ]]; then
+            echo "another set-up is running in this workspace$(set_up_progress); waiting for it to finish"
+            told=$now
+        fi
+        flock -w 2 9 && return
+    done
 }
 
 # was_cut_off STEP: may an earlier run have left this step incomplete?
@@ -40,6 +53,9 @@ start_step() {
     # An interrupted step stays marked until it has succeeded.
     if [[ -z $cut_off_step ]]; then write "$STATE/at_work" "$step_name"; fi
     write "$step_log" "# ${TITLES[$step_name]}, $(date)"
+    local place=1
+    while [[ $place -lt ${#STEPS[@]} && ${STEPS[place - 1]} != "$step_name" ]]; do place=$((place + 1)); done
+    write "$STATE/progress" "$(date +%s)"$'\t'"$place of ${#STEPS[@]}"$'\t'"${TITLES[$step_name]}"
 }
 
 end_step() { repaired "$step_name"; }
@@ -99,6 +115,7 @@ fail() {
     if [[ $1 -eq 130 ]]; then interrupted; fi
     local cause
     cause=$(cause_of "$1")
+    keep_failure "$cause"
     {
         echo
         echo "Set-up failed in step '${TITLES[$step_name]}' (exit code $1)."
@@ -122,9 +139,13 @@ refuse() {
         echo "  log:     $step_log"
     } >&2
     echo "$1" 2>/dev/null >>"$step_log"
+    keep_failure "$1"
     if [[ $1 != *"the disk is full"* ]]; then nothing_half_done; fi
     exit 1
 }
+
+# keep_failure CAUSE: for the doctor
+keep_failure() { printf '%s\t%s\n' "$step_name" "$1" 2>/dev/null >"$STATE/failure" || true; }
 
 nothing_half_done() {
     if [[ -z $cut_off_step ]]; then rm -f "$STATE/at_work"; fi

@@ -15,6 +15,7 @@ from lab_doctor.checks import Level, examine
 from lab_doctor.facts import (
     Controller,
     Facts,
+    Failure,
     Listener,
     Master,
     MoveGroup,
@@ -93,6 +94,13 @@ SICK = {
     "not built": (replace(HEALTHY_LAB, is_built=False), "build", "not built", "setup"),
     "set-up cut off": (
         replace(HEALTHY_LAB, is_fresh=False, set_up=SetUp("pip", is_running=False)), "build", "step 'pip'", "setup",
+    ),
+    "set-up failed": (
+        replace(HEALTHY_LAB, is_fresh=False, was_set_up=False, failure=Failure("pip", "the disk is full")),
+        "build", "'pip': the disk is full", "setup",
+    ),
+    "set up in part": (
+        replace(HEALTHY_LAB, is_fresh=False, was_set_up=False), "build", "no set-up has been completed", "setup",
     ),
     "stale build": (replace(HEALTHY_LAB, is_fresh=False), "build", "changed", "setup"),
     "pyenv first": (replace(HEALTHY_LAB, python=PythonFacts("/opt/pyenv/python3")), "python", "/opt/pyenv", "setup"),
@@ -340,16 +348,19 @@ def test_own_and_foreign_addresses_are_told_apart():
 
 
 def test_a_workspace_that_was_never_set_up_has_one_fault():
-    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=PythonFacts("/usr/bin/python3"))
+    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, was_set_up=False,
+                    python=PythonFacts("/usr/bin/python3"))
     wrong = [finding for finding in examine(facts) if finding.level is Level.WRONG]
     assert [(finding.topic, finding.fix) for finding in wrong] == [("build", "./baxter.sh setup")]
 
 
 def test_a_set_up_that_runs_is_told_with_its_step_and_nothing_is_wrong():
-    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=None, set_up=SetUp("apt", "Unpacking numpy"))
+    facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=None,
+                    set_up=SetUp("apt", "Unpacking numpy", True, "1 of 9", 40))
     finding, = (one for one in examine(facts) if one.level is not Level.OK)
     assert (finding.topic, finding.level) == ("build", Level.BUSY)
-    assert "step 'apt'" in finding.what and "Unpacking numpy" in finding.what and "apt.log" in finding.fix
+    assert "step 'apt' (1 of 9, since 40 s)" in finding.what and "Unpacking numpy" in finding.what
+    assert "apt.log" in finding.fix
 
 
 def test_the_lock_tells_a_running_set_up_from_one_that_was_cut_off(tmp_path):
@@ -360,6 +371,9 @@ def test_the_lock_tells_a_running_set_up_from_one_that_was_cut_off(tmp_path):
     with open(tmp_path / ".baxter/lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert set_up_at_work(tmp_path) == SetUp("apt", "Get: 2 \ufffd")
+        (tmp_path / ".baxter/progress").write_text(f"{int(time.time()) - 40}\t1 of 9\tDebian packages\n")
+        found = set_up_at_work(tmp_path)
+        assert found.place == "1 of 9" and found.since_s >= 40
     assert set_up_at_work(tmp_path) == SetUp("apt", is_running=False)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from lab_doctor.probe import last_failure
 from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
@@ -116,6 +117,12 @@ def workspace(tmp_path):
         (fakes / name).chmod(0o755)
     (fakes / "sudo").write_text('#!/bin/bash\n[[ $1 == -v ]] || exec "$@"\n')
     (fakes / "sudo").chmod(0o755)
+    # A machine with a name server, and with as much free disk as the file says.
+    (fakes / "getent").write_text("#!/bin/sh\n")
+    (fakes / "getent").chmod(0o755)
+    (fakes / "free").write_text("100000000")
+    (fakes / "df").write_text('#!/bin/sh\necho header\necho /dev/disk 1 1 "$(cat "${0%/*}/free")" 1% /\n')
+    (fakes / "df").chmod(0o755)
     setup = (root / "tools" / "setup.bash").read_text()
     setup = setup.replace("export PATH=", f"export PATH={fakes}:").replace("/usr/bin/python3", f"{fakes}/python3")
     (root / "tools" / "setup.bash").write_text(setup)
@@ -181,9 +188,12 @@ def test_a_failure_names_step_cause_command_and_log(workspace, step):
     assert f"failed in step '{TITLES[step]}'" in said
     assert "cause:   the network cannot be reached" in said and "Temporary failure in name resolution" in said
     assert f"log:     {root}/.baxter/logs/{step}.log" in said
+    failure = last_failure(root)
+    assert failure.step == step and "Temporary failure" in failure.cause
     (fakes / "fail").unlink()
     status, said = finish(start(root))
     assert status == 0 and "cut off" not in said, said
+    assert last_failure(root) is None
     assert_whole(root)
 
 
@@ -244,12 +254,44 @@ def test_what_outlives_a_killed_set_up_is_waited_for(workspace):
     first.wait()
     (fakes / "hang").unlink()
     second = start(root)
-    assert "another set-up is running" in second.stdout.readline()
+    told = second.stdout.readline()
+    assert "another set-up is running" in told and f"step 6 of 9 ({TITLES['build']}) since " in told
     assert (root / "build" / "half.o").exists()
     os.killpg(first.pid, signal.SIGKILL)
     status, said = finish(second)
     assert status == 0, said
     assert_whole(root)
+
+
+def test_too_little_disk_is_told_before_anything_is_fetched(workspace):
+    root, fakes = workspace
+    (fakes / "free").write_text("3900")
+    status, said = finish(start(root))
+    assert status == 1 and "too little disk: / has 3900 MB free" in said and "4000 MB" in said
+    assert "too little disk" in last_failure(root).cause
+    assert "apt-get" not in (root / ".baxter/logs/apt.log").read_text()
+    # The rest of a set-up that has begun needs less.
+    (root / ".venv").mkdir()
+    status, said = finish(start(root))
+    assert status == 0 and "cut off" not in said, said
+
+
+@pytest.mark.parametrize(("source", "answers", "told"), [
+    ("deb http://archive.example/debian trixie main", False, "archive.example"),
+    ("Types: deb\nURIs: https://archive.example:8000/debian\n# URIs: http://other.example/", False, "archive.example"),
+    ("deb http://archive.example/debian trixie main", True, ""),
+    ("deb [trusted=yes] file:/srv/packages ./\ndeb http://archive.example/debian trixie main", False, ""),
+], ids=["no address", "deb822", "an address", "a folder beside it"])
+def test_no_network_is_told_before_apt_waits_for_it(tmp_path, source, answers, told):
+    (tmp_path / "a.list").write_text(source + "\n")
+    (tmp_path / "getent").write_text(f"#!/bin/sh\nexit {0 if answers else 2}\n")
+    (tmp_path / "getent").chmod(0o755)
+    script = 'source "$1/tools/platform.bash"; unreachable_archive "$2"'
+    for variables, expected in (({}, told), ({"http_proxy": "http://proxy.example:3128"}, "")):
+        environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "APT_CONFIG": "/dev/null", **variables}
+        command = ["bash", "-uc", script, "test", ROOT, tmp_path / "a.list"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        assert (expected in done.stdout) and bool(done.stdout) == bool(expected), done.stdout
 
 
 def test_a_state_that_could_not_be_written_is_taken_for_the_worst(workspace):

@@ -40,15 +40,24 @@ def check_build(facts):
     if facts.set_up is not None:
         log = f"{facts.root}/.baxter/logs/{facts.set_up.step}.log"
     if facts.set_up is not None and facts.set_up.is_running:
-        what = f"set-up is running, in step '{facts.set_up.step}': {facts.set_up.last_line or 'it has just begun'}"
+        place = f" ({facts.set_up.place}, since {facts.set_up.since_s} s)" if facts.set_up.place else ""
+        line = facts.set_up.last_line or "it has just begun"
+        what = f"set-up is running, in step '{facts.set_up.step}'{place}: {line}"
         yield Finding("build", Level.BUSY, what, f"wait until it has ended; tail -f {log} shows what it does")
     elif facts.set_up is not None:
         what = f"the last set-up was cut off in step '{facts.set_up.step}' (log: {log})"
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
+    elif facts.failure is not None and not facts.was_set_up:
+        what = f"the last set-up failed in step '{facts.failure.step}': {facts.failure.cause}"
+        yield Finding("build", Level.WRONG, what, "mend that, then ./baxter.sh setup")
     elif not facts.is_built:
-        yield Finding("build", Level.WRONG, "the workspace is not built", "./baxter.sh setup")
+        what = "the workspace is not built" if facts.was_set_up else "the workspace has not been set up yet"
+        yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
     elif "is_fresh" in facts.timed_out:
         yield _busy("build", "reading all packages takes too long")
+    elif not facts.was_set_up:
+        what = "no set-up has been completed with the present packages"
+        yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
     elif facts.is_fresh is False:
         what = "packages, messages or requirements have changed since the last set-up"
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")

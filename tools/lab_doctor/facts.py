@@ -77,11 +77,24 @@ class PythonFacts:
 
 @dataclass(frozen=True)
 class SetUp:
-    """A set-up that has not ended: its step, the last line of that step's log, and whether it runs or was cut off."""
+    """A set-up that has not ended: its step, the last line of that step's log, and whether it runs or was cut off.
+
+    place: the step's, as "6 of 9"; since_s: the time since the step began.
+    """
 
     step: str
     last_line: str = ""
     is_running: bool = True
+    place: str = ""
+    since_s: int = 0
+
+
+@dataclass(frozen=True)
+class Failure:
+    """The error that ended the last set-up, and the step in which it did."""
+
+    step: str
+    cause: str
 
 
 @dataclass(frozen=True)
@@ -114,6 +127,8 @@ class Facts:
     is_built: bool = False
     is_fresh: bool | None = None
     set_up: SetUp | None = None  # None: the last one ended, or there was none
+    was_set_up: bool = True  # whether a set-up has been completed
+    failure: Failure | None = None
     python: PythonFacts | None = None
     # Path of `python3` outside the lab's environment, if it is not the system's.
     users_python: str = ""

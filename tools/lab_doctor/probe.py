@@ -20,6 +20,7 @@ from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import (
     Controller,
     Facts,
+    Failure,
     Listener,
     Master,
     MoveGroup,
@@ -79,6 +80,8 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         is_built=(root / "devel" / "setup.bash").is_file(),
         is_fresh=answers.get("is_fresh"),
         set_up=answers.get("set_up"),
+        was_set_up=(root / ".baxter" / "done").is_file(),
+        failure=last_failure(root),
         python=answers.get("python"),
         listeners=answers.get("listeners"),
         other_masters=answers.get("other_masters") or [],
@@ -326,8 +329,25 @@ def set_up_at_work(root: Path) -> SetUp | None:
         try:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
-            return SetUp(step, _last_line(state / "logs" / f"{step}.log"))
+            return SetUp(step, _last_line(state / "logs" / f"{step}.log"), True, *_progress(state / "progress"))
     return SetUp(step, is_running=False)
+
+
+def _progress(file: Path) -> tuple[str, int]:
+    """Place of the running step, and the time since it began [s]; ("", 0) if set-up has not written them."""
+    try:
+        began, place, _ = file.read_text().rstrip("\n").split("\t")
+        return place, max(0, int(time.time()) - int(began))
+    except (OSError, ValueError):
+        return "", 0
+
+
+def last_failure(root: Path) -> Failure | None:
+    try:
+        step, _, cause = (root / ".baxter" / "failure").read_text(errors="replace").strip().partition("\t")
+    except OSError:
+        return None
+    return Failure(step, cause)
 
 
 def _last_line(log: Path) -> str:
