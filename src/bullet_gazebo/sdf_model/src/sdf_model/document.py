@@ -6,8 +6,10 @@ import math
 import numpy as np
 
 from urdf_model import XmlRefused, bounds, parse_xml
+from urdf_model.element_table import IdleElements, add_place, placed
 from urdf_model.transforms import pose_matrix
 
+from .elements import TABLE
 from .lenient import attributes_to_elements
 
 ROOT_TAGS = ("sdf", "gazebo")
@@ -19,31 +21,25 @@ class SdfError(ValueError):
 
 
 class Notes:
-    """Elements that were not understood, from one or several files."""
+    """Elements that are not understood or have no effect, from one or several files."""
 
     def __init__(self):
         self._left_out, self._mended = {}, {}  # what -> file -> lines
+        self.idle = IdleElements()
 
     def add(self, what, source, line):
         """Note that ``what`` in ``line`` of ``source`` is ignored."""
-        self._left_out.setdefault(what, {}).setdefault(source, []).append(line)
+        add_place(self._left_out, what, source, line)
 
     def mend(self, what, source, line):
         """Note that ``what`` in ``line`` of ``source`` is not valid SDF, but is understood."""
-        self._mended.setdefault(what, {}).setdefault(source, []).append(line)
+        add_place(self._mended, what, source, line)
 
     def warning(self):
         """Return one line that names all notes, or "" without notes."""
         said = (("not understood and left out", self._left_out), ("not as SDF has it, but read", self._mended))
-        return "; ".join("%s: %s" % (text, _listed(noted)) for text, noted in said if noted)
-
-
-def _listed(noted):
-    parts = []
-    for what, files in noted.items():
-        places = ("%s line %s" % (source, ", ".join(map(str, lines))) for source, lines in files.items())
-        parts.append("%s (%s)" % (what, "; ".join(places)))
-    return ", ".join(parts)
+        parts = ["%s: %s" % (text, placed(noted)) for text, noted in said if noted]
+        return "; ".join(filter(None, (*parts, self.idle.text())))
 
 
 class Document:
@@ -69,6 +65,8 @@ class Document:
             raise SdfError("%s is not an SDF: its root element is %s, expected <sdf>" % (self.source, found))
         for what, line in attributes_to_elements(self.root):
             self.notes.mend(what, self.source, line)
+        for idle in TABLE.find(self.root, "sdf"):
+            self.notes.idle.add(idle, self.source)
         self.version = self._version()
 
     def _repaired(self, what):
@@ -96,12 +94,6 @@ class Document:
     def children(self, element):
         """Return the child elements, without processing instructions."""
         return [child for child in element if isinstance(child.tag, str)]
-
-    def note_unknown(self, element, known):
-        """Note each child whose tag is not in ``known``. Elements of other name spaces are ignored."""
-        for child in self.children(element):
-            if child.tag not in known and ":" not in child.tag and "}" not in child.tag:
-                self.note(child)
 
     def name(self, element):
         """Return the attribute ``name``."""

@@ -12,8 +12,6 @@ from urdf_model.transforms import pose_matrix
 
 from .materials import read_material
 
-# Elements without an effect on motion or looks here.
-_QUIET = ("enable_wind", "must_be_base_link", "laser_retro", "max_contacts", "cast_shadows", "meta", "velocity_decay")
 # Of a surface.
 _MOST = {"damping": bounds.DAMPING.high, "restitution": 1.0}
 _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 1, 1, 1.0), ("iyz", 1, 2, 0.0))
@@ -22,15 +20,12 @@ _INERTIA += (("izz", 2, 2, 1.0),)
 
 def read_link(document, element, name, materials):
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame. ``materials``: MaterialScripts."""
-    document.note_unknown(element, ("pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
-                                    "self_collide", "kinematic", *_QUIET))
     if document.flag(element, "self_collide"):
         document.note(element.find("self_collide"))
     link = Link(name, _inertial(document, element), line=element.sourceline)
     link.gravity = document.flag(element, "gravity", True)
     surfaces = []
     for child in element.iterchildren("collision"):
-        document.note_unknown(child, ("pose", "geometry", "surface", *_QUIET))
         shape = _shape(document, child, name)
         if shape is not None:
             link.collisions.append(shape)
@@ -41,7 +36,6 @@ def read_link(document, element, name, materials):
         if any(surface != said[0] for surface in said):
             document.note(element, "surfaces of link '%s' that differ from its first" % name)
     for child in element.iterchildren("visual"):
-        document.note_unknown(child, ("pose", "geometry", "material", "transparency", *_QUIET))
         shape = _shape(document, child, name)
         if shape is not None:
             shape.colour, shape.finish = read_material(document, child, materials)
@@ -54,7 +48,6 @@ def _inertial(document, link):
     element = link.find("inertial")
     if element is None:
         return Inertial(1.0, np.zeros(3), np.eye(3))
-    document.note_unknown(element, ("pose", "mass", "inertia"))
     mass = document.number(element, "mass", 1.0)
     if mass <= 0.0:
         raise document.error(element, "<mass> is %g kg, expected a positive number" % mass)
@@ -90,20 +83,16 @@ def _shape(document, element, link):
         found = Plane(size)
         origin = origin @ _turned_to(document, kind)
     elif kind.tag == "mesh":
-        document.note_unknown(kind, ("uri", "scale", "submesh"))
         scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
         submesh = kind.find("submesh")
         part = () if submesh is None else (document.text(submesh, "name"), document.flag(submesh, "center"))
         found = Mesh(_file(document, document.text(kind, "uri")), scale, *part)
     elif kind.tag == "heightmap":
-        document.note_unknown(kind, ("uri", "size", "pos", "texture", "blend", "sampling", "use_terrain_paging"))
         size = document.vector(kind, "size", (1.0, 1.0, 1.0))
         found = Mesh(_file(document, document.text(kind, "uri")), tuple(size))
         origin = origin @ pose_matrix(document.vector(kind, "pos", (0.0, 0.0, 0.0)))
     else:
-        if kind.tag != "empty":
-            document.note(kind)
-        return None
+        return None  # <empty>, or one that the table of elements has noted
     return Shape(found, origin, element.get("name", ""), None, link)
 
 

@@ -19,7 +19,6 @@ from .links import read_link
 from .materials import MaterialScripts
 from .tree import Dynamics, Parts, SdfJoint, build_robot
 
-_QUIET = ("enable_wind", "allow_auto_disable", "meta")
 _MOVABLE = ("revolute", "continuous", "prismatic")
 _DEEPEST_INCLUDE = 8
 
@@ -48,7 +47,6 @@ def parse_sdf_model(xml, source, folders=None, folder=None):
     if len(found) != 1:
         held = ", ".join("<%s>" % child.tag for child in document.children(document.root)) or "nothing"
         raise document.error(document.root, "it holds %s; expected one <model>" % held)
-    document.note_unknown(document.root, ("model", "include"))
     if found[0].tag == "model":
         model = reader.model(document, found[0])
     else:
@@ -82,7 +80,6 @@ class ModelReader:
 
     def included(self, document, element, depth):
         """Return the SdfModel that an <include> asks for, or Included for a file without a model."""
-        document.note_unknown(element, ("uri", "name", "pose", "static", "plugin"))
         inner, model = self._open(document, element, depth)
         if model is None:
             return Included([read_light(inner, light, np.eye(4)) for light in inner.root.iterchildren("light")])
@@ -140,8 +137,6 @@ class ModelReader:
 
     def _parts(self, document, element, prefix, origin, depth):
         """Return the Parts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
-        known = ("pose", "static", "link", "joint", "frame", "model", "include", "plugin", "gazebo", "self_collide")
-        document.note_unknown(element, (*known, *_QUIET))
         if document.flag(element, "self_collide"):
             document.note(element.find("self_collide"))
         if element.get("placement_frame"):
@@ -302,7 +297,6 @@ def _end(document, joint, role):
 
 def _joint(document, element, frames, own_frame):
     name, kind = document.name(element), element.get("type", "")
-    document.note_unknown(element, ("parent", "child", "pose", "axis", "physics", "meta"))
     axis, limit, dynamics = np.array([0.0, 0.0, 1.0]), Limit(), Dynamics()
     frame = frames.where(own_frame, element)
     if kind in _MOVABLE:
@@ -310,7 +304,6 @@ def _joint(document, element, frames, own_frame):
         if given is None:
             document.mend(element, "%s joint '%s' without <axis>, which is 0 0 1" % (kind, name))
             given = etree.Element("axis")
-        document.note_unknown(given, ("xyz", "limit", "dynamics", "use_parent_model_frame"))
         axis = _axis(document, given, name, frame, frames)
         kind, limit = _limit(document, given, name, kind)
         dynamics = _dynamics(document, given)

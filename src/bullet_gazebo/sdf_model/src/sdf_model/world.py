@@ -16,11 +16,10 @@ from .frames import Frames
 from .lights import Light, Scene, read_light, read_scene
 from .model import ModelReader, SdfModel, unused
 
-# Elements about windows, sound, weather and other solvers: ignored.
-_QUIET = ("gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
 # Left out, with a note.
 _NAMED = ("actor", "plugin")
 _ROAD_HEIGHT_M = 0.002
+_AT_REST = 0.01  # m/s and rad/s: what Gazebo saves of bodies that stand
 _ASPHALT = (0.25, 0.25, 0.25, 1.0)
 
 
@@ -69,8 +68,6 @@ class _WorldReader:
     def world(self, element):
         document = self._document
         self._world = SdfWorld(element.get("name", "default"))
-        known = ("gravity", "physics", "include", "model", "light", "frame", "state", "scene", "road", *_NAMED, *_QUIET)
-        document.note_unknown(element, known)
         for child in element.iterchildren(*_NAMED):
             document.note(child, "%s '%s'" % (child.tag, child.get("filename") or child.get("name", "")))
         if element.find("gravity") is not None:
@@ -103,9 +100,6 @@ class _WorldReader:
             self._world.time_step_s = used
         if element.find("gravity") is not None:  # where older files have it
             self._world.gravity = self._gravity(element)
-        factor = document.number(element, "real_time_factor", 1.0)
-        if factor != 1.0:
-            document.note(element.find("real_time_factor"), "real_time_factor %g: the launch argument decides" % factor)
 
     def _gravity(self, element):
         return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", (0.0,) * 3),
@@ -144,8 +138,15 @@ class _WorldReader:
         poses = {child.get("name"): child for child in element.iterchildren("model")}
         for model in self._world.models:
             child = poses.get(model.name)
-            if child is not None and child.find("pose") is not None:
+            if child is None:
+                continue
+            if child.find("pose") is not None:
                 model.pose = self._document.pose(child)
+            links = list(child.iterchildren("link"))
+            if links and model.robot.movable_joints():
+                self._document.note(links[0], "joint positions of model '%s' in <state>" % model.name)
+            if any(np.abs(self._document.vector(link, "velocity", (0.0,) * 6)).max() > _AT_REST for link in links):
+                self._document.note(links[0], "velocities of model '%s' in <state>" % model.name)
 
 
 def _road(document, element):
