@@ -37,8 +37,8 @@ class Drive(ModelPlugin):
         self.model = context.model
         rate = self.number(self.rate_tag, self.rate)
         self._pace = Pace(max(0.0, rate))
-        self._odometry_frame = self.text("odometryFrame", "odom")
-        self._base_frame = self.text("robotBaseFrame", "base_footprint")
+        self._odometry_frame = context.frame(self.text("odometryFrame", "odom"))
+        self._base_frame = context.frame(self.text("robotBaseFrame", "base_footprint"))
         self._wanted = (0.0, 0.0, 0.0)
         self.configure()
         self._commands = context.subscription(self.text("commandTopic", "cmd_vel"), Twist)

@@ -24,6 +24,7 @@ class ForceTorqueSensor(PacedSensor):
             self._joint = JointWrench(context.world, context.model, name)
         except BulletSimError as error:
             raise PluginError("%s: <jointName>: %s" % (self.what, error)) from error
+        self._frame = context.frame(self._joint.child)
         self._noise = self.number("gaussianNoise", 0.0)
         self._measuring = False
 
@@ -38,7 +39,7 @@ class ForceTorqueSensor(PacedSensor):
         self._measuring = False
         self._pace.took(time_s)
         message = WrenchStamped(wrench=_wrench(*self._joint.measure(), self._noise, self.context.world.random))
-        self.publisher.publish(self.stamped(message, time_s, self._joint.child))
+        self.publisher.publish(self.stamped(message, time_s, self._frame))
 
     def reset(self):
         super().reset()
@@ -55,7 +56,7 @@ class LinkForce(PacedSensor):
         super().__init__(context)
         self._link = self.link_named("bodyName")
         self._body = context.model.merged.frames[self._link].link
-        self._frame = context.element_text("frameName", "world")
+        self._frame = context.frame(context.element_text("frameName", "world"))
 
     def publish(self, time_s):
         if not self.is_due(time_s):

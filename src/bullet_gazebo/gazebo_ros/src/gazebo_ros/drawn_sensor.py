@@ -7,3 +7,4 @@ class DrawnSensor(ModelPlugin):
     """A camera or depth camera. The loop does nothing for it: /sensor_renderer finds it in the scene and serves it."""
 
     required = False
+    named_if_empty = True

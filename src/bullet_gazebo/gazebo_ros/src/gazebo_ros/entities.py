@@ -66,19 +66,22 @@ class Entities:
     def frame(self, name):
         """Pose and velocity of the reference frame ``name``: (4x4 matrix in the world, linear, angular velocity).
 
-        The world, a model, or a link as ``model::link``; raises :class:`UnknownEntity`.
+        The world, a model, or a link as ``model::link``; a link's plain name where no model has it, as in Gazebo the
+        first model's. Raises :class:`UnknownEntity`.
         """
         if name in WORLD_FRAMES:
             return np.eye(4), np.zeros(3), np.zeros(3)
+        models = self._world.models
+        if name in models:
+            model = models[name]
+            return (model.base_pose().matrix(), *map(np.asarray, model.base_twist()))
         if "::" in name:
             model, link_name = self.link(name)
-            return (model.link_pose(link_name).matrix(), *map(np.asarray, model.link_twist(link_name)))
-        try:
-            model = self.model(name)
-        except UnknownEntity as error:
-            raise UnknownEntity("reference frame '%s' not found (%s); for a link, scope the link by its model's name: "
-                                "model::link" % (name, error)) from None
-        return (model.base_pose().matrix(), *map(np.asarray, model.base_twist()))
+        else:
+            model, link_name = next((model for model in models.values() if name in model.link_names), None), name
+        if model is None:
+            raise UnknownEntity("reference frame '%s' is no model and no link; models: %s" % (name, _known(models)))
+        return (model.link_pose(link_name).matrix(), *map(np.asarray, model.link_twist(link_name)))
 
     def pose_in_world(self, pose, reference):
         """Transform a :class:`Pose` from the frame ``reference`` to the world."""

@@ -34,9 +34,11 @@ class ModelPlugin:
     #: Whether a model is not spawned when this plugin refuses it. If False, as for sensors, the plugin is left out,
     #: with a warning.
     required = True
-    #: Whether its names begin with the model's in a world file where it has no ``robotNamespace``, as Gazebo's drive by
-    #: two wheels has it. A spawned model's begin with the namespace that it was spawned with.
+    #: Whether its names begin with the model's where it has no ``robotNamespace`` and the model was spawned without a
+    #: namespace or stands in a world file, as Gazebo's drive by two wheels has it.
     named_after_model = False
+    #: Whether its names begin with the model's where its ``robotNamespace`` is empty. So it is for those above, too.
+    named_if_empty = False
 
     @classmethod
     def spawn_options(cls, robot, element):
@@ -109,6 +111,20 @@ class ModelPlugin:
     def while_failed(self, time_s):
         """Called in place of ``update`` and ``publish`` while it counts as failed; return True to be revived."""
         return False
+
+
+def with_tf_prefix(parameters, namespace, name):
+    """The frame ``name`` with the ``tf_prefix`` that a node in ``namespace`` finds among ``parameters`` (a tree)."""
+    if name.startswith("/"):
+        return name.lstrip("/")
+    found, branch = "", parameters
+    for part in (*namespace.strip("/").split("/"), None):
+        if not isinstance(branch, dict):
+            break
+        found = branch.get("tf_prefix", found)
+        branch = branch.get(part)
+    prefix = found.strip("/") if isinstance(found, str) else ""
+    return "%s/%s" % (prefix, name) if prefix else name
 
 
 class PluginSource(NamedTuple):
@@ -186,6 +202,11 @@ class PluginContext(NodeHandle):
                 return default
             branch = branch[part]
         return branch
+
+    def frame(self, name):
+        """The frame ``name`` as messages have it: behind the parameter ``tf_prefix`` of the namespace, or of one above
+        it, unless the name is absolute."""
+        return with_tf_prefix(self._parameters, self.namespace, name)
 
     def element_text(self, tag, default=None):
         """Stripped text of a child of the ``<plugin>`` element, or ``default`` where it is missing or empty."""

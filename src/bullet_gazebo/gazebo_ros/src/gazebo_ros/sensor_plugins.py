@@ -99,7 +99,7 @@ class _RaySensor(PacedSensor):
             self.pattern = RayPattern(element if element is not None else self.sensor.find("lidar"), self.what)
         except RayPatternError as error:
             raise PluginError(str(error)) from error
-        self.frame = context.element_text("frameName", self.link)
+        self.frame = context.frame(context.element_text("frameName", self.link))
         self._offset = self.sensor_pose()
         self._start_sweep()
         self._sweeping = False
@@ -134,6 +134,7 @@ class Laser(_RaySensor):
     intensities are 0, as in Gazebo for surfaces without a ``<laser_retro>``."""
 
     message_class = LaserScan
+    named_if_empty = True
 
     def __init__(self, context):
         super().__init__(context)
@@ -169,9 +170,9 @@ class RangeFinder(_RaySensor):
 
 class ImuSensor(PacedSensor):
     """``libgazebo_ros_imu.so`` and ``libgazebo_ros_imu_sensor.so``: orientation in the world, rates and accelerations
-    in the link's axes. The acceleration is the proper one: at rest, gravity upwards. ``rpyOffset`` turns the
-    orientation; with ``initialOrientationAsReference`` (default false) the orientation starts at identity; the service
-    ``serviceName`` exists and does nothing."""
+    in the axes and at the place of the link, or of a ``<sensor>``'s ``<pose>`` in it. The acceleration is the proper
+    one: at rest, gravity upwards. ``rpyOffset`` turns the orientation; with ``initialOrientationAsReference`` (default
+    false) the orientation starts at identity; the service ``serviceName`` exists and does nothing."""
 
     message_class = Imu
     default_topic = "imu"
@@ -183,26 +184,30 @@ class ImuSensor(PacedSensor):
             self._pace.rate = rate
         self._body = self.link if self.link is not None else self.link_named("bodyName")
         self._frame = context.element_text("frameName", self._body)
+        self._place = np.eye(4) if self.sensor is None else self.sensor_pose()
         self._noise = self.number("gaussianNoise", 0.0)
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, "rpyOffset", (0.0,) * 3))[:3, :3]
         if context.element_text("initialOrientationAsReference", "false").lower() in ("true", "1"):
-            self._turn = self._turn @ context.model.link_pose(self._body).matrix()[:3, :3].T
+            self._turn = self._turn @ self._matrix()[:3, :3].T
         service = context.element_text("serviceName")
         if service is not None:
             context.service(service, Empty, lambda request: EmptyResponse())
         self._last = None
+
+    def _matrix(self):
+        return self.context.model.link_pose(self._body).matrix() @ self._place
 
     def publish(self, time_s):
         if not self.publisher.has_listeners:
             self._last = None
             return
         linear, angular = self.context.model.link_twist(self._body)
-        linear = np.asarray(linear)
+        pose = self._matrix()
+        axes = pose[:3, :3]
+        linear = np.asarray(linear) + np.cross(angular, axes @ (self._place[:3, :3].T @ self._place[:3, 3]))
         last, self._last = self._last, (time_s, linear)
         if last is None or time_s <= last[0] or not self.is_due(time_s):
             return
-        pose = self.context.model.link_pose(self._body)
-        axes = pose.matrix()[:3, :3]
         felt = axes.T @ ((linear - last[1]) / (time_s - last[0]) - np.asarray(self.context.world.gravity))
         turning = axes.T @ np.asarray(angular)
         if self._noise:
@@ -230,7 +235,7 @@ class PoseSensor(PacedSensor):
         self._body = self.link_named("bodyName")
         frame = context.element_text("frameName", "world")
         self._reference = None if frame.strip("/") in ("world", "map", "") else self.link_named("frameName")
-        self._frame = frame
+        self._frame = context.frame(frame)
         self._offset = np.array(self.numbers(context.element, "xyzOffset", (0.0,) * 3))
         turn = "rpyOffset" if context.element.find("rpyOffset") is not None else "rpyOffsets"
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, turn, (0.0,) * 3))
@@ -274,7 +279,7 @@ class Bumper(PacedSensor):
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
                               % self.what)
         self._body = context.model.merged.frames[self.link].link
-        self._frame = context.element_text("frameName", "world")
+        self._frame = context.frame(context.element_text("frameName", "world"))
 
     def publish(self, time_s):
         if not self.is_due(time_s):

@@ -21,7 +21,7 @@ from bullet_sim.solids import with_solids
 from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
-from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource
+from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource, with_tf_prefix
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.simulation import HostedPlugin
 from gazebo_ros.world_lights import lights_of_links
@@ -164,9 +164,12 @@ class Spawner:
         for link in _slow_bodies(merged):
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
                                    options.get("mesh_cuts"))
+        tree = parameters() if plugins or sensors else {}
+        for sensor in sensors:
+            sensor["frame"] = with_tf_prefix(tree, sensor["namespace"], sensor["frame"])
         return Prepared(name=name, xml=xml, robot=robot, merged=merged, drawing=drawing, start=start, plugins=plugins,
                         sensors=sensors, lights=lights_of_links(robot, merged, self._log.warn),
-                        parameters=parameters() if plugins else {}, options=options, mended=mended)
+                        parameters=tree, options=options, mended=mended)
 
     def make_shapes(self, prepared):
         """Any thread but the loop's, while that runs: let the loop make a model's slow shapes, one per turn.
@@ -289,11 +292,13 @@ class Spawner:
             if plugin_class is None:
                 unknown[filename] += 1
                 continue
-            own = ""
-            is_a_name = re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name)
-            if spawn_namespace is None and plugin_class.named_after_model and is_a_name:
-                own = name
-            namespace = urdf_extras.namespace_of(element, spawn_namespace or own)
+            asked, named = spawn_namespace, plugin_class.named_after_model
+            if element.find("robotNamespace") is not None:
+                # Gazebo gives a model's namespace to plugins without the element alone.
+                asked, named = "", named or plugin_class.named_if_empty
+            if named and not asked and re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
+                asked = name
+            namespace = urdf_extras.namespace_of(element, asked)
             if issubclass(plugin_class, DrawnSensor):
                 try:
                     sensors.append(_drawn(robot, element, namespace))
@@ -337,7 +342,8 @@ def _drawn(robot, plugin, namespace):
         raise PluginError("plugin '%s' of '%s' stands outside of a <sensor>; expected <gazebo reference=\"LINK\">"
                           "<sensor><plugin>" % (plugin.get("filename"), robot.name))
     frame = merge_fixed(robot).frames[link]
-    return {"link": frame.link, "offset": frame.offset.ravel().tolist(), "member": link,
+    return {"link": frame.link, "offset": frame.offset.ravel().tolist(),
+            "frame": (plugin.findtext("frameName") or "").strip() or link,
             "xml": etree.tostring(sensor, encoding="unicode", with_tail=False),
             "plugin": sensor.findall("plugin").index(plugin), "namespace": namespace}
 

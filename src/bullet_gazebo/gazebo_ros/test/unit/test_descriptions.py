@@ -73,12 +73,20 @@ class NamedAfterModel(ModelPlugin):
     named_after_model = True
 
 
+class NamedIfEmpty(ModelPlugin):
+    named_if_empty = True
+
+
 @pytest.mark.parametrize(("plugin_class", "model", "spawned_in", "own", "expected"), [
-    (NamedAfterModel, "pioneer2dx", None, None, "/pioneer2dx"), (NamedAfterModel, "pioneer2dx", "", None, ""),
+    (NamedAfterModel, "pioneer2dx", None, None, "/pioneer2dx"),
+    (NamedAfterModel, "pioneer2dx", "", None, "/pioneer2dx"),
     (NamedAfterModel, "pioneer2dx", "/lab", None, "/lab"), (NamedAfterModel, "pioneer2dx", None, "/", ""),
     (NamedAfterModel, "pioneer2dx", None, "robot", "/robot"), (NamedAfterModel, "my robot", None, None, ""),
+    (NamedAfterModel, "pioneer2dx", "/lab", "", "/pioneer2dx"),
+    (NamedIfEmpty, "pioneer2dx", "/lab", "", "/pioneer2dx"),
+    (NamedIfEmpty, "pioneer2dx", "", None, ""), (Plain, "pioneer2dx", "/lab", "", ""),
     (Plain, "pioneer2dx", None, None, "")])
-def test_in_a_world_file_some_plugins_are_named_after_their_model(plugin_class, model, spawned_in, own, expected):
+def test_some_plugins_are_named_after_their_model(plugin_class, model, spawned_in, own, expected):
     element = "" if own is None else "<robotNamespace>%s</robotNamespace>" % own
     robot = parse_urdf('<robot name="r"><link name="l"/><gazebo><plugin name="p" filename="libp.so">%s</plugin>'
                        "</gazebo></robot>" % element)

@@ -10,7 +10,7 @@ from lxml import etree
 from bullet_sim import Pose, World
 from gazebo_ros import sensor_plugins
 from gazebo_ros.drawn_sensor import DrawnSensor
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource, with_tf_prefix
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
 from gazebo_ros.urdf_extras import plugins
@@ -33,14 +33,15 @@ RAY = """<gazebo reference="link"><sensor type="ray" name="s">%s<update_rate>50<
 class Lab:
     """A world with a floor, one model and its plugin."""
 
-    def __init__(self, urdf, plugin_class, pose=None, static=True):
+    def __init__(self, urdf, plugin_class, pose=None, static=True, parameters=None):
         self.world = World()
         self.world.add_ground_plane()
         robot = parse_urdf(urdf, "test")
         self.model = self.world.spawn(robot, "it", pose, static=static)
         element = (plugins(robot) + found_in(robot, warn=pytest.fail))[0]
         self.ros = FakeRos()
-        context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), None, self.ros, {})
+        context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), None, self.ros,
+                                parameters or {})
         try:
             self.plugin = plugin_class(context)
         except PluginError:
@@ -130,6 +131,33 @@ def test_an_imu_at_rest_feels_gravity_and_in_free_fall_nothing(lab):
     falling = lab(BOX % plugin, sensor_plugins.ImuSensor, Pose((0, 0, 5)), static=False)
     felt = falling.run(0.1)[-1].linear_acceleration
     assert abs(felt.z) < 0.05
+
+
+def test_an_imu_measures_where_and_as_its_sensor_is_mounted(lab):
+    imu = """<gazebo reference="%s"><sensor type="imu" name="s"><pose>%s</pose><plugin name="p"
+filename="libgazebo_ros_imu_sensor.so"><topicName>imu</topicName></plugin></sensor></gazebo>"""
+    upside_down = lab(BOX % (imu % ("link", "0 0 0 %r 0 0" % math.pi)), sensor_plugins.ImuSensor, Pose((0, 0, 1)))
+    last = upside_down.run(0.05)[-1]
+    assert last.linear_acceleration.z == pytest.approx(-9.81) and abs(last.orientation.x) == pytest.approx(1.0)
+    on_a_boom = lab(ARM % (imu % ("boom", "0.5 0 0 0 0 0")), sensor_plugins.ImuSensor, Pose((0, 0, 1)))
+    on_a_boom.model.drive_velocity(np.arange(1), np.array([2.0]), np.array([1e3]))
+    last = on_a_boom.run(0.2)[-1]
+    assert (last.linear_acceleration.x, last.angular_velocity.z) == pytest.approx((-0.5 * 2.0 ** 2, 2.0), rel=0.01)
+
+
+@pytest.mark.parametrize(("parameters", "name", "expected"), [
+    ({"ns": {"tf_prefix": "r1"}}, "laser", "r1/laser"), ({"tf_prefix": "/all/"}, "laser", "all/laser"),
+    ({"tf_prefix": "all", "ns": {"tf_prefix": "r1"}}, "laser", "r1/laser"),
+    ({"ns": {"tf_prefix": "r1"}}, "/odom", "odom"), ({"other": {"tf_prefix": "r1"}}, "laser", "laser"),
+    ({"tf_prefix": 3}, "laser", "laser"), ({}, "laser", "laser")])
+def test_frames_are_behind_the_tf_prefix(parameters, name, expected):
+    assert with_tf_prefix(parameters, "/ns/arm", name) == expected
+
+
+def test_a_laser_has_its_robots_tf_prefix(lab):
+    it = lab(BOX % (RAY % ("", 9, "libgazebo_ros_laser.so")), sensor_plugins.Laser, Pose((0, 0, 1)),
+             parameters={"ns": {"tf_prefix": "r1_tf"}})
+    assert it.run(0.05)[-1].header.frame_id == "r1_tf/link"
 
 
 @pytest.mark.parametrize(("elements", "pitch"), [

@@ -90,16 +90,15 @@ class Camera(Driver):
         super().__init__(entry)
         cameras = entry.cameras()
         base = entry.text("cameraName", entry.name)
-        self._frame = entry.text("frameName", entry.member)
+        self._frame = entry.frame
         self._cameras = []
-        baseline = entry.number(entry.plugin, "hackBaseline", 0.0)
         for camera in cameras:
             folder = base if len(cameras) == 1 else "%s/%s" % (base, camera.name)
             topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
             learning = LearningTopics(self.name(folder))
             self._cameras.append((Imager(camera, self.seed(camera.name)), topics, learning,
-                                  convert.camera_info(camera.pinhole, baseline, camera.distortion)))
+                                  convert.camera_info(camera.pinhole, entry.baseline_m(camera), camera.distortion)))
             self.topics += [*topics.all, learning]
         first = cameras[0]
         self._settings = CameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
@@ -127,7 +126,7 @@ class DepthCamera(Driver):
         self._camera = entry.cameras()[0]
         pinhole = self._camera.pinhole
         base = entry.text("cameraName", entry.name)
-        self._frame = entry.text("frameName", entry.member)
+        self._frame = entry.frame
         self._nearest = entry.number(entry.plugin, "pointCloudCutoff", pinhole.near)
         self._furthest = entry.number(entry.plugin, "pointCloudCutoffMax", pinhole.far)
         self._in_millimetres = entry.text("useDepth16UC1Format", "false").lower() in ("1", "true")
@@ -146,7 +145,7 @@ class DepthCamera(Driver):
         self._imager = Imager(self._camera, self.seed(base))
         self._pattern = None
         distortion = self._camera.distortion
-        self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0), distortion)
+        self._info = convert.camera_info(pinhole, entry.baseline_m(self._camera), distortion)
         self._plain_info = convert.camera_info(pinhole, 0.0, distortion)
         settings = CameraSettings(self.name(base), self._apply, (self._camera.noise_mean, self._camera.noise), more=[
             self.rate_setting, Setting("depth_noise", False, meaning="depth as the first Kinect measures it")])

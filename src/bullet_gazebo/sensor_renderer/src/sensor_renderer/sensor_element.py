@@ -71,14 +71,14 @@ class SensorEntry:
     """A ``<sensor>`` with its ``<plugin>``, as the simulator lists it in its scene."""
 
     def __init__(self, model, listed):
-        """``listed``: ``link`` (a body of the model), ``offset`` (16 numbers, link frame in the body's), ``member``
-        (the link that the description names), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
+        """``listed``: ``link`` (a body of the model), ``offset`` (16 numbers, link frame in the body's), ``frame``
+        (of its messages), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
 
         Raises :class:`SensorError`.
         """
         self.model = model
         self.link = listed["link"]
-        self.member = listed["member"]
+        self.frame = listed["frame"]
         self.offset = np.array(listed["offset"], dtype=float).reshape(4, 4)
         self.namespace = listed["namespace"]
         self.element = etree.fromstring(listed["xml"])
@@ -106,6 +106,12 @@ class SensorEntry:
         if not np.isfinite(value):
             raise SensorError("%s: <%s> is '%s', expected a number" % (self, path, text))
         return value
+
+    def baseline_m(self, camera):
+        """The distance to the left camera in the projection of ``camera`` (a CameraElement), ``hackBaseline``: of
+        several cameras, those that are not the right one have none."""
+        alone = len(self.element.findall("camera")) < 2
+        return self.number(self.plugin, "hackBaseline", 0.0) if alone or "right" in camera.name else 0.0
 
     def cameras(self):
         """The list of :class:`CameraElement`, one with SDF's defaults where no <camera> is; raises :class:`SensorError`

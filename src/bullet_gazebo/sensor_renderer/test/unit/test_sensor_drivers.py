@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
+from lxml import etree
 from sensor_msgs.msg import PointField
 
 from sensor_renderer import best, convert, drivers, node, topics
@@ -20,20 +21,27 @@ CAMERA = "<camera><image><width>%s</width><height>48</height><format>%s</format>
 
 
 def entry(rate="10", camera=CAMERA % ("64", "R8G8B8"), own_rate="0"):
-    return SensorEntry("robot", {"link": "base", "member": "head", "offset": np.eye(4).ravel().tolist(), "plugin": 0,
+    return SensorEntry("robot", {"link": "base", "frame": "ns/eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0,
                                  "namespace": "/ns", "xml": SENSOR % (rate, camera, own_rate)})
 
 
 def test_a_camera_as_it_is_written():
     found = entry()
     (camera,) = found.cameras()
-    assert (found.filename, found.rate, found.text("frameName", "x")) == ("libgazebo_ros_camera.so", 10.0, "eye_frame")
+    assert (found.filename, found.rate, found.frame) == ("libgazebo_ros_camera.so", 10.0, "ns/eye")
     assert found.text("cameraName", found.name) == "eye"
     assert (camera.pinhole.width, camera.pinhole.height, camera.encoding) == (64, 48, "rgb8")
     # A sensor looks along x of its frame: z of the optical one; and down is down.
     assert camera.offset[:3, 2] == pytest.approx([1, 0, 0]) and camera.offset[:3, 1] == pytest.approx([0, 0, -1])
     assert camera.offset[:3, 3] == pytest.approx([0, 0, 1])
     assert entry(own_rate="25").rate == 25.0
+
+
+@pytest.mark.parametrize(("names", "baselines"), [(("left", "right"), [0.0, 0.07]), (("eye",), [0.07])])
+def test_of_a_pair_of_cameras_the_right_one_has_the_baseline(names, baselines):
+    found = entry(camera="".join('<camera name="%s"/>' % name for name in names))
+    etree.SubElement(found.plugin, "hackBaseline").text = "0.07"
+    assert [found.baseline_m(camera) for camera in found.cameras()] == baselines
 
 
 def test_without_a_camera_element_it_is_that_of_sdf():
@@ -258,5 +266,5 @@ def test_noise_that_is_of_no_use_is_said(noise, text):
 def test_names_that_are_none_are_refused():
     with pytest.raises(SensorError, match="'/n s/eye' is not a name in ROS"):
         drivers.Driver(SensorEntry("robot", {
-            "link": "base", "member": "head", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/n s",
+            "link": "base", "frame": "ns/eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/n s",
             "xml": SENSOR % ("10", "", "0")})).name("eye")

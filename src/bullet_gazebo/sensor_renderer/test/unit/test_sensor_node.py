@@ -45,7 +45,7 @@ class Eye:
 
 def with_sensor(urdf):
     return {"name": "stand", "urdf": urdf, "joints": [], "sensors": [{
-        "link": "eye", "member": "eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/ns",
+        "link": "eye", "frame": "eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/ns",
         "xml": '<sensor type="camera" name="eye"><plugin name="p" filename="libeye.so"/></sensor>'}]}
 
 

@@ -139,7 +139,7 @@ class BaxterCamera(Driver):
         camera = entry.cameras()[0]
         self.camera_name = entry.name
         self._camera = camera
-        self._frame = entry.text("frameName", entry.member)
+        self._frame = entry.frame
         self._use = None
         self._learning = LearningTopics(self.name(self.camera_name))
         self._services = CameraServices.of(entry.namespace)
