@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A table of well-chosen postures as seeds of inverse kinematics: it returns the one whose tip is nearest the
 target."""
+import functools
 import math
 
 import numpy as np
@@ -16,7 +17,11 @@ class PostureMap:
         if not len(postures):
             raise ValueError("a posture map needs at least one posture")
         self._postures = [np.clip(chain.posture(posture), chain.lower, chain.upper) for posture in postures]
-        self._tips = [chain.fk(posture) for posture in self._postures]
+        self._chain = chain
+
+    @functools.cached_property
+    def _tips(self):
+        return [self._chain.fk(posture) for posture in self._postures]
 
     def nearest(self, target):
         """Return a copy of the posture (n,) whose tip is nearest the pose ``target`` (4, 4), tip in base."""

@@ -81,3 +81,12 @@ def test_kernels_find_a_cache_when_neither_source_nor_home_can_be_written(copy, 
     # A cache that cannot be written counts as none.
     cache, = copy(code, HOME=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "home" / "cache"))
     assert cache.startswith(str(tmp_path / ".cache" / "numba" / "baxter_sim_kinematics-"))
+
+
+def test_the_compiler_is_loaded_with_the_first_use():
+    code = ("import sys, baxter_sim_kinematics as k; before = 'numba' in sys.modules; k.kernels.wrench; "
+            "print(before, 'numba' in sys.modules)")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False True\n"
+    with pytest.raises(AttributeError, match="no_kernel"):
+        _ = baxter_sim_kinematics.kernels.no_kernel

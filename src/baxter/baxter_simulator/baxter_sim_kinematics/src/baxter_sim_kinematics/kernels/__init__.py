@@ -20,12 +20,28 @@ a named one. Their parts, in order:
 Positions are in metres and angles in radians, everything in the base frame. The functions keep no state and release the
 GIL, so any number of threads may call them.
 """
-from baxter_sim_kinematics.kernels.descent import nearest, newton
-from baxter_sim_kinematics.kernels.linear import wrench
-from baxter_sim_kinematics.kernels.motion import joint_frames, tip_and_jacobian
-from baxter_sim_kinematics.kernels.rows import Rows
-from baxter_sim_kinematics.kernels.searching import gather, search, search_many
-from baxter_sim_kinematics.kernels.task import beyond_reach, fill_basis, pose_error, split_pose
+import importlib
 
-__all__ = ["Rows", "beyond_reach", "fill_basis", "gather", "joint_frames", "nearest", "newton", "pose_error", "search",
-           "search_many", "split_pose", "tip_and_jacobian", "wrench"]
+from baxter_sim_kinematics.kernels.rows import Rows
+
+_HOMES = {"descent": ("nearest", "newton"), "linear": ("wrench",), "motion": ("joint_frames", "tip_and_jacobian"),
+          "searching": ("gather", "search", "search_many"),
+          "task": ("beyond_reach", "fill_basis", "pose_error", "split_pose")}
+
+__all__ = ["Rows", *(name for names in _HOMES.values() for name in names)]  # noqa: PLE0604
+
+
+def load() -> None:
+    """Import all functions, and with them the compiler, which takes a third of a second: for programs in which the
+    first use must not."""
+    for module, names in _HOMES.items():
+        home = importlib.import_module("%s.%s" % (__name__, module))
+        globals().update((name, getattr(home, name)) for name in names)
+
+
+def __getattr__(name):
+    """The functions are imported at the first use of one of them."""
+    if name not in __all__:
+        raise AttributeError("module '%s' has no attribute '%s'" % (__name__, name))
+    load()
+    return globals()[name]
