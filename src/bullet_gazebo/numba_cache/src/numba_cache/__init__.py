@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps code compiled by numba between runs. Free of ROS."""
+from __future__ import annotations
+
 import hashlib
 import os
 import shutil
 import stat
 import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 # Number of folders of other states of the sources that are kept: a second checkout may use the same cache.
 _KEPT = 3
 
 
-def compiler(name, sources, **options):
+def compiler(name: str, sources: Iterable[str | Path], **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator that compiles functions with ``numba.njit(cache=True, **options)`` and keeps the result.
 
     name: first part of the folder's name, usually the package's name; sources: the files whose functions call each
@@ -19,32 +23,34 @@ def compiler(name, sources, **options):
     here a change in any of them leads to another folder. Raises ImportError if numba is missing.
     """
     import numba  # callers of folder() need no numba
+    from numba.core import config as settings
 
     place = folder(name, sources)
 
-    def compiled(function):
-        before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, place
+    def compiled(function: Callable[..., Any]) -> Any:
+        config: Any = settings  # its entries are made at run time
+        before, config.CACHE_DIR = config.CACHE_DIR, place
         try:
             return numba.njit(cache=True, **options)(function)
         finally:
-            numba.config.CACHE_DIR = before
+            config.CACHE_DIR = before
 
     return compiled
 
 
-def folder(name, sources, environment=os.environ):
+def folder(name: str, sources: Iterable[str | Path], environment: Mapping[str, str] = os.environ) -> str:
     """Return the folder for what is compiled from ``sources``, paths of files.
 
     It lies in the first of these that is writable: ``NUMBA_CACHE_DIR``, ``__pycache__`` beside the first source, the
     user's cache, a private folder in the temporary directory. Its name holds a hash of the files' content, so that a
     change in any of them leads to a new, empty folder. Older folders beside it are deleted, but for the newest ones.
     """
-    sources = sorted(map(Path, sources))
+    paths = sorted(map(Path, sources))
     digest = hashlib.sha256()
-    for source in sources:
+    for source in paths:
         text = source.read_bytes()
         digest.update(b"%s %d\n" % (source.name.encode(), len(text)) + text)
-    places = filter(_writable, _places(sources[0], environment))
+    places = filter(_writable, _places(paths[0], environment))
     place = Path(next(places, None) or _private_temporary_directory(name))
     path = place / ("%s-%s" % (name, digest.hexdigest()[:16]))
     if not path.is_dir():
@@ -54,13 +60,13 @@ def folder(name, sources, environment=os.environ):
     return str(path)
 
 
-def _places(source, environment):
+def _places(source: Path, environment: Mapping[str, str]) -> Iterator[str]:
     beside_source = os.path.join(os.path.dirname(os.path.abspath(source)), "__pycache__")
     per_user = os.path.join(environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "numba")
     return filter(None, (environment.get("NUMBA_CACHE_DIR"), beside_source, per_user))
 
 
-def _age(path):
+def _age(path: Path) -> float:
     """Sort key: newest first; a folder that another process has just deleted comes last."""
     try:
         return -path.stat().st_mtime
@@ -68,7 +74,7 @@ def _age(path):
         return 0.0
 
 
-def _writable(directory):
+def _writable(directory: str) -> bool:
     try:
         os.makedirs(directory, exist_ok=True)
         with tempfile.TemporaryFile(dir=directory):
@@ -77,7 +83,7 @@ def _writable(directory):
         return False
 
 
-def _private_temporary_directory(name):
+def _private_temporary_directory(name: str) -> str:
     """A directory that only this user can write: the files in it are executed."""
     path = os.path.join(tempfile.gettempdir(), "%s-%d" % (name, os.getuid()))
     try:

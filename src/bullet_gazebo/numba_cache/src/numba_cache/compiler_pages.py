@@ -4,7 +4,10 @@
 A program whose functions come from the cache runs the compiler's machine code once, when they are loaded; 40 MB of it
 would stay in memory.
 """
+from __future__ import annotations
+
 import ctypes
+from collections.abc import Callable
 from pathlib import Path
 
 _LIBRARY = "libllvmlite"
@@ -12,7 +15,7 @@ _LIBRARY = "libllvmlite"
 _DONTNEED = 4
 
 
-def release(maps=Path("/proc/self/maps"), forget=None):
+def release(maps: Path = Path("/proc/self/maps"), forget: Callable[[int, int], object] | None = None) -> int:
     """Give back the pages of the compiler's machine code; return the size of their address range [bytes].
 
     Call it when all functions have been loaded. The compiler still works: its pages are read again. Returns 0 where
@@ -35,5 +38,5 @@ def release(maps=Path("/proc/self/maps"), forget=None):
     return released
 
 
-def _forget(start, size):
+def _forget(start: int, size: int) -> None:
     ctypes.CDLL(None).madvise(ctypes.c_void_p(start), ctypes.c_size_t(size), _DONTNEED)

@@ -3,12 +3,16 @@
 
 Reads fields of messages and imports none. Free of ROS.
 """
-import enum
-from typing import NamedTuple
+from __future__ import annotations
 
-from .command import Command
+import enum
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from .command import Command, Point
 from .errors import AllPointsInPast, JointNamesError
 from .goal_monitor import Outcome
+from .tolerances import Row
 
 
 class ErrorCode(enum.IntEnum):
@@ -35,17 +39,17 @@ class GoalTolerances(NamedTuple):
     path, goal: rows of (joint name, position, velocity, acceleration); goal_time_s [s].
     """
 
-    path: tuple | list = ()
-    goal: tuple | list = ()
+    path: Sequence[Row] = ()
+    goal: Sequence[Row] = ()
     goal_time_s: float = 0.0
 
 
-def code_of_outcome(outcome):
+def code_of_outcome(outcome: Outcome) -> int:
     """Return the ErrorCode of a goal that ended with an Outcome, a plain number."""
     return _OF_OUTCOME[outcome].value
 
 
-def code_of_error(error, start_was_given=False):
+def code_of_error(error: Exception | str, start_was_given: bool = False) -> int:
     """Return the ErrorCode of a goal that is refused for ``error``, an exception or a text; a plain number.
 
     ``start_was_given``: the goal's header has a stamp, which is the error if all points are in the past.
@@ -57,7 +61,7 @@ def code_of_error(error, start_was_given=False):
     return ErrorCode.INVALID_GOAL.value
 
 
-def rows_of_points(points):
+def rows_of_points(points: Iterable[Any]) -> list[Point]:
     """Return trajectory_msgs/JointTrajectoryPoint[] as rows of (time from start [s], positions, velocities,
     accelerations).
     """
@@ -65,15 +69,15 @@ def rows_of_points(points):
             for point in points]
 
 
-def command_of(trajectory, start_time=None):
+def command_of(trajectory: Any, start_time: float | None = None) -> Command:
     """Return the :class:`Command` of a trajectory_msgs/JointTrajectory. Raises TrajectoryError, as Command does."""
     return Command(trajectory.joint_names, rows_of_points(trajectory.points), start_time)
 
 
-def tolerances_of(goal):
+def tolerances_of(goal: Any) -> GoalTolerances:
     """Return the :class:`GoalTolerances` of a control_msgs/FollowJointTrajectoryGoal."""
     return GoalTolerances(_rows(goal.path_tolerance), _rows(goal.goal_tolerance), goal.goal_time_tolerance.to_sec())
 
 
-def _rows(tolerances):
+def _rows(tolerances: Iterable[Any]) -> list[Row]:
     return [(entry.name, entry.position, entry.velocity, entry.acceleration) for entry in tolerances]

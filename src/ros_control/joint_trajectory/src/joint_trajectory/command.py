@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A commanded trajectory: checked points, in arrays."""
+from __future__ import annotations
+
 import collections
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import (
     MissingJoints,
@@ -16,10 +20,13 @@ from .errors import (
 )
 from .segment import CUBIC, LINEAR, QUINTIC
 
+Indices = npt.NDArray[np.int_]
+#: Time from start [s], positions, velocities, accelerations.
+Point = tuple[float, Sequence[float], Sequence[float], Sequence[float]]
 _FIELDS = ("positions", "velocities", "accelerations")
 
 
-def joint_indices(names, known, allow_partial=False):
+def joint_indices(names: Sequence[str], known: Sequence[str], allow_partial: bool = False) -> Indices:
     """Indices of ``names`` in ``known``: (k,) int array.
 
     Any order is accepted. Raises a :class:`JointNamesError` for names that are empty, repeated, unknown, or, unless
@@ -53,7 +60,7 @@ class Command:
         Time at which the time from start begins [s]; None: as soon as possible.
     """
 
-    def __init__(self, joint_names, points, start_time=None):
+    def __init__(self, joint_names: Iterable[str], points: Iterable[Point], start_time: float | None = None) -> None:
         """``points``: rows of (time from start, positions, velocities, accelerations); the latter two may be empty.
 
         Raises :class:`TimesNotIncreasing`, :class:`NoPositions`, :class:`WrongSize` or :class:`NotFinite`.
@@ -80,7 +87,7 @@ class Command:
         self.positions, self.velocities, self.accelerations = fields[:, 0], fields[:, 1], fields[:, 2]
 
 
-def _checked_degree(index, point, count):
+def _checked_degree(index: int, point: Point, count: int) -> int:
     _, positions, velocities, accelerations = point
     if not len(positions):
         raise NoPositions(index)

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Follows one trajectory after the other and monitors the active goal."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 
 import numpy as np
+import numpy.typing as npt
 
-from .goal_monitor import GoalMonitor
-from .replacement import replace
+from .command import Command
+from .goal_monitor import GoalMonitor, Verdict
+from .limits import Limits
+from .replacement import Replacement, replace
+from .segment import Floats
 from .tolerances import Tolerances
-from .trajectory import hold, stop
+from .trajectory import Trajectory, hold, stop
 
 _TURN = 2.0 * math.pi
 
@@ -26,8 +33,9 @@ class Follower:
         The goal object of the active command.
     """
 
-    def __init__(self, joint_names, continuous=None, stop_duration_s=0.0, allow_partial=False, smooth=False,
-                 limits=None):
+    def __init__(self, joint_names: Iterable[str], continuous: npt.ArrayLike | None = None,
+                 stop_duration_s: float = 0.0, allow_partial: bool = False, smooth: bool = False,
+                 limits: Limits | None = None) -> None:
         """``continuous`` (n,) bool: joints without position limits; ``stop_duration_s`` [s]: duration of a stop, 0:
         hold the present positions at once; ``allow_partial``: commands need not name all joints; ``smooth``: see
         :func:`.replace`; ``limits`` (:class:`Limits`): commands beyond them are refused.
@@ -41,25 +49,27 @@ class Follower:
         self._allow_partial = allow_partial
         self._smooth = smooth
         self._limits = limits
-        self.trajectory = None
+        self.trajectory: Trajectory
         self.desired = np.zeros((3, count))
         self.error = np.zeros((3, count))
-        self.goal = None
-        self._monitor = None
+        self.goal: object | None = None
+        self._monitor: GoalMonitor | None = None
         self._ahead = np.zeros((3, count))
-        self._ahead_of = None
+        self._ahead_of: tuple[Trajectory, float] | None = None
         self._turns = np.zeros(count)
         # Views of the rows, so that no tick needs to make them.
         self._position_error, self._velocity_error = self.error[0], self.error[1]
 
-    def start(self, time_s, position, velocity):
+    def start(self, time_s: float, position: npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Hold, or come to rest from, the measured ``position`` and ``velocity`` (n,). No goal."""
         self.goal = self._monitor = None
-        self.desired[:] = position, velocity, np.zeros(len(position))
+        self.desired[:2] = position, velocity
+        self.desired[2] = 0.0
         self.error[:] = 0.0
         self.trajectory = stop(time_s, np.array(position), np.array(velocity), self._stop_duration_s)
 
-    def accept(self, command, now, position, goal=None, tolerances=None):
+    def accept(self, command: Command, now: float, position: npt.ArrayLike, goal: object | None = None,
+               tolerances: Tolerances | None = None) -> Replacement | None:
         """Follow ``command`` from now on; returns the :class:`Replacement`, or None for a command without points.
 
         ``now`` [s]: the first time that can still be changed, so later than the last :meth:`update`; ``position``
@@ -80,7 +90,7 @@ class Follower:
         self._watch(goal, tolerances, replacement.begins)
         return replacement
 
-    def stop(self, now, position, goal=None):
+    def stop(self, now: float, position: npt.ArrayLike, goal: object | None = None) -> None:
         """Come to rest: at once at the measured ``position`` (n,), or from the desired state within the stop duration.
 
         A ``goal`` is reached at the end of the stop, even if the joints still move.
@@ -92,17 +102,17 @@ class Follower:
             self.trajectory = hold(now, np.array(position))
         self._watch(goal, None, np.full(len(self.joint_names), float(now)))
 
-    def release(self):
+    def release(self) -> None:
         """Forget the goal; continue the trajectory."""
         self.goal = self._monitor = None
 
-    def look_ahead(self, time_s):
+    def look_ahead(self, time_s: float) -> Floats:
         """(3, n): desired state at ``time_s``, such as the next tick, if no command comes before; overwritten by the
         next call."""
         self._ahead_of = self.trajectory, time_s
         return self.trajectory.sample(time_s, self._ahead)
 
-    def update(self, time_s, position, velocity):
+    def update(self, time_s: float, position: npt.ArrayLike, velocity: npt.ArrayLike) -> Verdict | None:
         """Fill ``desired`` and ``error`` for the measured ``position``, ``velocity`` (n,) of ``time_s``.
 
         Returns the goal's :class:`Verdict` when it ends now, else None. After a violation the joints go on along their
@@ -127,7 +137,7 @@ class Follower:
             self._monitor = None
         return verdict
 
-    def _watch(self, goal, tolerances, begins):
+    def _watch(self, goal: object | None, tolerances: Tolerances | None, begins: Floats) -> None:
         self.goal = goal
         self._monitor = None
         if goal is not None:

@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Decides whether a goal is reached or missed."""
+from __future__ import annotations
+
 import enum
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from .segment import Floats
+from .tolerances import Tolerances
+
+Flags = npt.NDArray[np.bool_]
 _QUANTITIES = ("position", "velocity", "acceleration")
 
 
@@ -35,7 +43,7 @@ class GoalMonitor:
     within the goal tolerance once. The goal succeeds when every joint has.
     """
 
-    def __init__(self, joint_names, tolerances, begins, ends):
+    def __init__(self, joint_names: Sequence[str], tolerances: Tolerances, begins: Floats, ends: Floats) -> None:
         """``begins``, ``ends``: (n,) [s]."""
         self._joint_names = joint_names
         self._tolerances = tolerances
@@ -48,7 +56,7 @@ class GoalMonitor:
         self._size = np.empty((3, len(joint_names)))
         self._within = np.empty((3, len(joint_names)), dtype=bool)
 
-    def check(self, time_s, error):
+    def check(self, time_s: float, error: Floats) -> Verdict | None:
         """The :class:`Verdict`, or None while it is open. ``error`` (3, n): desired minus actual at ``time_s``."""
         if time_s < self._begin:
             return None
@@ -73,17 +81,17 @@ class GoalMonitor:
             return self._goal_verdict(time_s, error, off_goal)
         return None
 
-    def _path_verdict(self, time_s, error, where):
+    def _path_verdict(self, time_s: float, error: Floats, where: Flags) -> Verdict:
         joint, row = np.argwhere(where.T)[0]
         return self._verdict(Outcome.PATH_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.path,
                              "at %.3f s" % (time_s - self._begin))
 
-    def _goal_verdict(self, time_s, error, where):
+    def _goal_verdict(self, time_s: float, error: Floats, where: Flags) -> Verdict:
         joint, row = np.argwhere(where.T)[0]
         return self._verdict(Outcome.GOAL_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.goal,
                              "%.3f s after the end" % (time_s - self._ends[joint]))
 
-    def _verdict(self, outcome, joint, row, error, tolerances, when):
+    def _verdict(self, outcome: Outcome, joint: int, row: int, error: Floats, tolerances: Floats, when: str) -> Verdict:
         name, quantity = self._joint_names[joint], _QUANTITIES[row]
         found, allowed = float(error[row, joint]), float(tolerances[row, joint])
         text = "%s %s error %f (%s, tolerance %g) %s" % (name, outcome.value, found, quantity, allowed, when)

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Position and velocity limits of joints."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 import numpy as np
+import numpy.typing as npt
 
 from .errors import BeyondPosition, BeyondVelocity
+from .trajectory import Trajectory
 
 # Samples between two points that are checked against the limits: shares of the time between them.
 _PLACES = np.linspace(0.0, 1.0, 9)
@@ -16,13 +22,14 @@ class Limits:
     back at another rate have steps.
     """
 
-    def __init__(self, joint_names, lower, upper, velocity, slack=0.0):
+    def __init__(self, joint_names: Iterable[str], lower: npt.ArrayLike, upper: npt.ArrayLike, velocity: npt.ArrayLike,
+                 slack: float = 0.0) -> None:
         self._joint_names = list(joint_names)
         self._lower, self._upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
         self._velocity = np.asarray(velocity, dtype=float)
         self._slack = slack
 
-    def check(self, trajectory, begin_s, zero_s):
+    def check(self, trajectory: Trajectory, begin_s: float, zero_s: float) -> None:
         """Check a :class:`Trajectory` from ``begin_s`` [s] on; times in errors are relative to ``zero_s`` [s].
 
         A joint that starts beyond its limit may stay there, but not go farther. Raises :class:`BeyondPosition`,

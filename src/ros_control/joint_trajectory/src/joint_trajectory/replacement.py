@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Replaces the active trajectory by a new command."""
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from .command import joint_indices
+from .command import Command, Indices, joint_indices
 from .errors import AllPointsInPast
-from .segment import CUBIC, LINEAR, QUINTIC, constant, shifted, smooth_velocities, splines
+from .goal_monitor import Flags
+from .segment import CUBIC, LINEAR, QUINTIC, Floats, constant, shifted, smooth_velocities, splines
 from .trajectory import Trajectory
 
 # Near half a turn, within this margin, both directions count as equally short [rad].
@@ -19,12 +23,13 @@ class Replacement(NamedTuple):
     points left out because their time has passed; ``late_s``: time since the first of them was due [s]."""
 
     trajectory: Trajectory
-    begins: np.ndarray
+    begins: Floats
     dropped: int
     late_s: float
 
 
-def replace(current, command, now, joint_names, continuous, allow_partial=False, smooth=False):
+def replace(current: Trajectory, command: Command, now: float, joint_names: Sequence[str], continuous: Flags,
+            allow_partial: bool = False, smooth: bool = False) -> Replacement:
     """Follow ``current`` until ``command`` begins, then the command: a :class:`Replacement`.
 
     ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`Command` with points; ``now`` [s]: the
@@ -75,7 +80,8 @@ def replace(current, command, now, joint_names, continuous, allow_partial=False,
     return Replacement(_merged(current, now, times, coefficients, named, end_times), begins, dropped, late_s)
 
 
-def _smoothed(times, positions, velocities, accelerations, degrees):
+def _smoothed(times: Floats, positions: Floats, velocities: Floats, accelerations: Floats,
+              degrees: Indices) -> tuple[Floats, Floats, Indices]:
     """Velocities for the points that have none, and rest at the last one."""
     velocities = np.where((degrees == LINEAR)[:, None], smooth_velocities(times, positions), velocities)
     velocities[-1] = 0.0
@@ -84,7 +90,7 @@ def _smoothed(times, positions, velocities, accelerations, degrees):
     return velocities, accelerations, np.maximum(degrees, CUBIC)
 
 
-def whole_turns(position, target):
+def whole_turns(position: float, target: float) -> float:
     """What to add to ``target`` [rad], a multiple of a full turn, so that it is nearest to ``position``.
 
     If both directions are equally long, it keeps the sign of ``target - position``.
@@ -95,7 +101,8 @@ def whole_turns(position, target):
     return position + way - target
 
 
-def _merged(current, now, starts, coefficients, named, end_times):
+def _merged(current: Trajectory, now: float, starts: Floats, coefficients: Floats, named: Indices,
+            end_times: Floats) -> Trajectory:
     """``current`` from the piece that holds ``now`` on; from ``starts[0]`` on the columns ``named`` are replaced."""
     first = max(int(np.searchsorted(current.starts, now, side="right")) - 1, 0)
     kept = current.starts[first:]
@@ -113,7 +120,7 @@ def _merged(current, now, starts, coefficients, named, end_times):
     return Trajectory(cuts, merged, end_times)
 
 
-def _cut(starts, coefficients, cuts):
+def _cut(starts: Floats, coefficients: Floats, cuts: Floats) -> Floats:
     """The curves that begin at ``starts``, as pieces that begin at ``cuts`` (none before the first start)."""
     pieces = np.searchsorted(starts, cuts, side="right") - 1
     return shifted(coefficients[pieces], cuts - starts[pieces])

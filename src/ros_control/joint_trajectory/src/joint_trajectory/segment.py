@@ -4,7 +4,13 @@
 A polynomial of k joints is an array (6, k): row i holds the coefficients of s**i, with s [s] the time since its start.
 Everything here works on m polynomials at once, (m, 6, k).
 """
+from __future__ import annotations
+
 import numpy as np
+import numpy.typing as npt
+
+#: Shapes and units are in the docstrings.
+Floats = npt.NDArray[np.float64]
 
 # Degree of the polynomial that a point's fields allow: positions alone, with velocities, with accelerations too.
 LINEAR, CUBIC, QUINTIC = 1, 3, 5
@@ -15,7 +21,8 @@ _BINOMIAL = np.array([[1, 0, 0, 0, 0, 0], [1, 1, 0, 0, 0, 0], [1, 2, 1, 0, 0, 0]
 _POWERS = np.subtract.outer(np.arange(6), np.arange(6)).clip(0)
 
 
-def splines(times, positions, velocities, accelerations, degrees):
+def splines(times: Floats, positions: Floats, velocities: Floats, accelerations: Floats,
+            degrees: npt.NDArray[np.int_]) -> Floats:
     """The m - 1 polynomials through m points: (m - 1, 6, k).
 
     ``times`` (m,) [s], strictly increasing; ``positions``, ``velocities``, ``accelerations`` (m, k); ``degrees`` (m,)
@@ -51,7 +58,7 @@ def splines(times, positions, velocities, accelerations, degrees):
     return coefficients
 
 
-def smooth_velocities(times, positions):
+def smooth_velocities(times: Floats, positions: Floats) -> Floats:
     """Velocities (m, k) with which cubics through ``positions`` (m, k) do not overshoot; 0 at both ends.
 
     At a turning point 0, else the harmonic mean of the slopes beside it (F. N. Fritsch, J. Butland 1984).
@@ -64,14 +71,15 @@ def smooth_velocities(times, positions):
     return velocities
 
 
-def constant(position):
+def constant(position: npt.ArrayLike) -> Floats:
     """The polynomial (6, k) that stays at ``position`` (k,)."""
+    position = np.asarray(position, dtype=float)
     coefficients = np.zeros((6, len(position)))
     coefficients[0] = position
     return coefficients
 
 
-def shifted(coefficients, delay):
+def shifted(coefficients: Floats, delay: npt.ArrayLike) -> Floats:
     """The same curves, (m, 6, k), with time counted from ``delay`` (m,) [s] after their start."""
     # Taylor: the new coefficient j is the sum over i >= j of (i over j) delay**(i - j) c_i.
     matrices = _BINOMIAL * np.asarray(delay, dtype=float)[:, None, None] ** _POWERS

@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tolerances on the joints' errors, on the path and at the goal."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+
+from .segment import Floats
+
+#: Joint name, position, velocity, acceleration.
+Row = tuple[str, float, float, float]
 
 
 class Tolerances(NamedTuple):
@@ -11,17 +20,18 @@ class Tolerances(NamedTuple):
     ``path`` applies during the motion, ``goal`` at the end; ``goal_time_s`` is the allowed delay of the end [s].
     """
 
-    path: np.ndarray
-    goal: np.ndarray
+    path: Floats
+    goal: Floats
     goal_time_s: float
 
     @classmethod
-    def none(cls, count):
+    def none(cls, count: int) -> Tolerances:
         """No bounds on ``count`` joints."""
         return cls(np.full((3, count), np.inf), np.full((3, count), np.inf), 0.0)
 
 
-def bounds(count, position=0.0, velocity=0.0, acceleration=0.0):
+def bounds(count: int, position: npt.ArrayLike = 0.0, velocity: npt.ArrayLike = 0.0,
+           acceleration: npt.ArrayLike = 0.0) -> Floats:
     """(3, n) for :class:`Tolerances` from numbers or arrays (n,) in which 0 stands for no bound."""
     table = np.empty((3, count))
     for row, values in enumerate((position, velocity, acceleration)):
@@ -30,7 +40,8 @@ def bounds(count, position=0.0, velocity=0.0, acceleration=0.0):
     return table
 
 
-def merge_tolerances(defaults, joint_names, path=(), goal=(), goal_time_s=0.0):
+def merge_tolerances(defaults: Tolerances, joint_names: Sequence[str], path: Iterable[Row] = (),
+                     goal: Iterable[Row] = (), goal_time_s: float = 0.0) -> Tolerances:
     """A new :class:`Tolerances`: ``defaults`` with a goal's own values.
 
     ``path`` and ``goal``: rows of (joint name, position, velocity, acceleration). A positive number replaces the
@@ -43,7 +54,7 @@ def merge_tolerances(defaults, joint_names, path=(), goal=(), goal_time_s=0.0):
                       max(goal_time_s, 0.0))
 
 
-def _merged(default, joint_names, rows):
+def _merged(default: Floats, joint_names: Sequence[str], rows: Iterable[Row]) -> Floats:
     table = default.copy()
     for name, *values in rows:
         if name in joint_names:

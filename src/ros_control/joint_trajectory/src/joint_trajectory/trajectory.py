@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint positions, velocities and accelerations over time."""
+from __future__ import annotations
+
 import bisect
 
 import numpy as np
 
 from .errors import BeforeTrajectory
-from .segment import QUINTIC, constant, splines
+from .segment import QUINTIC, Floats, constant, splines
 
 
 class Trajectory:
@@ -23,24 +25,24 @@ class Trajectory:
     One thread at a time: sampling uses a work space of the object's own.
     """
 
-    def __init__(self, starts, coefficients, end_times):
+    def __init__(self, starts: Floats, coefficients: Floats, end_times: Floats) -> None:
         self.starts = starts
         self.coefficients = coefficients
         self.end_times = end_times
-        self._start_list = starts.tolist()
+        self._start_list: list[float] = starts.tolist()
         self._basis = np.zeros((3, 6))
 
     @property
-    def start_time(self):
+    def start_time(self) -> float:
         """Start of the first piece [s]."""
         return self._start_list[0]
 
     @property
-    def end_time(self):
+    def end_time(self) -> float:
         """When the last joint has reached its last point [s]."""
         return float(self.end_times.max())
 
-    def sample(self, time_s, out=None):
+    def sample(self, time_s: float, out: Floats | None = None) -> Floats:
         """(3, n): position, velocity, acceleration [rad or m, per s, per s^2] at ``time_s``; written to ``out``."""
         piece = bisect.bisect_right(self._start_list, time_s) - 1
         if piece < 0:
@@ -53,24 +55,24 @@ class Trajectory:
         t3 = t2 * t
         t4 = t2 * t2
         # Times the coefficients: position, velocity, acceleration.
-        self._basis.flat = (1.0, t, t2, t3, t4, t4 * t,
+        self._basis.flat[:] = (1.0, t, t2, t3, t4, t4 * t,
                             0.0, 1.0, 2.0 * t, 3.0 * t2, 4.0 * t3, 5.0 * t4,
                             0.0, 0.0, 2.0, 6.0 * t, 12.0 * t2, 20.0 * t3)
         return np.dot(self._basis, self.coefficients[piece], out)
 
-    def query(self, time_s):
+    def query(self, time_s: float) -> Floats:
         """As :meth:`sample`, but raises :class:`BeforeTrajectory` for a time before the start."""
         if time_s < self.start_time:
             raise BeforeTrajectory(time_s, self.start_time)
         return self.sample(time_s)
 
 
-def hold(time_s, position):
+def hold(time_s: float, position: Floats) -> Trajectory:
     """Stand at ``position`` (n,) from ``time_s`` on."""
     return Trajectory(np.array([time_s], dtype=float), constant(position)[None], np.full(len(position), float(time_s)))
 
 
-def stop(time_s, position, velocity, duration_s):
+def stop(time_s: float, position: Floats, velocity: Floats, duration_s: float) -> Trajectory:
     """Come to rest within ``duration_s`` [s] from ``position``, ``velocity`` (n,); a hold when that is 0.
 
     The path is the first half of a quintic that goes out and returns with the mirrored velocity: at its turning point,
