@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from urdf_model import Inertial, bounds
+from urdf_model import Inertial, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
 from .errors import BulletSimError, within
@@ -41,6 +41,8 @@ class Body:
         self._base_quaternion = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=client)[1]
         self._link_index = {merged.root: BASE, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
         self._link_names = {index: link for link, index in self._link_index.items()}
+        #: The links that Gazebo makes of the description: some of `link_names`.
+        self.gazebo_links = tuple(dict.fromkeys(gazebo_links(self.robot).values()))
         self._late_twist = None
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps

@@ -211,7 +211,7 @@ class World:
     def add_ground_plane(self, name="ground_plane"):
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
         link = Link("link", collisions=[Shape(Plane(), np.eye(4), "collision", None, "link")])
-        return self.spawn(Robot(name, {"link": link}, {}, "link"), name, static=True)
+        return self.spawn(Robot(name, {"link": link}, {}, "link", keeps_links=True), name, static=True)
 
     def delete(self, name):
         """Remove a model. Raises BulletSimError when there is none of that name."""

@@ -1,28 +1,96 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Contacts of the world as ``gazebo_msgs/ContactState``."""
+"""Contacts of the world as ``gazebo_msgs/ContactState``, with the names of Gazebo's collisions."""
+import weakref
+
 import numpy as np
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Vector3, Wrench
 
+from urdf_model import Box, CollisionName, Cylinder, Plane, Sphere, collision_names
+from urdf_model.transforms import inverse
 
-def contact_states(contacts, about=None):
-    """List of ContactState, one for each pair of links among ``contacts``, a list of ``bullet_sim.Contact``.
+# A mesh counts as so far away from a contact [m]: its triangles are not searched, and a shape with a formula that is
+# nearer is the one that was touched.
+_MESH_IS_AT_M = 0.002
 
-    ``about``: (model, link): only contacts of this link, which then comes first in each; forces act on the first link.
+
+class CollisionNames:
+    """Names of the collisions of a ``bullet_sim.World``, as Gazebo has them: ``model::link::collision``."""
+
+    def __init__(self, world):
+        self._world = world
+        self._known = weakref.WeakKeyDictionary()  # Model -> {body: [(shape, CollisionName)]}
+
+    def of_link(self, model, link):
+        """Return the names in a link of Gazebo, of a ``bullet_sim.Model``: {plain name: full name}."""
+        return {name.name: _full(model.name, name) for rows in self._rows(model).values() for _, name in rows
+                if name.link == link}
+
+    def at(self, model_name, body, position):
+        """Return the name of the collision of a model's body that is at or next to ``position`` (3,) [m, world]."""
+        model = self._world.models[model_name]
+        rows = self._rows(model)[body]
+        if not rows:
+            return _full(model_name, CollisionName(body, "collision"))
+        if len(rows) == 1:
+            return _full(model_name, rows[0][1])
+        frame = model.link_pose(body).matrix() @ inverse(model.merged.frames[body].offset)
+        point = inverse(frame) @ (*position, 1.0)
+        return _full(model_name, min(rows, key=lambda row: abs(_distance(row[0], point)))[1])
+
+    def _rows(self, model):
+        if model not in self._known:
+            names, counts, found = collision_names(model.robot), {}, {}
+            for body, link in model.merged.links.items():
+                found[body] = []
+                for shape in link.collisions:
+                    number = counts[shape.link] = counts.get(shape.link, -1) + 1
+                    name = names.get((shape.link, number), CollisionName(body, "collision"))
+                    found[body].append((shape, name))
+            self._known[model] = found
+        return self._known[model]
+
+
+def _full(model_name, name):
+    return "%s::%s::%s" % (model_name, *name)
+
+
+def _distance(shape, point):
+    """Distance [m] of ``point`` (4,), in the frame of the shape's body, from the surface; below 0 inside."""
+    point, geometry = (inverse(shape.origin) @ point)[:3], shape.geometry
+    if isinstance(geometry, Sphere):
+        return np.linalg.norm(point) - geometry.radius
+    if isinstance(geometry, Plane):
+        return point[2]
+    if isinstance(geometry, Box):
+        beyond = np.abs(point) - np.array(geometry.size) / 2.0
+    elif isinstance(geometry, Cylinder):
+        beyond = np.array([np.hypot(*point[:2]) - geometry.radius, abs(point[2]) - geometry.length / 2.0])
+    else:
+        return _MESH_IS_AT_M
+    return np.linalg.norm(np.maximum(beyond, 0.0)) + min(beyond.max(), 0.0)
+
+
+def contact_states(contacts, names, about=None):
+    """List of ContactState, one for each pair of collisions among ``contacts``, a list of ``bullet_sim.Contact``.
+
+    ``names``: :class:`CollisionNames`; ``about``: names of collisions: only their contacts, in which they come first;
+    forces act on the first one.
     """
     touching = {}
     for contact in contacts:
-        sides = ((contact.model_a, contact.link_a), (contact.model_b, contact.link_b))
-        if about is not None and about not in sides:
-            continue
-        # The normal points from b to a: turned, where the wanted link is b.
-        mine, other, sign = (*sides, 1.0) if about in (None, sides[0]) else (*sides[::-1], -1.0)
-        touching.setdefault((mine, other), []).append((contact, sign))
+        sides = (names.at(contact.model_a, contact.link_a, contact.position),
+                 names.at(contact.model_b, contact.link_b, contact.position))
+        # The normal points from b to a: turned, where the wanted collision is b.
+        if about is None or sides[0] in about:
+            touching.setdefault(sides, []).append((contact, 1.0))
+        elif sides[1] in about:
+            touching.setdefault(sides[::-1], []).append((contact, -1.0))
     return [_contact_state(mine, other, points) for (mine, other), points in touching.items()]
 
 
 def _contact_state(mine, other, points):
-    state = ContactState(collision1_name="%s::%s" % mine, collision2_name="%s::%s" % other)
+    state = ContactState(collision1_name=mine, collision2_name=other)
     state.info = "%d contact points" % len(points)
     total = np.zeros(3)
     for contact, sign in points:

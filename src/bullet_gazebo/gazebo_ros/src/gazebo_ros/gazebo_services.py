@@ -44,7 +44,7 @@ from loop_ros.faults import SURVIVED, described
 from loop_ros.reconfigure import Setting, SettingsServer
 from loop_ros.request_queue import LoopEnded
 from sim_time.stamps import stamp_ns
-from urdf_model import bounds
+from urdf_model import bounds, collision_names
 
 _ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 _NOT_CONTENT = re.compile(r"<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
@@ -198,11 +198,12 @@ class GazeboServices:
         except UnknownEntity as error:
             response.status_message = "GetModelProperties: %s" % error
             return response
-        links = model.merged.links
-        response.canonical_body_name = next(iter(links))
+        links = model.gazebo_links
+        response.canonical_body_name = next(iter(links), "")
         response.body_names = list(links)
-        response.geom_names = ["%s_collision%s" % (link.name, "_%d" % k if k else "")
-                               for link in links.values() for k, _ in enumerate(link.collisions)]
+        response.geom_names = [collision.name for collision in collision_names(model.robot).values()]
+        inner = (link.partition("::") for link in links)
+        response.child_model_names = list(dict.fromkeys(child for child, scope, _ in inner if scope))
         response.joint_names = list(model.joint_names)
         response.is_static = bool(model.static)
         response.success = True

@@ -8,7 +8,7 @@ import rospy
 from gazebo_msgs.msg import ContactsState, LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 
-from gazebo_ros.contact_messages import contact_states
+from gazebo_ros.contact_messages import CollisionNames, contact_states
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.pacing import RateMeter, SlownessWatch, slowness_line, ticks_between
 from sim_time.stamps import stamp_ns
@@ -60,6 +60,7 @@ class Publications:
         self._link_states = ros.publisher("/gazebo/link_states", LinkStates)
         self._contacts = ros.publisher("/gazebo/contacts", ContactsState)
         self._contacts_sent_at = 0.0
+        self._collision_names = CollisionNames(simulation.world)
         self._metrics = ros.publisher("/gazebo/performance_metrics", PerformanceMetrics)
         self.publish_clock()
 
@@ -153,7 +154,7 @@ class Publications:
         if self._link_states.has_listeners:
             message = LinkStates()
             for model in models.values():
-                for link in model.merged.links:
+                for link in model.gazebo_links:
                     message.name.append("%s::%s" % (model.name, link))
                     message.pose.append(msg_from_pose(model.link_pose(link)))
                     message.twist.append(msg_from_twist(*model.link_twist(link)))
@@ -163,7 +164,8 @@ class Publications:
         too_soon = now - self._contacts_sent_at < 0.5 / CONTACTS_RATE and not self._simulation.paused
         if self._contacts.has_listeners and not too_soon:
             self._contacts_sent_at = now
-            message = ContactsState(states=contact_states(self._simulation.world.contacts()))
+            contacts = self._simulation.world.contacts()
+            message = ContactsState(states=contact_states(contacts, self._collision_names))
             message.header.stamp, message.header.frame_id = stamp_ns(self._simulation.time_ns), "world"
             self._contacts.publish(message)
 

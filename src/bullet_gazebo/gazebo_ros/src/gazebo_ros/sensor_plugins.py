@@ -9,13 +9,14 @@ from sensor_msgs.msg import Imu, JointState, LaserScan, Range
 from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_sim import Pose
-from gazebo_ros.contact_messages import contact_states
+from gazebo_ros.contact_messages import CollisionNames, contact_states
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.ray_pattern import RayPattern, RayPatternError, Sweep
 from gazebo_ros.urdf_extras import sensor_of, unscoped
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
+from urdf_model import gazebo_links
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 
@@ -268,7 +269,8 @@ class PoseSensor(PacedSensor):
 
 
 class Bumper(PacedSensor):
-    """``libgazebo_ros_bumper.so``: what touches the link of its ``<sensor>``, and how hard."""
+    """``libgazebo_ros_bumper.so``: what touches the link of its ``<sensor>``, or the collisions of it that the sensor's
+    ``<contact>`` names, and how hard."""
 
     message_class = ContactsState
     topic_tag, default_topic = "bumperTopicName", "bumper_states"
@@ -278,14 +280,22 @@ class Bumper(PacedSensor):
         if self.link is None:
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
                               % self.what)
-        self._body = context.model.merged.frames[self.link].link
         self._frame = context.frame(context.element_text("frameName", "world"))
+        self._names = CollisionNames(context.world)
+        known = self._names.of_link(context.model, gazebo_links(context.model.robot).get(self.link, self.link))
+        asked = [(element.text or "").strip() for element in self.sensor.iterfind("contact/collision")]
+        unknown = [name for name in asked if name not in known and name != "__default__"]
+        if unknown:
+            context.log.warn("%s: <collision> is '%s', and all contacts of the link are published; its collisions are "
+                             "%s" % (self.what, "', '".join(unknown), ", ".join(known) or "none"))
+            asked = []
+        self._watched = frozenset(known[name] for name in asked if name in known) or frozenset(known.values())
 
     def publish(self, time_s):
         if not self.is_due(time_s):
             return
         model = self.context.model
-        states = contact_states(self.context.world.contacts(model), about=(model.name, self._body))
+        states = contact_states(self.context.world.contacts(model), self._names, self._watched)
         self.publisher.publish(self.stamped(ContactsState(states=states), time_s, self._frame))
 
 

@@ -3,8 +3,10 @@
 import pytest
 
 from bullet_sim import Pose, World
+from gazebo_ros.contact_messages import CollisionNames, contact_states
 from gazebo_ros.entities import Entities, UnknownEntity
-from urdf_model import parse_urdf
+from sdf_model import parse_sdf_model
+from urdf_model import collision_names, gazebo_links, parse_urdf
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 CART = """<robot name="cart"><link name="base">%s</link><link name="camera"/><joint name="mount" type="fixed">
@@ -29,3 +31,48 @@ def test_a_reference_frame_is_a_model_or_a_link_with_or_without_its_model(world)
                       "camera": [2, 0, 1], "camera::base": [2, 0, 1]}
     with pytest.raises(UnknownEntity, match="'lens' is no model and no link; models: one, two, camera"):
         entities.frame("lens")
+
+
+BOX = '<collision%s><origin xyz="%s"/><geometry><box size="0.2 0.2 0.2"/></geometry></collision>'
+JOINT = '<joint name="%s" type="%s"><parent link="%s"/><child link="%s"/></joint>'
+ROBOT = """<robot name="r"><link name="foot">%s%s</link><link name="body">%s%s</link><link name="lens"/>
+<link name="lid"/>%s<gazebo reference="hold_lens"><preserveFixedJoint>true</preserveFixedJoint></gazebo></robot>""" % (
+    INERTIAL, BOX % ("", "0 0 0"), BOX % (' name="shell"', "1 0 0"), BOX % ("", "2 0 0"),
+    "".join(JOINT % joint for joint in (("hold", "fixed", "foot", "body"), ("hold_lens", "fixed", "body", "lens"),
+                                        ("hinge", "continuous", "body", "lid"))))
+
+
+def test_links_and_collisions_of_a_urdf_have_sdformats_names():
+    robot = parse_urdf(ROBOT)
+    assert gazebo_links(robot) == {"foot": "foot", "body": "foot", "lens": "lens", "lid": "lid"}
+    assert [name.name for name in collision_names(robot).values()] == [
+        "foot_collision", "foot_fixed_joint_lump__shell_collision_1", "foot_fixed_joint_lump__body_collision_2"]
+    standing = parse_urdf(ROBOT.replace("foot", "world").replace(INERTIAL, ""))
+    assert gazebo_links(standing) == {"body": "body", "lens": "lens", "lid": "lid"}
+    # A name that does not begin with the link's gets it in front, even if nothing was lumped.
+    assert [name.name for name in collision_names(standing).values()] == [
+        "body_fixed_joint_lump__shell_collision", "body_collision_1"]
+
+
+def test_links_of_an_sdf_all_stay():
+    robot = parse_sdf_model("""<sdf version="1.6"><model name="m"><link name="a"><collision name="hull"><geometry>
+<sphere><radius>0.1</radius></sphere></geometry></collision></link><link name="b"/><joint name="j" type="fixed">
+<parent>a</parent><child>b</child></joint></model></sdf>""", "m.sdf").robot
+    assert gazebo_links(robot) == {"a": "a", "b": "b"}
+    assert collision_names(robot) == {("a", 0): ("a", "hull")}
+
+
+def test_contacts_have_the_names_of_the_collisions_that_touch(world):
+    world.add_ground_plane()
+    model = world.spawn(parse_urdf(ROBOT), "it", Pose((0.0, 0.0, 0.1)))
+    for _ in range(100):
+        world.step()
+    names = CollisionNames(world)
+    states = contact_states(world.contacts(), names)
+    assert {state.collision2_name for state in states} | {state.collision1_name for state in states} == {
+        "ground_plane::link::collision", "it::foot::foot_collision",
+        "it::foot::foot_fixed_joint_lump__shell_collision_1", "it::foot::foot_fixed_joint_lump__body_collision_2"}
+    about = {names.of_link(model, "foot")["foot_fixed_joint_lump__shell_collision_1"]}
+    (state,) = contact_states(world.contacts(), names, about)
+    assert {state.collision1_name} == about and all(normal.z > 0.99 for normal in state.contact_normals)
+    assert all(position.x == pytest.approx(1.0, abs=0.11) for position in state.contact_positions)

@@ -18,6 +18,8 @@ class World:
     def __init__(self, monkeypatch, factor, paused=False, asked=None, clock_rate=500.0):
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
         monkeypatch.setattr(publications.time, "perf_counter", lambda: self.wall_s)
+        monkeypatch.setattr(publications, "CollisionNames", lambda world: SimpleNamespace(
+            at=lambda model, body, position: "%s::%s::shell" % (model, body)))
         self.simulation = SimpleNamespace(step_s=STEP_S, tick=0, time_ns=0, time_s=0.0, paused=paused, is_stepping=True,
                                           real_time_factor=asked, ticks_at_once=1,
                                           world=SimpleNamespace(models={}, contacts=lambda: [TOUCH, TOUCH]))
@@ -135,7 +137,7 @@ def test_contacts_go_out_to_subscribers_only_and_no_more_often_than_they_can_use
     world.run(1.0)
     assert len(world.messages) == publications.CONTACTS_RATE
     state, = world.messages[-1].states
-    assert (state.collision1_name, state.collision2_name) == ("cup::body", "table::top")
+    assert (state.collision1_name, state.collision2_name) == ("cup::body::shell", "table::top::shell")
     assert len(state.contact_positions) == 2 and state.contact_positions[0].z == 0.3
     assert (state.total_wrench.force.x, state.total_wrench.force.z) == (2.0, 10.0) and state.depths == [0.001, 0.001]
     assert world.messages[-1].header.frame_id == "world"

@@ -112,6 +112,7 @@ def build_robot(document, name, parts):
         root,
         gazebo=parts.gazebo,
         root_origin=links[root][1],
+        keeps_links=True,
     )
 
 

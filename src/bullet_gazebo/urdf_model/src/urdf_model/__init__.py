@@ -4,6 +4,7 @@
 from .bounds import OutOfBounds, check_robot
 from .errors import UrdfError
 from .files import check_file, description_text, read_file, read_text
+from .gazebo_names import CollisionName, collision_names, gazebo_links
 from .merge import MergedFrame, MergedLink, MergedRobot, merge_fixed
 from .model import (
     Box,
@@ -28,6 +29,7 @@ from .xml_text import XmlRefused, parse_xml, refuse_entities
 
 __all__ = [
     "Box",
+    "CollisionName",
     "Cylinder",
     "Finish",
     "Inertial",
@@ -50,8 +52,10 @@ __all__ = [
     "XmlRefused",
     "check_file",
     "check_robot",
+    "collision_names",
     "description_text",
     "drawing_urdf",
+    "gazebo_links",
     "merge_fixed",
     "parse_urdf",
     "parse_xml",

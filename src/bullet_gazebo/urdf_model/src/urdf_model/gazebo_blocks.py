@@ -44,6 +44,8 @@ def read_joint_block(element: Any, joint: Joint, warn: Callable[[Any, str], None
     what = "joint '%s'" % joint.name
     for part in element.iterchildren("implicitSpringDamper", "cfmDamping"):
         joint.implicit_damping = is_true(part.text)
+    for part in element.iterchildren("preserveFixedJoint", "disableFixedJointLumping"):
+        joint.preserved = is_true(part.text)
     for part in element.iterchildren("springStiffness"):
         value = _number(part, what, False, warn)
         if value is not None:  # Gazebo takes a negative stiffness for one that it may reduce

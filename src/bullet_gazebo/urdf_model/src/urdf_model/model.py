@@ -146,6 +146,7 @@ class Joint:
     child_offset: np.ndarray = field(default_factory=lambda: np.eye(4))
     spring_stiffness: float = 0.0  # N m/rad or N/m
     spring_reference: float = 0.0  # rad or m, the position without a spring's effort
+    preserved: bool = False  # fixed, but what it holds stays a link for Gazebo
 
     @property
     def movable(self):
@@ -180,6 +181,7 @@ class Robot:
     warnings: list[str] = field(default_factory=list)
     # 4x4, the root link's frame in the model's, which is what a pose in the world refers to. One in a URDF, not in SDF.
     root_origin: np.ndarray = field(default_factory=lambda: np.eye(4))
+    keeps_links: bool = False  # whether fixed links all stay links for Gazebo, as those of an SDF
 
     def movable_joints(self):
         """Return the joints that move (revolute, continuous, prismatic), in document order."""
