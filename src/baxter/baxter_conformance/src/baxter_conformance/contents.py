@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What messages and values must be like for programs to understand them: each check returns None, or what is wrong.
+"""Checks of messages and values that programs must understand; each returns None, or the fault as a text.
 
 The rules are those that the vendor's clients rely on.
 """
@@ -86,7 +86,7 @@ CHECKS = {
 
 
 def wrong_with_message(topic, message):
-    """What is wrong with a message of a topic, or None."""
+    """The fault of a topic's message, or None."""
     for pattern, check in CHECKS.items():
         if fnmatchcase(topic, pattern):
             return check(message)
@@ -94,7 +94,7 @@ def wrong_with_message(topic, message):
 
 
 def wrong_with_parameter(name, kind, value):
-    """What is wrong with the value of a parameter, or None. kind: "text" or "names"."""
+    """The fault of a parameter's value, or None. kind: "text" or "names"."""
     if kind == "text":
         if not isinstance(value, str) or not value:
             return "is %r, not a text" % (value,)
