@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What keeps the robot from doing what a program asks, read from the robot's own topics.
+"""Reasons why the robot does not do what a program asks, read from the robot's own topics.
 
 These come 100 times a second each. Listening all the time would cost each program more than its own work, so they are
 read only while something does not move.
@@ -97,7 +97,7 @@ class IgnoredCommands:
 
 
 class ArmHindrance:
-    """What keeps one arm, "left" or "right", from moving. Its methods may be called by any thread."""
+    """Reasons why one arm, "left" or "right", does not move. Its methods may be called by any thread."""
 
     def __init__(self, side: str) -> None:
         self._side = side

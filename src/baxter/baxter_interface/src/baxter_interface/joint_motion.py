@@ -91,7 +91,7 @@ class Standstill:
 
 
 class Hindrance(NamedTuple):
-    """What keeps an arm from moving.
+    """The reason why an arm does not move.
 
     text: "" if nothing is known; is_lasting: whether the arm will not move any further on its way.
     """

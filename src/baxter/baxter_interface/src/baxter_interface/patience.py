@@ -14,7 +14,7 @@ LOOK_EVERY_S = 1.0
 
 
 def others_than(name: str, known: Iterable[str]) -> str:
-    """What to say after "there is no topic" (or service) `name`: those of the `known` names that may have been meant.
+    """The text after "there is no topic" (or service) `name`: those of the `known` names that may have been meant.
 
     Names that differ in one part are of the same kind, such as the channels of a robot. Of others, the most similar.
     """
