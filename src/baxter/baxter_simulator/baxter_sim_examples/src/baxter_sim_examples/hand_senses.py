@@ -21,7 +21,7 @@ READINGS = 100
 
 
 class Eyes:
-    """What cameras see, and where they are.
+    """Pictures of cameras, and the cameras' poses.
 
     Its methods raise OSError with errno ETIMEDOUT after 30 s of silence, and tf2_ros.TransformException for frames that
     tf does not know.
@@ -54,7 +54,7 @@ class Eyes:
 
 
 class HandSenses:
-    """What the hand of an arm, "left" or "right", sees and feels; raises as :class:`Eyes`."""
+    """The sensors of the hand of an arm, "left" or "right"; raises as :class:`Eyes`."""
 
     def __init__(self, limb):
         self._camera, self._sensor = "%s_hand_camera" % limb, "%s_hand_range" % limb

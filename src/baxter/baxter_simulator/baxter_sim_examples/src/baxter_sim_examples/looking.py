@@ -31,7 +31,7 @@ _ELSEWHERE_M = ((0.0, -0.12), (0.0, 0.12), (-0.1, 0.0))
 
 
 class NotSeen(Exception):
-    """What was looked for is not there, or is not seen; the text says what was."""
+    """The object is not there, or is not seen; the text says what was found."""
 
 
 class View(NamedTuple):

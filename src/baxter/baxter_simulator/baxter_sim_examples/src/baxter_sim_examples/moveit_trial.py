@@ -32,7 +32,7 @@ _CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if isins
 
 
 class TrialFailed(Exception):
-    """What went wrong, in a sentence."""
+    """The trial failed; the text is a sentence."""
 
 
 class MoveItTrials:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands on the table for the programs that look: three coloured blocks and a board with a tag. Free of ROS."""
+"""The objects on the table for the programs that look: three coloured blocks and a board with a tag. Free of ROS."""
 import math
 from typing import NamedTuple
 
