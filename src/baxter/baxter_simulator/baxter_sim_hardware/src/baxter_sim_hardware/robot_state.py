@@ -25,7 +25,7 @@ class State(Enum):
 
 
 class Event(Enum):
-    """What can happen to the robot. Listed in the order in which one tick applies them: a stop comes last."""
+    """Events of the robot. Listed in the order in which one tick applies them: a stop comes last."""
 
     RESET = "reset"
     DISABLE = "disable"

@@ -45,7 +45,7 @@ class Held:
 
 
 class Suppressions:
-    """What clients of one arm have suppressed; each message is valid for SUPPRESSION_S."""
+    """Suppressions by the clients of one arm; each message is valid for SUPPRESSION_S."""
 
     def __init__(self):
         self.reset()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What acts on the joints from outside, as a mean over some ticks: the momentum that motors and weight do not explain.
+"""External loads of the joints, as a mean over some ticks: the momentum that motors and weight do not explain.
 
 A blow changes the speed of an arm in one tick, between two looks at it. A mean since the last look does not miss it.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the arms' controllers know of the weight in their hands, and by how much they are wrong.
+"""The weight in the hands as the arms' controllers know it, and its error.
 
 Gravity compensation computes with a model of the robot. The vendor's grippers are in it, a client's tool is not until
 EndEffectorCommand `configure` says what it weighs.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a physical arm's joints say of themselves: in counts, with noise, and with the error of their sensors' gears.
+"""Readings of a physical arm's joints: in counts, with noise, and with the error of their sensors' gears.
 
 A joint's controller reads the same sensor. So the error of the gear is not in what joint states say of a joint at rest:
 it is the link that is elsewhere.
@@ -48,7 +48,7 @@ class JointSensors:
         return felt - _error(gear, felt - _error(gear, felt))
 
     def read(self, tick, position, velocity, effort):
-        """What is read of the joints in this tick: the same three (n,), [rad], [rad/s] and [Nm].
+        """The joints' readings of this tick: the same three (n,), [rad], [rad/s] and [Nm].
 
         The noise of a tick follows from its number, so it does not depend on who listens, and when.
         """

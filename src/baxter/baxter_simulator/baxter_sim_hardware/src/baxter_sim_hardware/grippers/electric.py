@@ -23,7 +23,7 @@ OPEN, CLOSED = 1.0, 0.0
 
 
 class Phase(Enum):
-    """What the fingers are doing."""
+    """The phase of the fingers' motion."""
 
     RESTING = "resting"
     MOVING = "moving"

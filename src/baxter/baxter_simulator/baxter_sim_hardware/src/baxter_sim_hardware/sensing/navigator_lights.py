@@ -31,7 +31,7 @@ def place(navigator):
 
 
 def picture(inner, outer):
-    """What glows, uint8 (rows, columns, 3), with each light on or off; black does not glow."""
+    """The glow as a picture, uint8 (rows, columns, 3), with each light on or off; black does not glow."""
     (columns, rows), (width, height) = PIXELS, SIZE_M
     x = ((np.arange(columns) + 0.5) / columns - 0.5) * width
     y = (((np.arange(rows) + 0.5) / rows - 0.5) * height)[:, None]

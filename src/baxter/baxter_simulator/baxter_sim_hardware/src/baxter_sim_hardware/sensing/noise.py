@@ -20,7 +20,7 @@ def generator(seed, name, number):
 
 
 class HandSensors:
-    """What ranges and accelerometers of the hands say.
+    """Readings of the hands' ranges and accelerometers.
 
     rows: {section: rows} of `effects.read`; serial: of the robot; seed: integer from 0. Raises HardwareError.
     """

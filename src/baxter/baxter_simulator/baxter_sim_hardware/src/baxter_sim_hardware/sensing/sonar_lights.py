@@ -33,7 +33,7 @@ def around(link):
 
 
 def picture(mask, red, green):
-    """What glows, uint8 (rows, columns, 3); black does not glow. mask: a bit for each sonar's light; red, green: the
+    """The glow, uint8 (rows, columns, 3); black does not glow. mask: a bit for each sonar's light; red, green: the
     halo's levels, 0 to 100."""
     columns, rows = PIXELS
     pixels = np.zeros((rows, columns, 3), dtype=np.uint8)
