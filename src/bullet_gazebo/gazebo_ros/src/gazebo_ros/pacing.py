@@ -70,7 +70,7 @@ class Pacer:
         self.lag.forget(self._last)
 
     def forget_lag(self):
-        """What has just delayed the world was no lack of processor time."""
+        """Do not count the present delay as a lack of processor time."""
         self.lag.forget(self._clock())
 
     @property
