@@ -152,7 +152,7 @@ def _check(name):
 
 
 class _Sent:
-    """What all publishers of a topic have sent while it had a subscriber."""
+    """The messages of all publishers of a topic while it had a subscriber."""
 
     def __init__(self, heard, clock):
         self.heard, self.clock = heard, clock
