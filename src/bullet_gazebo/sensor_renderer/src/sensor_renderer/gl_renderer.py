@@ -119,7 +119,7 @@ class GlRenderer:
         return picture, distance
 
     def identify(self, mirror, pinhole, pose):
-        """What each pixel of the same view shows: (numbers, links, depth).
+        """The body at each pixel of the same view: (numbers, links, depth).
 
         ``numbers``: uint16 (height, width), 0 for nothing, else one more than the index in ``links``, a list of
         (model's name, number of the link in its ``parts``); ``depth`` as :meth:`render` returns it. A screen

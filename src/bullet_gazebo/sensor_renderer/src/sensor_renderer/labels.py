@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each pixel shows: masks of models and of their classes, and how far it has moved. ROS-free."""
+"""Labels of pixels: masks of models and of their classes, and the pixels' motion. ROS-free."""
 import fnmatch
 import re
 

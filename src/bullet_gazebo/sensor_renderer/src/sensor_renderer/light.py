@@ -39,7 +39,7 @@ class Lamp(NamedTuple):
 
     @property
     def kind(self):
-        """What its shader depends on."""
+        """The kind of shader that it needs."""
         return self.type, self.shadow is not None
 
     @property

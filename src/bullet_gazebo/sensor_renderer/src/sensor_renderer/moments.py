@@ -21,7 +21,7 @@ class World:
 
     @property
     def renderer(self):
-        """What draws; made at the first use."""
+        """The renderer, made at its first use."""
         if self._renderer is None:
             self._renderer = self._make_renderer()
         return self._renderer

@@ -165,7 +165,7 @@ class Shadows:
 
 
 class _Poses:
-    """What a map was drawn of."""
+    """The poses that a map was drawn of."""
 
     def __init__(self, casters):
         self._links = [link for link, _, _ in casters]

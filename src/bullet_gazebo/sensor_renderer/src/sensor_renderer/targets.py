@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What pictures are drawn into. ROS-free."""
+"""Framebuffers that pictures are drawn into. ROS-free."""
 import numpy as np
 
 

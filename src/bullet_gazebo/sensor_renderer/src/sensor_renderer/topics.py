@@ -110,7 +110,7 @@ class ColourTopics:
 
 
 class LearningTopics:
-    """What each pixel of a camera shows, for programs that learn: masks of classes and of models with their tables,
+    """Labels of a camera's pixels, for programs that learn: masks of classes and of models with their tables,
     depth, optical flow. They exist while they are open."""
 
     def __init__(self, folder):
