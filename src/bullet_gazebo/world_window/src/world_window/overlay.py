@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is drawn over the picture: boxes, frames, names, contacts, the spring. In pixels, for any painter. ROS-free."""
+"""Shapes drawn over the picture: boxes, frames, names, contacts, the spring. In pixels, for any painter. ROS-free."""
 import itertools
 from typing import NamedTuple
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is under a pixel: the ray through it, and the first thing that it hits. ROS-free."""
+"""The body under a pixel: the ray through it, and the first thing that it hits. ROS-free."""
 from typing import NamedTuple
 
 import numpy as np

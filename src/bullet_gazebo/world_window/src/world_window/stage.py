@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the user does with the mouse and the keys, and what is shown of the world. ROS-free; one thread uses it.
+"""Handles mouse and keys, and keeps what is shown of the world. ROS-free; one thread uses it.
 
 The mouse moves the eye as in Gazebo's window: the left button pans, the middle one (or the left one with shift) orbits
 about the point under the pointer, the wheel and the right button zoom. With control, or with the tool "pull", the left
@@ -94,7 +94,7 @@ class Stage:
         self._follow()
 
     def shapes(self):
-        """What is drawn over the picture, :mod:`world_window.overlay`'s shapes."""
+        """The shapes to draw over the picture, :mod:`world_window.overlay`'s shapes."""
         overlay = Overlay(self.pinhole, self.eye.pose())
         if self._mirror is None:
             return overlay.shapes
