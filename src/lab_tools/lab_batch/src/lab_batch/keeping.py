@@ -56,7 +56,7 @@ def raise_limit():
 
 
 def own_memory_bytes():
-    """What counts for the limit of this process now."""
+    """The memory of this process that counts for its limit [bytes]."""
     return int(Path("/proc/self/status").read_text(encoding="ascii").split("VmData:")[1].split()[0]) << 10
 
 
