@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the labs' files occupy on the disk, and which lab is to end for it. No file system's quotas are required.
+"""The space of the labs' files on the disk, and the lab that must end for it. No file system's quotas are required.
 
 A program fills gigabytes in seconds, so the free space of the disk is asked for several times a second, which costs
 nothing, and the labs' files are measured whenever it falls. Free of ROS; Linux only.
@@ -112,7 +112,7 @@ def entries_left(folder):
 
 
 def nameless_bytes(pids, device):
-    """What files occupy that have been removed and are still open in one of these processes, on a disk (st_dev)."""
+    """Space of removed files that are still open in one of these processes, on a disk (st_dev) [bytes]."""
     found = {}
     for pid in pids:
         folder = "/proc/%d/fd" % pid
@@ -131,7 +131,7 @@ def nameless_bytes(pids, device):
 
 
 def written_bytes(pids):
-    """What these processes, and children of theirs that have ended, have written to disks (proc_pid_io(5))."""
+    """Bytes that these processes, and children of theirs that have ended, have written to disks (proc_pid_io(5))."""
     total = 0
     for pid in pids:
         try:

@@ -37,7 +37,7 @@ def same(token, known):
 
 
 class Door:
-    """What the handlers share. ``record``: store.ClassRecord; ``supervisor``: supervisor.Supervisor."""
+    """State that the handlers share. ``record``: store.ClassRecord; ``supervisor``: supervisor.Supervisor."""
 
     def __init__(self, record, supervisor):
         self.record, self.supervisor = record, supervisor
@@ -57,7 +57,7 @@ class Door:
         return same(token, self.record.instructor)
 
     def words_of(self, lab):
-        """What a lab that does not run says to its student."""
+        """The text for the student of a lab that does not run."""
         if lab.state is State.WAITING and lab.reason:
             return "The lab is going to start. It waits: %s." % lab.reason
         if lab.state is State.WAITING:

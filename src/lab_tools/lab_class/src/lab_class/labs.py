@@ -40,7 +40,7 @@ class Kind(enum.Enum):
 
 
 class Action(enum.Enum):
-    """What the supervisor is to do with a lab."""
+    """The supervisor's next action on a lab."""
 
     START = "start"
     PAUSE = "pause"

@@ -68,7 +68,7 @@ def prepared(place, options, tokens, listener, refused):
 
 
 def _ready(environment):
-    """What set-up has made ready for pictures, as binds; without it each lab simplifies the robot's meshes when it
+    """Set-up's prepared drawings, as binds; without them each lab simplifies the robot's meshes when it
     starts, which takes ten seconds of a processor. Notes in the lab's environment where it is."""
     folder = cache_folder("")
     if not folder.is_dir():

@@ -21,7 +21,7 @@ def shortage(available, limit_bytes, starting=0):
 
 
 def forecast(count, available, limit_bytes):
-    """What to say to an instructor who asks for more labs than memory has room for; else ""."""
+    """The warning for an instructor whose labs are more than memory has room for; else ""."""
     each = min(LAB_BYTES, limit_bytes)
     if count * each <= available:
         return ""

@@ -51,7 +51,7 @@ class Options:
 
     @property
     def prefix(self):
-        """What the paths of all addresses begin with: the path of ``address``, mostly ""."""
+        """The common prefix of all addresses' paths: the path of ``address``, mostly ""."""
         return urlsplit(self.address).path
 
 
@@ -65,7 +65,7 @@ class Tokens:
 
 @dataclass(frozen=True)
 class ClassRecord:
-    """What class.json holds: options, students, tokens by name, the instructor's token."""
+    """The content of class.json: options, students, tokens by name, the instructor's token."""
 
     options: Options
     students: tuple
@@ -152,8 +152,8 @@ class Store:
                              "instructor": record.instructor})
 
     def running(self):
-        """What the supervisor has written by `write_running`, or {}; also where a host that lost power has kept only a
-        part of it."""
+        """The content that the supervisor wrote by `write_running`, or {}; also where a host that lost power has kept
+        only a part of it."""
         try:
             found = json.loads((self.folder / _RUNNING).read_text(encoding="utf-8"))
         except (FileNotFoundError, ValueError):

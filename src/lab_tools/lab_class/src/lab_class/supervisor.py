@@ -323,7 +323,7 @@ class Supervisor:
                 self._exceed_memory(name)
 
     def _without_group(self, name, process):
-        """What no control group counts: (memory [bytes], why the lab is to end for something else or "")."""
+        """Usage that no control group counts: (memory [bytes], why the lab is to end for something else or "")."""
         return (process.memory_bytes(self._scratch.bytes(name, process.family)),
                 too_many_sockets(process.family()))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What students' own checks of their programs have said: read from their folders, kept for the instructor's page.
+"""Results of students' own checks of their programs: read from their folders, kept for the instructor's page.
 
 A check runs in the student's lab and writes its result there, so nothing here is proof, and nothing there is trusted:
 the file may be a link, a pipe, or of any size.
