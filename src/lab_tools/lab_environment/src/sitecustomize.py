@@ -83,7 +83,7 @@ def _add_the_workspaces_packages() -> None:
 
 
 def _program(words: list) -> str:
-    """What Python, called with `words`, runs: a file, "-c" or "-m"; "" where its user types."""
+    """The program that Python runs when called with `words`: a file, "-c" or "-m"; "" where its user types."""
     words = iter(words)
     for word in words:
         if not word.startswith("-"):

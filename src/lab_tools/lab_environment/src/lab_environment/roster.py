@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who is in the class: a number of students, or a CSV file. No ROS, no files."""
+"""The students of a class: a number of students, or a CSV file. No ROS, no files."""
 import codecs
 import csv
 import hashlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the kernel keeps for programs outside of their processes' memory: files in memory, and sockets. Free of ROS;
+"""Memory that the kernel keeps for programs outside of their processes: files in memory, and sockets. Free of ROS;
 Linux only."""
 import contextlib
 import os
