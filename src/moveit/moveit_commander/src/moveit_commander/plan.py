@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What plan() returns: noetic's tuple, which melodic's programs can use as the trajectory that they expect."""
+"""The result of plan(): noetic's tuple, which melodic's programs can use as the trajectory that they expect."""
 from moveit_msgs.msg import RobotTrajectory
 
 

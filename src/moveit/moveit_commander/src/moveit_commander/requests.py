@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is sent to move_group: requests and goals, built from a commander's settings."""
+"""Requests and goals for move_group, built from a commander's settings."""
 from dataclasses import dataclass, field
 
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion, Vector3
@@ -38,7 +38,7 @@ def code_name(code):
 
 @dataclass
 class RequestSettings:
-    """What a commander is set to. Lengths in m, angles in rad, times in s; scaling 0 to 1."""
+    """Settings of a commander. Lengths in m, angles in rad, times in s; scaling 0 to 1."""
 
     planning_time: float = 5.0
     attempts: int = 1
