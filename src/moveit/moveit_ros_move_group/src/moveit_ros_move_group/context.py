@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the node's services and actions share."""
+"""State that the node's services and actions share."""
 import functools
 import time
 from dataclasses import dataclass

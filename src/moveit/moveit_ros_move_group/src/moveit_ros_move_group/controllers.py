@@ -42,7 +42,7 @@ class Controller:
 
     @property
     def remedy(self):
-        """What to do where the action does not answer, the command that starts its server if that is known."""
+        """Advice where the action does not answer, the command that starts its server if that is known."""
         action = self.action.lstrip("/")
         command = self.options.get("started_by") or next(
             (line for begin, end, line in _SERVERS if action.startswith(begin) and action.endswith(end)), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers are spoken to by: an action each, or nothing where they are fake."""
+"""Handles of controllers: an action client each, or nothing where they are fake."""
 import itertools
 import threading
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What move_group reads from the parameter server."""
+"""Settings that move_group reads from the parameter server."""
 import math
 import re
 from dataclasses import dataclass, field

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What dynamic_reconfigure's clients may change while the node runs, under MoveIt's names."""
+"""Settings that dynamic_reconfigure's clients may change while the node runs, under MoveIt's names."""
 import rospy
 
 from loop_ros.reconfigure import Setting, SettingsServer

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What messages do to a scene, with MoveIt's meaning of each."""
+"""Applies messages to a scene, with MoveIt's meaning of each."""
 import itertools
 import math
 from dataclasses import replace
