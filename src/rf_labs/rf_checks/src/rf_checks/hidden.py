@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What sandboxes of a check do not show of the workspace: no sandbox shows the solutions or the history, and a
+"""Parts of the workspace that the sandboxes of a check hide: no sandbox shows the solutions or the history, and a
 student's program does not see the judge either."""
 
 #: Paths below a workspace that contain or reveal solutions. No sandbox shows these.
