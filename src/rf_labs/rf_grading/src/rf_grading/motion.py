@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the robot did in a run, small enough for a page: points of both arms over time. Free of ROS."""
+"""The robot's motion in a run, small enough for a page: points of both arms over time. Free of ROS."""
 from baxter_model import SIDES
 
 #: Links of an arm that are drawn, from shoulder to hand.

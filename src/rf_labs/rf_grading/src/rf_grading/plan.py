@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is to be judged: a task for each program of each submission, its files laid out in a folder. Free of ROS."""
+"""The tasks of a grading: one for each program of each submission, its files laid out in a folder. Free of ROS."""
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -27,7 +27,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 class NotRead(Exception):
-    """What was sent needs more than it may have, or ends the process that reads it; the text says which."""
+    """A submission needs more than it may have, or ends the process that reads it; the text says which."""
 
 
 def limited(function: Callable, *arguments, cpu_s: int = CPU_S, memory_bytes: int = MEMORY_BYTES):

@@ -36,7 +36,7 @@ class BadFolder(Exception):
 
 @dataclass
 class Submission:
-    """What one student sent. entry: the name under which it was found, unique; student, name, email: as far as known.
+    """The files of one student. entry: their unique name as found; student, name, email: as far as known.
 
     files: {path: bytes} of programs and notebooks; others: paths of other files; problem: why it is not judged, or "".
     """
