@@ -69,7 +69,7 @@ class JointStateController(Controller):
 
 
 def _flaw(row, known):
-    """What is wrong with an entry of ``extra_joints``, or None."""
+    """The fault of an entry of ``extra_joints``, or None."""
     if not isinstance(row, dict) or not isinstance(row.get("name"), str):
         return "%r is no {name, position, velocity, effort}" % (row,)
     if row["name"] in known:
