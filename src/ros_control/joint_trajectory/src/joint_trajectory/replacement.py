@@ -91,7 +91,7 @@ def _smoothed(times: Floats, positions: Floats, velocities: Floats, acceleration
 
 
 def whole_turns(position: float, target: float) -> float:
-    """What to add to ``target`` [rad], a multiple of a full turn, so that it is nearest to ``position``.
+    """The multiple of a full turn [rad] to add to ``target``, so that it is nearest to ``position``.
 
     If both directions are equally long, it keeps the sign of ``target - position``.
     """
