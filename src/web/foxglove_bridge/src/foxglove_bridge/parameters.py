@@ -11,7 +11,7 @@ _SEND_BUFFER_BYTES = 10_000_000
 
 
 class BridgeParameters(NamedTuple):
-    """What the node is built from. ``longest_look_s``: the graph is looked at at least that often; ``probe_s``: how
+    """Parameters of the node. ``longest_look_s``: the graph is looked at at least that often; ``probe_s``: how
     long a service may take to tell its type; ``warnings`` for its log.
     """
 
