@@ -39,7 +39,7 @@ class Comparison:
 
 
 def shown_of(findings):
-    """What pages show of findings: ``met`` and ``of`` (numbers of items), ``groups`` [{name, met, of}], ``others``
+    """Findings as pages show them: ``met`` and ``of`` (numbers of items), ``groups`` [{name, met, of}], ``others``
     [{name, verdict, reason}] of all that is missing or other than expected.
     """
     met, of = totals(findings, True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who drives the robot, and whether that page still answers. No ROS; times [s] come in as arguments."""
+"""The page that drives the robot, and whether it still answers. No ROS; times [s] come in as arguments."""
 
 #: Period of a page's heartbeats [s]; the page gets it from here.
 HEARTBEAT_S = 0.04

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What takes a while and is done for pages one after the other, in a thread. No ROS."""
+"""Slow tasks of pages, done one after the other in a thread. No ROS."""
 import queue
 
 from lab_web.lab import RobotError

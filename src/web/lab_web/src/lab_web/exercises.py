@@ -14,7 +14,7 @@ class Results:
         self._seen = self._version()
 
     def newest(self):
-        """What pages show of a result that has come since the last call, or None."""
+        """The result that has come since the last call, as pages show it, or None."""
         version = self._version()
         if version == self._seen:
             return None
@@ -35,7 +35,7 @@ class Results:
 
 
 def shown_of(text):
-    """What pages show of a result's JSON text: ``exercise``, ``passed``, ``points`` (None: not graded), ``due``,
+    """A result's JSON text as pages show it: ``exercise``, ``passed``, ``points`` (None: not graded), ``due``,
     ``why`` (of what is not graded), ``hint``, ``runs`` [{call, criteria [{name, points, of, found}]}]. All
     numbers are finite. Raises ValueError.
     """

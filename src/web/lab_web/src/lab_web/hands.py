@@ -98,7 +98,7 @@ class Hands:
 
 
 def ghost(picture, chain, joints):
-    """What pages draw of an arm of the scene ``picture`` (:class:`lab_web.scene.Picture`, or None) at other ``joints``:
+    """Drawing of an arm of the scene ``picture`` (:class:`lab_web.scene.Picture`, or None) at other ``joints``:
     ``revision``; ``base``, the pose of the chain's base in the world, and ``links`` {number in the scene: pose}, as the
     upper three rows, 12 numbers. None where the scene has no such arm.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What pages may do with the robot: one holds the control, everybody may stop. No ROS: the robot is an argument, with
+"""Control of the robot by pages: one holds the control, everybody may stop. No ROS: the robot is an argument, with
 
 - ``limits``: {joint: motion.Limits}, empty until the robot is known; ``poses``: {name: {joint: angle [rad]}}
 - ``measured()``: {joint: position [rad]}, of ``time_s`` in the robot's time; ``why_not_ready()``: "" or a sentence

@@ -72,7 +72,7 @@ def _install(folder, run):
 
 
 def _download(folder):
-    """What ``npm ci`` does for packages without scripts: the archives that package-lock.json names, by their hashes."""
+    """As ``npm ci`` for packages without scripts: fetch the archives that package-lock.json names, by their hashes."""
     registry = os.environ.get("NPM_CONFIG_REGISTRY", "").rstrip("/")
     if not registry:
         raise LibrariesError("the page's library three.js comes from npm, and this machine has no npm; fix: sudo apt "

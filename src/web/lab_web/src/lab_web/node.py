@@ -245,7 +245,7 @@ def _notebook_routes(notebooks, access):
 
 
 class _Equipment(NamedTuple):
-    """What pages use beside the arms; ``loops``: {name: function of ``ends``}, for a thread each."""
+    """Services of pages beside the arms; ``loops``: {name: function of ``ends``}, for a thread each."""
 
     hands: Hands
     simulation: Simulation
@@ -338,7 +338,7 @@ def _announce(port, tokens, public):
 
 
 def announcement(operators: str, viewers: str, public_port: int | None, is_launched: bool) -> str:
-    """What is printed of the addresses; the operator's is the last line."""
+    """The printed text of the addresses; the operator's is the last line."""
     text = "To watch, and to stop the robot:\n\n    %s\n\n" % viewers
     if public_port is not None:
         text += ("Port %d is open to every machine of the network: who has the operator's address moves the robot. The "
@@ -393,7 +393,7 @@ def _watch(robot, equipment, pages, is_needed, ends):
 
 
 def _described(robot, equipment, published):
-    """What pages are told of the robot: the operation "robot". ``published``: {topic: type}."""
+    """Description of the robot for pages: the operation "robot". ``published``: {topic: type}."""
     return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
                        for name, limits in robot.limits.items()],
             "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,

@@ -105,7 +105,7 @@ class Notebooks:
 
 
 class Door:
-    """Who may use the notebooks. ``access``: web_bridge.access.Access."""
+    """Access control of the notebooks. ``access``: web_bridge.access.Access."""
 
     def __init__(self, access, notebooks):
         self.notebooks = notebooks

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What pages see in the 3D view beside the world's bodies: the points of a sensor, and the frames of tf. No ROS: the
+"""Additions to the world's bodies in the pages' 3D view: the points of a sensor, and the frames of tf. No ROS: the
 graph is an argument, with
 
 - ``clouds()``: the topics with points; ``subscribe(topic, take)``: calls ``take(message)`` on any thread, returns an

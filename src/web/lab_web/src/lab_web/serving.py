@@ -56,7 +56,7 @@ class Pages:
 
     @property
     def shared(self):
-        """What every page is told first."""
+        """The first messages to every page."""
         return list(self._shared.values())
 
     @property
