@@ -9,7 +9,7 @@ from web_bridge.websocket import SocketOptions
 
 
 class ServerParameters(NamedTuple):
-    """What the node is built from; ``warnings`` for its log."""
+    """Parameters of the node; ``warnings`` for its log."""
 
     endpoint: Endpoint
     bridge: BridgeOptions
