@@ -24,7 +24,7 @@ class FrameWatch:
         self._sent = {}
 
     def changed(self, lookup):
-        """What ``lookup`` gave for the frames that have moved since they were last returned."""
+        """Results of ``lookup`` for the frames that have moved since they were last returned."""
         found = []
         for source in self._sources:
             transform = lookup(self._target, source)
