@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who may connect, and what a client may do: Origin, tokens, patterns of names. No ROS.
+"""Access control of clients: Origin, tokens, patterns of names. No ROS.
 
 A handshake of a WebSocket is not subject to a browser's same-origin policy: any page that a user opens could connect to
 a server on that user's machine. A page is therefore only let in from this machine's own names, or from origins that the
@@ -21,7 +21,7 @@ _CHANGING = ("/rosapi/set_", "/rosapi/delete_")
 
 
 class Rules(NamedTuple):
-    """What a client may name. Lists of patterns as of fnmatch; an empty list allows everything.
+    """Names that a client may use. Lists of patterns as of fnmatch; an empty list allows everything.
 
     ``may_act`` False: the client may subscribe and ask rosapi, no more.
     """
@@ -98,7 +98,7 @@ def host_of(text):
 
 
 class Access:
-    """Who may connect.
+    """Decides whether a client may connect.
 
     ``tokens`` {token: may act}, empty: everybody who reaches the port may act. ``origins``: further origins, as
     "https://host:port", or "*". ``null_origin``: pages without an origin, such as files. ``names``: names of this

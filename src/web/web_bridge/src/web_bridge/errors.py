@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a client is told when a request of its own cannot be served."""
+"""Errors for a client whose request cannot be served."""
 
 
 class BridgeError(ValueError):

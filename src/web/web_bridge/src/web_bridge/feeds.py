@@ -39,7 +39,7 @@ class Wish(NamedTuple):
     compression: str = "none"
 
     def joined(self, other):
-        """What counts for a client with both subscriptions to one topic."""
+        """The wish of a client with both subscriptions to one topic."""
         sizes = [size for size in (self.fragment_size, other.fragment_size) if size]
         return Wish(min(self.throttle_rate, other.throttle_rate), min(self.queue_length, other.queue_length),
                     min(sizes, default=0), max(self.compression, other.compression, key=COMPRESSIONS.index))

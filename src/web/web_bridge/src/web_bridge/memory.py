@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What malloc keeps of freed memory. No ROS."""
+"""Limits of the freed memory that malloc keeps. No ROS."""
 import ctypes
 
 #: Blocks of this size and more go back to the system as soon as they are freed [bytes].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What waits to be sent to one client: bounded, the oldest messages dropped. No ROS, any thread."""
+"""Messages that wait for one client: bounded, the oldest messages dropped. No ROS, any thread."""
 import threading
 from collections import OrderedDict, deque
 

@@ -75,7 +75,7 @@ def access_of(get):
 
 
 def warnings_of(address, access, risk="move the robot"):
-    """What the node's log says about an address and an Access; ``risk``: what everybody could do there."""
+    """Warnings for the node's log about an address and an Access; ``risk``: what everybody could do there."""
     if access.needs_token or is_loopback(address):
         return ()
     return ("this port is open to other machines, and everybody on them can %s; with ~token set, only clients that "

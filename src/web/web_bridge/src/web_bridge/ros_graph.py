@@ -67,7 +67,7 @@ def address_of(uri):
 
 
 def handshake(address, header, timeout_s):
-    """What the publisher or service at (host, port) answers to a header of TCPROS. Raises OSError and
+    """The answer of the publisher or service at (host, port) to a header of TCPROS. Raises OSError and
     ROSHandshakeException.
     """
     with socket.create_connection(address, timeout_s) as connection:

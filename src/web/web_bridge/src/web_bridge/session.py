@@ -43,7 +43,7 @@ class BridgeOptions(NamedTuple):
 
 
 class Bridge:
-    """What all clients share."""
+    """State that all clients share."""
 
     def __init__(self, graph, codec: Codec, later, options=None, clock=time.monotonic):
         self.options = options or BridgeOptions()

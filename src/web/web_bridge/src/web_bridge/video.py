@@ -59,7 +59,7 @@ class VideoOptions(NamedTuple):
 
 
 class Query(NamedTuple):
-    """What a client asks for. ``transport`` raw: the topic itself; compressed: the images of ``TOPIC/compressed``;
+    """The query of a client. ``transport`` raw: the topic itself; compressed: the images of ``TOPIC/compressed``;
     original: these without a change, or the topic's own in ``form`` where there are none.
     """
 
@@ -124,7 +124,7 @@ def routes(server):
 
 
 class VideoServer:
-    """What the handlers share: cameras, options, and the open streams."""
+    """State that the handlers share: cameras, options, and the open streams."""
 
     def __init__(self, cameras, options):
         self.cameras = cameras

@@ -104,7 +104,7 @@ def token_of(request):
 
 
 class BufferedSocket(websocket.WebSocketHandler):
-    """What the sockets of all protocols have in common: who may connect, and a task that writes what waits for the
+    """Common base of the sockets of all protocols: access control, and a task that writes what waits for the
     client.
 
     ``outgoing``: the client's OutgoingBuffer, None before it is open; ``may_act``: may it do more than watch?

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all Foxglove clients share: channels, parameters, the time, and the thread that looks at the graph. No ROS.
+"""State that all Foxglove clients share: channels, parameters, time, and the thread that looks at the graph. No ROS.
 
 The graph has, beside what :mod:`web_bridge.session` lists, these methods, all of which may block and raise BridgeError:
 

@@ -56,7 +56,7 @@ class ServiceEntry(NamedTuple):
 
 
 class Changes(NamedTuple):
-    """What clients are told after a look at the graph. ``graph``: the fields of connectionGraphUpdate."""
+    """Messages to clients after a look at the graph. ``graph``: the fields of connectionGraphUpdate."""
 
     channels: tuple = ()
     gone_channels: tuple = ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a Foxglove client may name: regular expressions, as foxglove_bridge's parameters have them."""
+"""Names that a Foxglove client may use: regular expressions, as foxglove_bridge's parameters have them."""
 import re
 from typing import NamedTuple
 
