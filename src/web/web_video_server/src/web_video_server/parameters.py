@@ -7,7 +7,7 @@ from web_bridge.video import QueryError, VideoOptions, check_type
 
 
 class ServerParameters(NamedTuple):
-    """What the node is built from. ``threads`` encode images; ``warnings`` for its log."""
+    """Parameters of the node. ``threads`` encode images; ``warnings`` for its log."""
 
     endpoint: Endpoint
     threads: int
