@@ -134,7 +134,7 @@ class PositionLimiter:
         self._last = None
 
     def enforce(self, command, dt, position, velocity):
-        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         last = position if self._last is None else self._last
         reach = columns.velocity * dt
@@ -165,7 +165,7 @@ class VelocityLimiter:
         self._last = np.zeros(len(self._last))
 
     def enforce(self, command, dt, position, velocity):
-        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         low, high = -columns.velocity, columns.velocity
         if columns.has_soft:
@@ -197,7 +197,7 @@ class EffortLimiter:
         """Has no state to reset."""
 
     def enforce(self, command, dt, position, velocity):
-        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         low = np.where((position < columns.lower) | (velocity < -columns.velocity), 0.0, -columns.effort)
         high = np.where((position > columns.upper) | (velocity > columns.velocity), 0.0, columns.effort)
