@@ -103,7 +103,7 @@ def package_of(path: Path, root: Path) -> str:
 
 @dataclass
 class Selection:
-    """What pytest is to run: files and node ids, and its own arguments. ``title`` says it in words."""
+    """The choice of tests: files and node ids, and its own arguments. ``title`` says it in words."""
 
     targets: list[str]
     pytest_arguments: list[str]
@@ -111,7 +111,7 @@ class Selection:
 
 
 def select(inventory: Inventory, arguments: list[str], root: Path, changed: list[Path] | None = None) -> Selection:
-    """What to run for a command line; raises SelectionError for an unknown name.
+    """The :class:`Selection` of a command line; raises SelectionError for an unknown name.
 
     Names are packages, test files (with or without folder and suffix), pytest node ids, or a linter. Everything that
     starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that depend on them.

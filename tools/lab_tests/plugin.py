@@ -233,7 +233,7 @@ class Controller:
         self.take(getattr(node, "workeroutput", {}))
 
     def take(self, told: dict):
-        """What a worker says in the end."""
+        """The last report of a worker."""
         self._total.long = told.get("long", self._total.long)
         if names := told.get("left_threads"):
             self._fail(f"after the last test, threads of a process still compute; there are: {names}")
