@@ -23,7 +23,7 @@ _VARIANCES = (1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
 class Drive(ModelPlugin):
     """Base of the classes below. Elements, with their defaults: ``commandTopic`` (cmd_vel), ``odometryTopic`` (odom),
     ``odometryFrame`` (odom), ``robotBaseFrame`` (base_footprint), ``updateRate`` or ``odometryRate`` [Hz] (``rate``).
-    A command holds until the next one.
+    A command holds until the next one, or until the timeout of a kind that has one.
     """
 
     rate = 100.0
@@ -39,11 +39,14 @@ class Drive(ModelPlugin):
         self._pace = Pace(max(0.0, rate))
         self._odometry_frame = context.frame(self.text("odometryFrame", "odom"))
         self._base_frame = context.frame(self.text("robotBaseFrame", "base_footprint"))
-        self._wanted = (0.0, 0.0, 0.0)
+        self._wanted, self._commanded_at = (0.0, 0.0, 0.0), 0.0
+        #: How long a command holds [s].
+        self.timeout_s = math.inf
         self.configure()
         self._commands = context.subscription(self.text("commandTopic", "cmd_vel"), Twist)
-        self._odometry = context.publisher(self.text("odometryTopic", "odom"), Odometry)
-        self._tf = context.publisher("/tf", TFMessage) if self.flag(self.tf_tag, True) else None
+        publishes = self.flag("publishTf", True)
+        self._odometry = context.publisher(self.text("odometryTopic", "odom"), Odometry) if publishes else None
+        self._tf = context.publisher("/tf", TFMessage) if publishes and self.flag(self.tf_tag, True) else None
 
     # -- of each kind ------------------------------------------------------------------------------------------------
 
@@ -66,13 +69,16 @@ class Drive(ModelPlugin):
     # -- the loop ----------------------------------------------------------------------------------------------------
 
     def update(self, time_s, dt):
+        self._now = time_s
         self._commands.handle(self._take)
+        if time_s - self._commanded_at > self.timeout_s:
+            self._wanted = (0.0, 0.0, 0.0)
         self.drive(*self._wanted, dt)
 
     def _take(self, message):
         wanted = (message.linear.x, message.linear.y, message.angular.z)
         if all(map(math.isfinite, wanted)):
-            self._wanted = wanted
+            self._wanted, self._commanded_at = wanted, self._now
         else:
             self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is not a number and ignored"
                                            % (self.what, *wanted))
@@ -81,36 +87,29 @@ class Drive(ModelPlugin):
         self.moved(time_s, self.context.world.time_step_s)
         if not self._pace.take(time_s):
             return
-        wanted = self._odometry.has_listeners, self._tf is not None and self._tf.has_listeners
+        wanted = [topic is not None and topic.has_listeners for topic in (self._odometry, self._tf)]
         if any(wanted):
             pose, linear, angular = self.where()
-            now, place = stamp(time_s), pose[:3, 3].tolist()
-            turned = Quaternion(*_quaternion(pose))
             if wanted[0]:
-                self._odometry.publish(self._message(now, place, turned, linear, angular))
+                self._odometry.publish(self._message(stamp(time_s), pose, linear, angular))
             if wanted[1]:
-                transform = TransformStamped(child_frame_id=self._base_frame)
-                transform.header.stamp, transform.header.frame_id = now, self._odometry_frame
-                translation = transform.transform.translation
-                translation.x, translation.y, translation.z = place
-                transform.transform.rotation = turned
-                self._tf.publish(TFMessage([transform]))
+                self._tf.publish(TFMessage([_transform(time_s, self._odometry_frame, self._base_frame, pose)]))
         self.also_publish(time_s)
 
     def also_publish(self, time_s):
         """Called at the same rate, for a kind with further topics."""
 
     def reset(self):
-        self._wanted = (0.0, 0.0, 0.0)
+        self._wanted, self._commanded_at = (0.0, 0.0, 0.0), 0.0
         self._commands.take()
         self._pace.restart()
 
-    def _message(self, now, place, turned, linear, angular):
+    def _message(self, now, pose, linear, angular):
         message = Odometry(child_frame_id=self._base_frame)
         message.header.stamp, message.header.frame_id = now, self._odometry_frame
         position, twist = message.pose.pose.position, message.twist.twist
-        position.x, position.y, position.z = place
-        message.pose.pose.orientation = turned
+        position.x, position.y, position.z = pose[:3, 3].tolist()
+        message.pose.pose.orientation = Quaternion(*_quaternion(pose))
         twist.linear.x, twist.linear.y, twist.linear.z = linear.tolist()
         twist.angular.x, twist.angular.y, twist.angular.z = angular.tolist()
         message.pose.covariance = message.twist.covariance = np.diag(self.variances).ravel().tolist()
@@ -194,7 +193,9 @@ class DiffDrive(_Wheels):
     """``libgazebo_ros_diff_drive.so``. Elements besides those of :class:`Drive`: ``leftJoint`` (left_joint),
     ``rightJoint`` (right_joint), ``wheelSeparation`` (0.34 m), ``wheelDiameter`` (0.15 m), ``wheelTorque`` (5 Nm at
     most), ``wheelAcceleration`` (0: any; of the rim [m/s2]), ``odometrySource`` (world; encoder), ``legacyMode`` (true:
-    left and right are exchanged), ``publishWheelJointState`` (false: the wheels on ``joint_states``).
+    left and right are exchanged), ``publishWheelJointState`` (false: the wheels on ``joint_states``),
+    ``publishWheelTF`` (false: the frames of the wheels on ``/tf``), ``publishTf`` (true; false: neither odometry nor
+    its transform, as in Gazebo).
     """
 
     torque_tag = "wheelTorque"
@@ -219,10 +220,12 @@ class DiffDrive(_Wheels):
             raise PluginError("%s: <odometrySource> is '%s', expected world or encoder" % (self.what, source))
         self._counted = WheelOdometry() if source in ("encoder", "0") else None
         self._turned = self._angles()
-        self._wheels = None
+        self._wheel_names = [self.model.joint_names[i] for i in self._both]
+        self._wheels = self._wheel_tf = None
         if self.flag("publishWheelJointState", False):
             self._wheels = self.context.publisher("joint_states", JointState)
-            self._wheel_names = [self.model.joint_names[i] for i in self._both]
+        if self.flag("publishWheelTF", False):
+            self._wheel_tf = self.context.publisher("/tf", TFMessage)
 
     def moved(self, time_s, dt):
         if self._counted is None:
@@ -251,6 +254,14 @@ class DiffDrive(_Wheels):
             message = JointState(None, self._wheel_names, position, velocity, effort)
             message.header.stamp = stamp(time_s)
             self._wheels.publish(message)
+        if self._wheel_tf is not None and self._wheel_tf.has_listeners:
+            self._wheel_tf.publish(TFMessage([self._wheel_transform(name, time_s) for name in self._wheel_names]))
+
+    def _wheel_transform(self, name, time_s):
+        joint = self.context.robot.joints[name]
+        parent, child = (self.model.link_pose(link).matrix() for link in (joint.parent, joint.child))
+        return _transform(time_s, self.context.frame(joint.parent), self.context.frame(joint.child),
+                          np.linalg.inv(parent) @ child)
 
     def joints_set(self):
         self._turned = self._angles()
@@ -292,11 +303,17 @@ class SkidSteer(_Wheels):
 class PlanarMove(Drive):
     """``libgazebo_ros_planar_move.so``: the model moves as commanded on any ground.
 
-    ``odometryRate`` (20 Hz) takes the place of ``updateRate``.
+    ``odometryRate`` (20 Hz) takes the place of ``updateRate``. ``cmdTimeout`` (below 0: none [s]): how long a command
+    holds.
     """
 
     rate = 20.0
     rate_tag = "odometryRate"
+
+    def configure(self):
+        text = self.text("cmdTimeout", "-1")
+        if not text.startswith("-"):
+            self.timeout_s = self.number("cmdTimeout", 0.0)
 
     def drive(self, x, y, turn, dt):
         pose = self.model.base_pose().matrix()
@@ -319,6 +336,16 @@ class ForceBasedMove(PlanarMove):
         up = np.cross(along, across)
         linear = linear + (x - linear @ along) * along + (y - linear @ across) * across
         self.model.set_base_twist(tuple(linear), tuple(angular + (turn - angular @ up) * up))
+
+
+def _transform(time_s, parent, child, pose):
+    """The transform (4, 4) of frame ``child`` in ``parent``."""
+    transform = TransformStamped(child_frame_id=child)
+    transform.header.stamp, transform.header.frame_id = stamp(time_s), parent
+    translation = transform.transform.translation
+    translation.x, translation.y, translation.z = pose[:3, 3].tolist()
+    transform.transform.rotation = Quaternion(*_quaternion(pose))
+    return transform
 
 
 def _quaternion(pose):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The base of TurtleBot 2."""
-import math
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
@@ -30,8 +29,6 @@ class Kobuki(DiffDrive):
 
     def __init__(self, context):
         self._prefix = context.param("base_prefix", "mobile_base")
-        self._heard_at = -math.inf
-        self._time_s = context.world.time_s
         super().__init__(context)
         self._resets = context.subscription(self._prefix + "/commands/reset_odometry", Empty)
         self._imu = context.publisher(self._prefix + "/sensors/imu_data", Imu)
@@ -48,18 +45,11 @@ class Kobuki(DiffDrive):
 
     def configure(self):
         super().configure()
-        self._timeout = self.number("velocity_command_timeout", 0.6)
+        self.timeout_s = self.number("velocity_command_timeout", 0.6)
 
     def update(self, time_s, dt):
-        self._time_s = time_s
         self._resets.handle(self._reset_odometry)
-        if time_s - self._heard_at > self._timeout:
-            self._wanted = (0.0, 0.0, 0.0)
         super().update(time_s, dt)
-
-    def _take(self, message):
-        super()._take(message)
-        self._heard_at = self._time_s
 
     def _reset_odometry(self, message):
         self._counted = WheelOdometry()
@@ -85,7 +75,7 @@ class Kobuki(DiffDrive):
 
     def reset(self):
         super().reset()
-        self._heard_at, self._last = -math.inf, None
+        self._last = None
 
     def _gyro(self):
         return self.model.base_pose().matrix()[:3, :3].T @ np.asarray(self.model.base_twist()[1])

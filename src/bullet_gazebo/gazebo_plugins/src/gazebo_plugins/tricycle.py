@@ -21,7 +21,8 @@ class Tricycle(DiffDrive):
     (left_wheel_joint), ``encoderWheelRightJoint`` (right_wheel_joint), ``encoderWheelSeparation`` (0.5 m),
     ``encoderWheelDiameter`` (0.15 m), ``wheelTorque`` (5 Nm at most, of both motors), ``wheelAcceleration`` (0: any; of
     the front wheel [rad/s2]), ``wheelDeceleration`` (as the acceleration), ``steeringSpeed`` (0: any [rad/s]),
-    ``odometrySource`` (world; encoder), ``publishWheelJointState`` (false). The wheels' tolerances have no effect.
+    ``odometrySource`` (world; encoder), ``publishWheelJointState``, ``publishWheelTF`` (false). The wheels'
+    tolerances have no effect.
     """
 
     def text(self, tag, default=None):
@@ -43,7 +44,7 @@ class Tricycle(DiffDrive):
         self._side = math.copysign(1.0, left - right)
         if self._wheels is not None:
             self._both = np.concatenate([front, self._both])
-            self._wheel_names = [self.model.joint_names[i] for i in self._both]
+        self._wheel_names = [*names, *self._wheel_names]
 
     def drive(self, x, y, turn, dt):
         wanted = x / self._front_radius

@@ -142,6 +142,16 @@ def test_odometry_transform_and_wheels_come_at_their_rate(make):
 
 def test_without_the_transform(make):
     assert "/tf" not in two_wheeler(make, publishOdomTF="false").ros.publishers
+    assert not {"/tf", "/ns/odom"} & set(two_wheeler(make, publishTf="false").run(DT).ros.publishers)
+
+
+def test_the_frames_of_the_wheels(make):
+    vehicle = two_wheeler(make, publishWheelTF="true", publishOdomTF="false")
+    vehicle.run(0.05)
+    left, right = vehicle.ros.publishers["/tf"].messages[-1].transforms
+    assert [(each.header.frame_id, each.child_frame_id) for each in (left, right)] == [
+        ("base", "left_link"), ("base", "right_link")]
+    assert (left.transform.translation.x, left.transform.translation.y) == pytest.approx(TWO["left"], abs=1e-3)
 
 
 def test_after_a_reset_it_stands_until_told_otherwise(make):
@@ -186,6 +196,13 @@ def test_planar_move_slides_as_commanded(make):
     vehicle.command(0.0, 0.5)
     assert vehicle.run(1.0).true_pose()[2] == pytest.approx(0.5, abs=0.02)
     assert len(vehicle.ros.publishers["/ns/odom"].messages) == pytest.approx(40, abs=2)
+
+
+@pytest.mark.parametrize(("timeout", "moved"), [(0.2, 0.1), (-1, 0.5), (None, 0.5)])
+def test_planar_move_stops_when_commands_do(make, timeout, moved):
+    vehicle = make(PlanarMove, {}, {"cmdTimeout": timeout}, caster=False)
+    vehicle.command(0.5)
+    assert vehicle.run(1.0).true_pose()[0] == pytest.approx(moved, abs=0.01)
 
 
 def test_force_based_move_moves_as_commanded_and_falls(make):

@@ -21,6 +21,7 @@ from bullet_sim.solids import with_solids
 from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
+from gazebo_ros.idle_elements import idle_elements, plugin_elements
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource, with_tf_prefix
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.simulation import HostedPlugin
@@ -118,6 +119,7 @@ class Spawner:
             robot = parse_urdf(xml, source="the description of '%s'" % name)
         except UrdfError as error:
             raise SpawnRefused(str(error)) from error
+        self._warn(name, idle_elements(robot, "its description"))
         return self.prepare_robot(name, xml, robot, namespace, parameters, drawing=xml)
 
     def prepare_sdf(self, name, xml, namespace, parameters):
@@ -127,8 +129,7 @@ class Spawner:
             found = parse_sdf_model(xml, "the description of '%s'" % name, self._library.models)
         except SdfError as error:
             raise SpawnRefused(str(error)) from error
-        if found.warning:
-            self._log.warn("model '%s': %s" % (name, found.warning))
+        self._warn(name, "; ".join(filter(None, (found.warning, plugin_elements([found.robot], "its description")))))
         prepared = self.prepare_robot(name, xml, found.robot, namespace, parameters)
         prepared.origin = found.pose
         return prepared
@@ -208,6 +209,9 @@ class Spawner:
 
     def spawn_world(self, models):
         """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs those that fail."""
+        said = plugin_elements([found.robot for found in models], "the world or a model")
+        if said:
+            self._log.warn("plugins: %s" % said)
         for found in models:
             try:
                 prepared = self.prepare_robot(found.name, "", found.robot, None, dict)
@@ -313,6 +317,10 @@ class Spawner:
             self._log.warn("model '%s': plugins that are not known here and are left out: %s; known plugins: %s"
                            % (name, names, ", ".join(self._library.plugins.known)))
         return found, sensors, options
+
+    def _warn(self, name, text):
+        if text:
+            self._log.warn("model '%s': %s" % (name, text))
 
     def _leave_out(self, model_name, error):
         self._log.warn("model '%s' comes without one of its sensors: %s" % (model_name, error))

@@ -12,8 +12,9 @@ _FLAGS = {"true": "1", "false": "0"}
 class Row(NamedTuple):
     """An element: ``reason`` says why it has no effect, "" for one that is honoured.
 
-    ``harmless``: the texts, with | between them, with which it has none in Gazebo either; @mu=1 is the text of the
-    element beside it, or 1. None where its presence counts.
+    ``harmless``: the texts, with | between them, with which it has none in Gazebo either; None where its presence
+    counts. ``@mu=1`` is the text of the element <mu> beside it, or 1; ``?mu=mu2`` is any text, where the elements <mu>
+    and <mu2> are the same.
     """
 
     reason: str = ""
@@ -71,7 +72,7 @@ class ElementTable:
                 if inside in self.parents:
                     yield from self.find(child, inside)
             elif row.harmless is None or not any(
-                    _same(child.text, _text_of(text, element)) for text in row.harmless.split("|")):
+                    _is(child.text, text, element) for text in row.harmless.split("|")):
                 yield Idle(child.tag, child.sourceline, row.reason, False)
 
 
@@ -110,11 +111,12 @@ def placed(table: Mapping[str, Mapping[str, list[Any]]]) -> str:
     return ", ".join(parts)
 
 
-def _text_of(harmless, parent):
-    if not harmless.startswith("@"):
-        return harmless
-    name, _, default = harmless[1:].partition("=")
-    return parent.findtext(name) or default
+def _is(text, harmless, parent):
+    """Whether ``text``, of an element in ``parent``, is the text that ``harmless`` means."""
+    name, _, other = harmless[1:].partition("=")
+    if harmless.startswith("?"):
+        return _same(parent.findtext(name) or "1", parent.findtext(other) or "1")
+    return _same(text, (parent.findtext(name) or other) if harmless.startswith("@") else harmless)
 
 
 def _same(text, other):

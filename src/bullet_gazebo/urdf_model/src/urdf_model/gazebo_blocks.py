@@ -24,7 +24,8 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
     """
     found = {}
     for tag, field in _SURFACE.items():
-        for part in element.iterchildren(tag):
+        # Also as SDF has them, in <collision>.
+        for part in (*element.iterchildren(tag), *element.iterfind("collision/surface/*/ode/" + tag)):
             value = _of_surface(part, field, link.name, warn)
             if value is not None:
                 found[field] = value

@@ -210,6 +210,8 @@ def test_blocks_add_up():
     assert (link.surface.friction, link.surface.stiffness, link.surface.damping) == (0.05, 1e6, 1.0)
     assert surface_of("<mu1>0.1</mu1>", "<mu1>0.2</mu1>").surface.friction == 0.2
     assert surface_of("<mu1>-1</mu1>").surface.friction == math.inf
+    assert surface_of("<collision><surface><friction><ode><mu>0.3</mu></ode></friction></surface></collision>"
+                      ).surface.friction == 0.3
 
 
 @pytest.mark.parametrize("inside, weight", [

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which <gazebo> elements of a URDF, and which elements of its plugins, have no effect here. ROS-free."""
+import os
+
+from gazebo_ros.plugin_elements import TABLES
+from sdf_model import elements as sdf
+from urdf_model.element_table import ElementTable, Idle, IdleElements
+
+_STOPS = "the stops of joints are hard"
+_NOT_IN_A_URDF = "this element of SDF is not read in a URDF"
+_ONE_MU = "friction is the same in all directions"
+
+#: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
+KNOWN = {
+    "model": "static plugin start_configuration",
+    "link": "mu mu1 kp kd turnGravityOff gravity material sensor light plugin canonicalBody maxContacts",
+    "link/collision": "max_contacts",
+    "link/collision/surface/friction/ode": "mu",
+    "link/collision/surface/contact/ode": "kp kd",
+    **{"link/collision/" + path: names for path, names in sdf.HARMLESS.items() if path.startswith("surface")},
+    "joint": "implicitSpringDamper cfmDamping springStiffness springReference provideFeedback sensor plugin "
+             "preserveFixedJoint disableFixedJointLumping",
+}
+WITHOUT_EFFECT = (
+    ("link", {"mu2": "@mu1=1", "fdir1": "0 0 0|?mu1=mu2"}, _ONE_MU),
+    ("link", {"maxVel": "0.01", "minDepth": "0"}, "the solver is Bullet's, not ODE's"),
+    ("link", {"dampingFactor": "0"}, "bodies have no drag"),
+    ("link", {"selfCollide": "false", "self_collide": "false"}, "links of a model do not collide with each other"),
+    ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
+    ("link", {"kinematic": "false"}, "links move freely"),
+    ("link", {"visual": None}, _NOT_IN_A_URDF),
+    ("link/collision", {"laser_retro": "0"}, "intensities of lasers are 0"),
+    *(("link/collision/" + path, names, reason) for path, names, reason in sdf.WITHOUT_EFFECT
+      if path.startswith("surface")),
+    ("joint", {"stopCfm": "0", "stopErp": "0.2"}, _STOPS),
+    ("joint", {"fudgeFactor": "0"}, "the solver is Bullet's, not ODE's"),
+)
+URDF = ElementTable([KNOWN], WITHOUT_EFFECT)
+
+
+def idle_elements(robot, source):
+    """One line that names what has an effect in Gazebo and none here in the <gazebo> elements of a
+    ``urdf_model.Robot``, and what is not known there; "" for nothing. ``source`` names the description."""
+    found = IdleElements()
+    for gazebo in robot.gazebo:
+        reference = gazebo.get("reference") or ""
+        kind = "link" if reference in robot.links else "joint" if reference in robot.joints else "model"
+        if reference and kind == "model":
+            said = 'gazebo reference="%s"' % reference
+            found.add(Idle(said, gazebo.sourceline, "neither a link nor a joint", False), source)
+            continue
+        for idle in URDF.find(gazebo, kind):
+            if idle.unknown and "%s/%s" % (kind, idle.tag) in sdf.TABLE.rows:
+                idle = idle._replace(reason=_NOT_IN_A_URDF, unknown=False)
+            found.add(idle, source)
+        for sensor in gazebo.iterchildren("sensor"):
+            _add_all(found, sdf.TABLE.find(sensor, "sensor"), source)
+    _add_plugins(found, robot, source)
+    return found.text()
+
+
+def plugin_elements(robots, source):
+    """As :func:`idle_elements`, of the plugins of several robots: for an SDF, whose other elements its reader names."""
+    found = IdleElements()
+    for robot in robots:
+        _add_plugins(found, robot, source)
+    return found.text()
+
+
+def _add_plugins(found, robot, source):
+    for gazebo in robot.gazebo:
+        for plugin in gazebo.iter("plugin"):
+            table = TABLES.get(os.path.basename(plugin.get("filename") or ""))
+            if table is not None:
+                _add_all(found, table.find(plugin, "plugin"), source)
+
+
+def _add_all(found, idles, source):
+    for idle in idles:
+        found.add(idle, source)
