@@ -20,6 +20,16 @@ from loop_ros.subscription import Subscription
 from rospy_limits.messages import largest_message_bytes
 
 
+def remapped(name):
+    """The absolute ``name``, moved to where the node's remappings put its namespace, such as an action's name.
+
+    roscpp's node handles do so; rospy remaps whole names alone, which it still does with the result. Raises
+    ``loop_ros.names.IllegalName``.
+    """
+    space, _, last = checked_name(name).rpartition("/")
+    return "%s/%s" % (rospy.resolve_name(space).rstrip("/"), last) if space else name
+
+
 class RosObjects:
     """Makes publishers, subscriptions and services for the loop. Each raises ``loop_ros.names.IllegalName`` for a name
     that is none in ROS."""
@@ -41,7 +51,7 @@ class RosObjects:
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
         """A :class:`LoopPublisher` for the absolute name ``topic``."""
-        topic, registered = checked_name(topic), []
+        topic, registered = remapped(topic), []
 
         def register():
             if publisher.is_closed:
@@ -65,7 +75,7 @@ class RosObjects:
 
     def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
         """A :class:`Subscription` to ``topic``; ``notice()`` is called after each message, in any thread."""
-        topic = checked_name(topic)
+        topic = remapped(topic)
         subscription = Subscription(depth, notice, self._counting(topic))
         self._subscriptions[topic] = [*self._subscriptions.get(topic, ()), subscription]
         registered = []
@@ -110,6 +120,7 @@ class RosObjects:
 
         Returns the service's handler, which from then on only the caller can use, or None if there is no such service.
         """
+        name = remapped(name)
         for subscription in self._subscriptions.get(name, ()):
             subscription.close()
         service = self._services.get(name)
@@ -149,7 +160,7 @@ class RosObjects:
         self._jobs.put(function)
 
     def _serve(self, name, srv_class, answer_in_thread, handler):
-        name = checked_name(name)
+        name = remapped(name)
         service = self._services[name] = _Service(self, name, handler)
 
         def register():

@@ -96,7 +96,8 @@ class Real:
         self._subscribed, self._served, self._published, self._lines = {}, {}, {}, []
         monkeypatch.setattr(ros_objects, "rospy", SimpleNamespace(
             Publisher=self._publisher, Subscriber=self._subscriber, Service=self._service,
-            ServiceException=rospy.ServiceException, is_shutdown=lambda: False))
+            ServiceException=rospy.ServiceException, is_shutdown=lambda: False,
+            resolve_name=rospy.resolve_name))
         monkeypatch.setattr("loop_ros.publisher.Peer.of", classmethod(lambda cls, peer: SimpleNamespace(
             transport=peer, send=peer.take, has_rest=False)))
         self.log = LoopLog(dict.fromkeys(("info", "warn", "error"), self._lines.append))

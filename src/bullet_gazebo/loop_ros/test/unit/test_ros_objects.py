@@ -202,6 +202,20 @@ def test_a_publisher_is_registered_until_it_is_closed(objects, registrations):
     assert objects.flush() and registrations.open == []
 
 
+def test_a_remapping_of_an_actions_name_moves_its_topics(objects, registrations, monkeypatch):
+    monkeypatch.setattr(rospy.names, "_resolved_mappings", {
+        "/arm_controller/follow_joint_trajectory": "/joint_trajectory_action", "/arm_controller": "/arm"})
+    for name in ("/arm_controller/follow_joint_trajectory/status", "/arm_controller/state", "/clock"):
+        objects.publisher(name, String)
+    objects.subscription("/arm_controller/follow_joint_trajectory/goal", String)
+    assert objects.flush()
+    assert registrations.open == ["/joint_trajectory_action/status", "/arm/state", "/clock",
+                                  "/joint_trajectory_action/goal"]
+    assert "/joint_trajectory_action/goal" in objects.subscribed()
+    objects.withdraw("/arm_controller/follow_joint_trajectory/goal")
+    assert objects.subscribed() == []
+
+
 def test_a_publisher_that_is_closed_before_its_turn_came_is_not_registered(objects, registrations):
     turn = threading.Event()
     objects.later(lambda: turn.wait(60.0))
