@@ -27,12 +27,17 @@ NO_PARTS = ("src/rf_labs/rf_checks/exercises/", "src/rf_labs/rf_checks/test/wron
 
 def imported(text):
     """Names of the modules that a program imports, at the top or later, each by its first part."""
-    names = set()
-    for node in ast.walk(ast.parse(text)):
+    names, left = set(), [ast.parse(text)]
+    while left:
+        node = left.pop()
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and not node.level:
             names.add(node.module)
+        # Statements alone: the expressions of the whole tree take seconds.
+        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inner = getattr(node, part, ())
+            left += inner if isinstance(inner, list) else ()
     return {name.partition(".")[0] for name in names}
 
 
@@ -57,8 +62,10 @@ def of_ros(module):
     return module if any((share / module / "package.xml").is_file() for share in SHARES) else None
 
 
+@cache
 def uses():
     """(package, file, package that the file imports) for all imports of a package."""
+    found = []
     owner = owners()
     folders = sorted(((str(folder) + "/", name) for name, folder in PACKAGES.items()), reverse=True)
     for file in own_files():
@@ -68,15 +75,13 @@ def uses():
         for module in sorted(imported((ROOT / file).read_text(encoding="utf-8"))):
             needed = owner.get(module) or of_ros(module)
             if needed not in (None, package):
-                yield package, file, needed
-
-
-USES = tuple(uses())
+                found.append((package, file, needed))
+    return tuple(found)
 
 
 def test_package_xml_names_what_is_imported():
     unnamed = []
-    for package, file, needed in USES:
+    for package, file, needed in uses():
         always, in_tests = named(package)
         if needed not in (always | in_tests if is_in_tests(file) else always):
             unnamed.append((file, needed))
@@ -111,7 +116,7 @@ def circle(edges):
 
 def test_no_two_packages_need_each_other():
     edges = {}
-    for package, file, needed in USES:
+    for package, file, needed in uses():
         if not is_in_tests(file) and needed in PACKAGES:
             edges.setdefault(package, set()).add(needed)
     assert circle(edges) == []
@@ -119,7 +124,7 @@ def test_no_two_packages_need_each_other():
 
 def test_a_package_below_imports_none_above():
     """The lowest packages, and packages that a physical robot must not need."""
-    product = {(package, needed) for package, file, needed in USES if not is_in_tests(file)}
+    product = {(package, needed) for package, file, needed in uses() if not is_in_tests(file)}
     assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
     for low, below in (("loop_ros", {"rospy_limits", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),
                        ("model_files", {"urdf_model"})):
