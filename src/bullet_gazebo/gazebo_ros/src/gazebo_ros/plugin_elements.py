@@ -5,10 +5,8 @@ from urdf_model.element_table import ElementTable
 # Read for all plugins, or of no use to any: noetic's plugins do not read alwaysOn, and rosDebugLevel is of the log.
 _ALL = "robotNamespace alwaysOn always_on rosDebugLevel"
 _CAMERA = ("cameraName imageTopicName cameraInfoTopicName frameName updateRate hackBaseline distortionK1 distortionK2 "
-           "distortionK3 distortionT1 distortionT2")
-_CAMERA_INFO = ({"Cx": "0", "Cy": "0", "CxPrime": "0", "focalLength": "0"},
-                "camera_info is that of the picture, by <horizontal_fov>")
-_LENS = ({"autoDistortion": "false", "borderCrop": "true"}, "the picture is distorted as a whole")
+           "distortionK3 distortionT1 distortionT2 focalLength Cx Cy CxPrime autoDistortion")
+_LENS = ({"borderCrop": "true"}, "the picture is distorted as a whole")
 _TRIGGER = ({"triggerTopicName": None}, "cameras are not triggered")
 _DEPTH = _CAMERA + (" depthImageTopicName depthImageCameraInfoTopicName pointCloudTopicName pointCloudCutoff "
                     "pointCloudCutoffMax useDepth16UC1Format")
@@ -22,10 +20,10 @@ _FORCE_GAINS = ({"yaw_velocity_p_gain": None, "x_velocity_p_gain": None, "y_velo
 
 #: File name -> (elements with an effect, ({name: harmless texts}, reason), ...).
 PLUGINS = {
-    "libgazebo_ros_camera.so": (_CAMERA, _CAMERA_INFO, _LENS, _TRIGGER),
-    "libgazebo_ros_multicamera.so": (_CAMERA, _CAMERA_INFO, _LENS, _TRIGGER),
-    "libgazebo_ros_depth_camera.so": (_DEPTH, _CAMERA_INFO, _LENS, _TRIGGER, _MORE_DEPTH),
-    "libgazebo_ros_openni_kinect.so": (_DEPTH, _CAMERA_INFO, _LENS, _TRIGGER),
+    "libgazebo_ros_camera.so": (_CAMERA, _LENS, _TRIGGER),
+    "libgazebo_ros_multicamera.so": (_CAMERA, _LENS, _TRIGGER),
+    "libgazebo_ros_depth_camera.so": (_DEPTH, _LENS, _TRIGGER, _MORE_DEPTH),
+    "libgazebo_ros_openni_kinect.so": (_DEPTH, _LENS, _TRIGGER),
     "libgazebo_ros_laser.so": ("topicName frameName updateRate",),
     "libgazebo_ros_gpu_laser.so": ("topicName frameName updateRate",),
     "libgazebo_ros_range.so": ("topicName frameName updateRate fov radiation gaussianNoise",),

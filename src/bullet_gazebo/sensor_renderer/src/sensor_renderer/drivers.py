@@ -97,8 +97,8 @@ class Camera(Driver):
             topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
             learning = LearningTopics(self.name(folder))
-            self._cameras.append((Imager(camera, self.seed(camera.name)), topics, learning,
-                                  convert.camera_info(camera.pinhole, entry.baseline_m(camera), camera.distortion)))
+            info = convert.camera_info(entry.stated(camera.pinhole), entry.baseline_m(camera), camera.distortion)
+            self._cameras.append((Imager(camera, self.seed(camera.name)), topics, learning, info))
             self.topics += [*topics.all, learning]
         first = cameras[0]
         self._settings = CameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
@@ -145,8 +145,9 @@ class DepthCamera(Driver):
         self._imager = Imager(self._camera, self.seed(base))
         self._pattern = None
         distortion = self._camera.distortion
-        self._info = convert.camera_info(pinhole, entry.baseline_m(self._camera), distortion)
-        self._plain_info = convert.camera_info(pinhole, 0.0, distortion)
+        stated = entry.stated(pinhole)
+        self._info = convert.camera_info(stated, entry.baseline_m(self._camera), distortion)
+        self._plain_info = convert.camera_info(stated, 0.0, distortion)
         settings = CameraSettings(self.name(base), self._apply, (self._camera.noise_mean, self._camera.noise), more=[
             self.rate_setting, Setting("depth_noise", False, meaning="depth as the first Kinect measures it")])
         self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self._learning, settings]

@@ -119,6 +119,13 @@ class SensorEntry:
         found = self.element.findall("camera") or [etree.Element("camera")]
         return [self._camera(camera, number) for number, camera in enumerate(found)]
 
+    def stated(self, pinhole):
+        """The :class:`Pinhole` that ``camera_info`` states: with the plugin's ``focalLength``, ``Cx`` and ``Cy``
+        [pixels] where they are not 0. As in Gazebo, the picture is that of ``pinhole`` all the same."""
+        focal, cx, cy = (self.number(self.plugin, tag, 0.0) for tag in ("focalLength", "Cx", "Cy"))
+        return pinhole._replace(fx=focal or pinhole.fx, fy=focal or pinhole.fy, cx=cx or pinhole.cx,
+                                cy=cy or pinhole.cy)
+
     def _camera(self, camera, number):
         try:
             pinhole = Pinhole.from_field_of_view(

@@ -44,6 +44,14 @@ def test_of_a_pair_of_cameras_the_right_one_has_the_baseline(names, baselines):
     assert [found.baseline_m(camera) for camera in found.cameras()] == baselines
 
 
+def test_camera_info_states_what_the_plugin_says():
+    found = entry(own_rate="0</updateRate><focalLength>60.0</focalLength><Cx>30</Cx><Cy>0.0</Cy><updateRate>0")
+    (camera,) = found.cameras()
+    info = convert.camera_info(found.stated(camera.pinhole))
+    assert (info.K[0], info.K[2], info.K[4], info.K[5]) == (60.0, 30.0, 60.0, camera.pinhole.cy)
+    assert info.P[:3] == [60.0, 0.0, 30.0] and found.cameras()[0].pinhole == camera.pinhole
+
+
 def test_without_a_camera_element_it_is_that_of_sdf():
     pinhole = entry(camera="").cameras()[0].pinhole
     assert (pinhole.width, pinhole.height, pinhole.near, pinhole.far) == (320, 240, 0.1, 100)
