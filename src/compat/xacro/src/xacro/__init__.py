@@ -57,7 +57,7 @@ def _without_inorder(main):
     return command
 
 
-# URDF elements that are also names of macros; these need no warning.
+# URDF elements that are also names of macros; these are what they are in URDF.
 _OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geometry", "box", "cylinder", "sphere",
             "mesh",
             "origin", "mass", "inertia", "material", "color", "texture", "axis", "limit", "dynamics", "mimic", "parent",
@@ -65,22 +65,43 @@ _OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geomet
             "plugin"}
 
 
-def _with_word_on_prefix(handle_macro_call):
-    """The engine's function, which ignores a macro's name without ``xacro:``, as all versions since ROS melodic; with a
-    warning that names file and lines."""
+# xacro's own elements that melodic's files may have without ``xacro:`` -> the attributes that make them xacro's.
+_WITHOUT_PREFIX = {"property": ("name",), "macro": ("name",), "include": ("filename",), "arg": ("name", "default"),
+                   "if": ("value",), "unless": ("value",), "insert_block": ("name",)}
+
+
+def _with_melodics_names(eval_all, handle_macro_call):
+    """The engine's two functions for files of ROS melodic and before, in which elements and macros of xacro may lack
+    the prefix ``xacro:``. They get it, with a warning that names file and lines; noetic ignores them."""
     told = set()
+
+    def add_prefix(node):
+        name = node.tagName
+        if name not in told:
+            told.add(name)
+            _engine.warning("<%s> without xacro: is taken for <xacro:%s>, as by ROS melodic; write that (%s)"
+                            % (name, name, _places(name)))
+        node.tagName = node.nodeName = "xacro:" + name
+
+    def is_of_xacro(node):
+        wanted = _WITHOUT_PREFIX.get(getattr(node, "tagName", ""))
+        return wanted is not None and all(node.hasAttribute(name) for name in wanted)
+
+    @functools.wraps(eval_all)
+    def evaluate(node, macros, symbols):
+        # What a plugin has for elements is its own business.
+        if node.tagName != "plugin":
+            for child in filter(is_of_xacro, node.childNodes):
+                add_prefix(child)
+        return eval_all(node, macros, symbols)
 
     @functools.wraps(handle_macro_call)
     def handle(node, macros, symbols):
-        handled = handle_macro_call(node, macros, symbols)
-        name = node.tagName
-        if not handled and name in macros and name not in _OF_URDF and name not in told:
-            told.add(name)
-            _engine.warning("<%s> is a macro, but is called without xacro: and left as it stands; write <xacro:%s> (%s)"
-                            % (name, name, _places(name)))
-        return handled
+        if node.tagName in macros and node.tagName not in _OF_URDF:
+            add_prefix(node)
+        return handle_macro_call(node, macros, symbols)
 
-    return handle
+    return evaluate, handle
 
 
 def _places(name):
@@ -98,7 +119,7 @@ def _places(name):
 
 _engine = _load_engine(_engine_folder())
 _engine.main = _without_inorder(_engine.main)
-_engine.handle_macro_call = _with_word_on_prefix(_engine.handle_macro_call)
+_engine.eval_all, _engine.handle_macro_call = _with_melodics_names(_engine.eval_all, _engine.handle_macro_call)
 _substitution_args = importlib.import_module("xacro.substitution_args")  # the engine's
 _substitution_args._eval_find = _find         # $(find PACKAGE)
 _substitution_args._eval_dict["find"] = _find  # $(eval find('PACKAGE'))

@@ -85,7 +85,7 @@ def test_missing_engine_is_said_with_the_way_to_install_it(tmp_path):
     assert "xacro engine is not installed" in done.stderr and "pip install xacro" in done.stderr
 
 
-def test_a_macro_called_without_prefix_is_said_once_with_its_lines(probe):
+def test_a_macro_called_without_prefix_is_called_and_said_once_with_its_lines(probe):
     source = probe / "urdf" / "probe.urdf.xacro"
     source.write_text("""<robot name="probe" xmlns:xacro="http://www.ros.org/wiki/xacro">
 <xacro:macro name="wheel" params="name"><link name="${name}"/></xacro:macro>
@@ -97,6 +97,28 @@ def test_a_macro_called_without_prefix_is_said_once_with_its_lines(probe):
   name="rear"/>
 </robot>""")
     done = run(COMMANDS["xacro"], source, path=probe.parent)
-    assert done.returncode == 0 and '<link name="right"/>' in done.stdout
-    assert done.stderr.count("is a macro, but is called without xacro:") == 1
-    assert "write <xacro:wheel> (%s line 4, 7)" % source in done.stderr and "inertial" not in done.stderr
+    assert done.returncode == 0
+    for word in ('"left"', '"right"', '"rear"', "<inertial/>"):
+        assert word in done.stdout
+    assert "wheel" not in done.stdout
+    assert done.stderr.count("<xacro:wheel>") == 1
+    assert "(%s line 4, 7)" % source in done.stderr and "inertial" not in done.stderr
+
+
+def test_elements_of_xacro_may_lack_the_prefix(probe):
+    source = probe / "urdf" / "probe.urdf.xacro"
+    (probe / "urdf" / "part.xacro").write_text('<robot><property name="M_PI" value="3.14159"/></robot>')
+    source.write_text("""<robot name="probe" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<include filename="part.xacro"/>
+<property name="twice" value="${2 * M_PI}"/>
+<property name="twice" value="${2 * M_PI}"/>
+<macro name="arm" params="side *origin"><link name="${side}_arm"><insert_block name="origin"/></link></macro>
+<arm side="left"><origin xyz="${twice} 0 0"/></arm>
+<if value="false"><link name="none"/></if>
+<gazebo><plugin filename="a.so"><include filename="as it is"/></plugin></gazebo>
+</robot>""")
+    done = run(COMMANDS["xacro"], source, path=probe.parent)
+    assert done.returncode == 0, done.stderr
+    for words in ('<link name="left_arm">', '<origin xyz="6.28318 0 0"/>', '<include filename="as it is"/>'):
+        assert words in done.stdout
+    assert "none" not in done.stdout and done.stderr.count("<xacro:property>") == 1
