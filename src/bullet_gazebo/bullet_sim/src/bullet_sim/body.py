@@ -43,6 +43,7 @@ class Body:
         self._link_names = {index: link for link, index in self._link_index.items()}
         #: The links that Gazebo makes of the description: some of `link_names`.
         self.gazebo_links = tuple(dict.fromkeys(gazebo_links(self.robot).values()))
+        self._canonical = self._find_canonical()
         self._late_twist = None
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
@@ -91,6 +92,22 @@ class Body:
         if not self.static:
             self._world.note_placed(self)
         self._world.wake_all()
+
+    def model_pose(self):
+        """Return the pose of the model as Gazebo tells it: its frame goes with its first link. That is the pose of
+        :meth:`base_pose` but for models that joints hold on the world."""
+        if self._canonical is None:
+            return self.base_pose()
+        link, to_model = self._canonical
+        return Pose.from_matrix(self._link_matrix(link) @ to_model)
+
+    def model_twist(self):
+        """Return (linear (3,), angular (3,)) velocity of the frame of :meth:`model_pose`, in world axes."""
+        if self._canonical is None:
+            return self.base_twist()
+        link, to_model = self._canonical
+        index, matrix = self._link_index[self._frame(link).link], self._link_matrix(link)
+        return self._twist(index, (matrix @ to_model)[:3, 3])
 
     def base_twist(self):
         """Return (linear (3,), angular (3,)) velocity of the model's frame, in world axes."""
@@ -330,6 +347,14 @@ class Body:
                 % (body, self.name, frame.link)
             )
         return self.merged.links[body]
+
+    def _find_canonical(self):
+        """(Gazebo's first link, the model's frame in its (4, 4)) where joints carry it, or None; before any joint has
+        moved."""
+        first = next(iter(self.gazebo_links), self.merged.root)
+        if self.merged.frames[first].link == self.merged.root:
+            return None
+        return first, inverse(self._link_matrix(first)) @ self._body_matrix(BASE)
 
     def _link_matrix(self, link):
         frame = self._frame(link)

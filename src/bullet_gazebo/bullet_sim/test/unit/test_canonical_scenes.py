@@ -195,6 +195,18 @@ def test_friction_in_a_joint_stops_it_and_holds_it(world):
     assert it.read_joints()[1][0] == pytest.approx(-0.5, rel=0.01)
 
 
+def test_the_pose_of_a_model_on_the_world_is_that_of_its_first_link(world):
+    robot = parse_urdf((SLIDER % 0.0).replace('xyz="1 0 0"', 'xyz="0 0 1"').replace(
+        '<child link="it"/>', '<child link="it"/><origin xyz="0 0 3" rpy="0 0 1.5707963"/>'))
+    it = world.spawn(robot, "lift", Pose((1, 2, 0)))
+    run(world, 1.0)
+    fallen = G / 2.0
+    assert it.model_pose().position == pytest.approx((1.0, 2.0, -fallen), abs=G * world.time_step_s)
+    assert it.model_pose().quaternion == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-6)
+    assert it.model_twist()[0] == pytest.approx((0.0, 0.0, -G), rel=1e-3)
+    assert it.base_pose().position == (1.0, 2.0, 0.0)
+
+
 def test_a_spring_in_a_joint_swings(world):
     robot = parse_urdf(SLIDER % 0.0)
     robot.joints["rail"].spring_stiffness, robot.joints["rail"].spring_reference = 50.0, 0.2

@@ -74,7 +74,7 @@ class Entities:
         models = self._world.models
         if name in models:
             model = models[name]
-            return (model.base_pose().matrix(), *map(np.asarray, model.base_twist()))
+            return (model.model_pose().matrix(), *map(np.asarray, model.model_twist()))
         if "::" in name:
             model, link_name = self.link(name)
         else:

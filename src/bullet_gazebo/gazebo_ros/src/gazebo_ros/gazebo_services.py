@@ -214,7 +214,7 @@ class GazeboServices:
         response = GetModelStateResponse()
         try:
             model = self._entities.model(request.model_name)
-            pose, linear, angular = self._entities.relative(model.base_pose(), *model.base_twist(),
+            pose, linear, angular = self._entities.relative(model.model_pose(), *model.model_twist(),
                                                             request.relative_entity_name)
         except UnknownEntity as error:
             response.status_message = "GetModelState: %s" % error

@@ -149,8 +149,8 @@ class Publications:
         models = self._simulation.world.models
         if self._model_states.has_listeners:
             self._model_states.publish(ModelStates(
-                list(models), [msg_from_pose(model.base_pose()) for model in models.values()],
-                [msg_from_twist(*model.base_twist()) for model in models.values()]))
+                list(models), [msg_from_pose(model.model_pose()) for model in models.values()],
+                [msg_from_twist(*model.model_twist()) for model in models.values()]))
         if self._link_states.has_listeners:
             message = LinkStates()
             for model in models.values():
