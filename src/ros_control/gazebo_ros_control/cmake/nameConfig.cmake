@@ -2,7 +2,6 @@
 # Python. This file has the name of each of them.
 set(_name ${CMAKE_FIND_PACKAGE_NAME})
 message(STATUS "${_name} is found without headers: C++ code that includes them does not compile here")
-set(${_name}_FOUND TRUE)
 set(${_name}_FOUND_CATKIN_PROJECT TRUE)
 foreach(_variable INCLUDE_DIRS LIBRARY_DIRS LIBRARIES EXPORTED_TARGETS)
   set(${_name}_${_variable} "")
