@@ -10,6 +10,12 @@ export LAB_ROOT
 
 # shellcheck source=tools/environment.bash
 source "$LAB_ROOT/tools/environment.bash"
+# shellcheck source=tools/platform.bash
+source "$LAB_ROOT/tools/platform.bash"
+# shellcheck source=tools/container.bash
+source "$LAB_ROOT/tools/container.bash"
+# The bash of macOS cannot read what follows; that of the container can.
+if [[ ${BASH_VERSINFO[0]} -lt 4 ]]; then use_container "$@" || exit; fi
 
 # The one table of modes: two spaces begin a mode, deeper lines belong to it. `MODE --help` and the words of "did you mean"
 # come from here.
@@ -95,6 +101,7 @@ declare -A PROGRAMS=(
 run_program() {
     local mode=$1 command
     shift
+    if ! asks_only "$mode" "$@" || has_earlier_build; then use_container "$mode" "$@" || exit; fi
     read -ra command <<<"${PROGRAMS[$mode]}"
     if asks_only "$mode" "$@"; then
         if ! has_earlier_build; then help_of "$mode" && exit; fi
@@ -188,12 +195,14 @@ main() {
             version
             ;;
         setup)
+            use_container setup "$@" || exit
             exec bash "$LAB_ROOT/tools/setup.bash" "$@"
             ;;
         doctor)
             # Works on a half-built workspace, so it sets nothing up. The doctor itself reports a host that does not
             # resolve or has no route.
             refuse_option "$@" || exit
+            use_container doctor "$@" || exit
             if is_loopback "${1:-}"; then
                 use_loopback
             elif [[ $# -gt 0 ]]; then
@@ -224,6 +233,7 @@ main() {
             local public=
             case ${1:-} in --public | --public=*) public=${1#--} && shift ;; esac
             refuse_option "$@" || exit
+            use_container sim ${public:+"--$public"} "$@" || exit
             bring_up_to_date "$@" || exit
             if [[ -z $public ]]; then
                 use_loopback
@@ -251,6 +261,7 @@ main() {
             fi
             if asks_only host "${1:-}"; then help_of HOST && exit; fi
             refuse_option "$@" || exit
+            use_container "$mode" "$@" || exit
             bring_up_to_date "$@" || exit
             use_build || exit
             enter "$@"

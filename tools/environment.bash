@@ -105,6 +105,9 @@ own_fingerprint() {
         -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
 }
 
+# system_name: what a build and a virtual environment are made for; in a container it is another one than outside.
+system_name() { sed -n 's/^\(ID\|VERSION_CODENAME\)=//p' /etc/os-release 2>/dev/null | LC_ALL=C sort | paste -sd ' '; }
+
 # A hash of everything whose change makes an earlier set-up stale; the user's own packages do not count. The workspace's
 # own path counts too: virtual environments and catkin build folders cannot be moved.
 fingerprint() {
@@ -115,6 +118,7 @@ fingerprint() {
     # The order of the files must not depend on the user's language. -H: some folders of src are links.
     {
         echo "$LAB_ROOT"
+        system_name
         cd "$LAB_ROOT" && find -H requirements*.txt tools/*.txt tools/setup.bash ${folders[@]+"${folders[@]}"} $([[ -d src_overlay ]] && echo src_overlay) \
             \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
             -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \

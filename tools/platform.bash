@@ -1,23 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Detects the system, and prints whether the workspace supports it; docs/platforms.md has the long form. Sourced by
-# set-up.
+# baxter.sh and by set-up.
 
 OLDEST_PYTHON=3.10
 
+# in_release FILE KEY: the value of a key in a file like /etc/os-release
+in_release() { sed -n "s/^$2=//p" "$1" 2>/dev/null | tr -d '"'; }
+
+# lacks_ros1 OS_RELEASE NOETIC_SETUP: why a system has no ROS 1 for the lab, as "Ubuntu 24.04 LTS has no ROS 1 packages"; fails if
+# it has one, or may have.
+lacks_ros1() {
+    local name codename
+    name=$(in_release "$1" PRETTY_NAME) codename=$(in_release "$1" UBUNTU_CODENAME)
+    case ${codename:-$(in_release "$1" VERSION_CODENAME)} in
+        bookworm | trixie | forky | sid | jammy) return 1 ;;
+        stretch | buster | bullseye | bionic | focal) echo "$name has a Python older than $OLDEST_PYTHON" ;;
+        *)
+            if [[ -f $2 || -z $codename ]] && command -v apt-get >/dev/null; then return 1; fi
+            echo "${name:-$(uname -s)} has no ROS 1 packages"
+            ;;
+    esac
+}
+
 # platform_line OS_RELEASE NOETIC_SETUP MACHINE: one line about the system that a file like /etc/os-release describes
 platform_line() {
-    local name verdict
-    name=$(sed -n 's/^PRETTY_NAME=//p' "$1" 2>/dev/null | tr -d '"')
-    case $(sed -n 's/^\(ID\|VERSION_ID\)=//p' "$1" 2>/dev/null | tr -d '"' | sort -r | paste -sd ' ') in
+    local name verdict lacking
+    name=$(in_release "$1" PRETTY_NAME)
+    case "$(in_release "$1" ID) $(in_release "$1" VERSION_ID)" in
         "debian 12") verdict="supported and tested" ;;
         "debian 13") verdict="tried, not in the regular tests" ;;
         "ubuntu 22.04") verdict="tried, not in the regular tests; ROS 1 has to come from Ubuntu's own packages" ;;
-        "ubuntu 24.04" | "ubuntu 26.04") verdict="not supported: it has no ROS 1 packages; use the container" ;;
-        "ubuntu 20.04")
-            verdict="not supported: its Python is 3.8, the pinned packages need $OLDEST_PYTHON"
-            if [[ -f $2 ]]; then verdict+="; ros-noetic is installed and not used"; fi
+        *)
+            verdict="unknown; the workspace needs apt, ROS 1 packages and Python $OLDEST_PYTHON or newer"
+            if lacking=$(lacks_ros1 "$1" "$2"); then verdict="not supported: $lacking; use the container"; fi
             ;;
-        *) verdict="unknown; the workspace needs apt, ROS 1 packages and Python $OLDEST_PYTHON or newer" ;;
     esac
     if [[ $3 != x86_64 ]]; then verdict+="; on $3 untested: pybullet has no wheel for it and is compiled"; fi
     echo "System: ${name:-unknown}: $verdict (docs/platforms.md)"

@@ -371,6 +371,11 @@ started=$SECONDS
 fingerprint_at_start=$(fingerprint) own_at_start=$(own_fingerprint)
 if [[ -f $STATE/done && $(<"$STATE/done") != "$fingerprint_at_start" ]]; then rm -f "$STATE/done"; fi
 rm -f "$STATE/failed"
+# Compiled code and virtual environments of another system cannot be used here.
+if [[ -f $STATE/system && $(<"$STATE/system") != "$(system_name)" ]]; then
+    echo "This workspace was set up on another system, $(<"$STATE/system"); starting from the beginning."
+    rm -rf build devel "$VENV" "$STATE"/*.stamp "$STATE/own"
+fi
 echo "Setting up $LAB_ROOT"
 platform_line /etc/os-release "$NOETIC" "$(uname -m)"
 for index in "${!STEPS[@]}"; do
@@ -387,6 +392,7 @@ done
 if [[ ${#chosen[@]} -eq 0 ]]; then
     cut_off_step=""
     write "$STATE/done" "$fingerprint_at_start"
+    write "$STATE/system" "$(system_name)"
     if [[ -n $own_at_start ]]; then write "$STATE/own_done" "$own_at_start"; fi
 fi
 if [[ -z $cut_off_step ]]; then rm -f "$STATE/at_work"; fi

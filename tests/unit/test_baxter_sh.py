@@ -351,7 +351,8 @@ def workspace(tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     (tmp_path / ".venv/bin/python3").chmod(0o755)
-    shutil.copy(ROOT / "tools/environment.bash", tmp_path / "tools")
+    for name in ("environment", "platform", "container"):
+        shutil.copy(ROOT / "tools" / f"{name}.bash", tmp_path / "tools")
     return tmp_path
 
 

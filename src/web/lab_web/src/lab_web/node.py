@@ -10,6 +10,7 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -156,7 +157,8 @@ def serve(options, page, libraries):
     end_on_signals()
     rospy.init_node("lab_web", disable_signals=True, disable_rostime=True)
     loop_thread = LoopThread("lab_web")
-    access = Access({tokens[0]: True, tokens[1]: False})
+    forwarded = forwarded_address(os.environ, port)
+    access = Access({tokens[0]: True, tokens[1]: False}, [forwarded] if forwarded else ())
     pages = Pages(access, loop_thread)
     robot = Baxter(lambda text: pages.tell(None, "refused", text))
     pages.lab = Lab(robot, pages.control_changed, pages.tell,
@@ -320,10 +322,16 @@ def _no_port(port, error):
     return Failure("port %d cannot be opened: %s; name another one by --port" % (port, error))
 
 
+def forwarded_address(variables: Mapping[str, str], port: int) -> str:
+    """The address at which a GitHub codespace forwards a port to its owner's browser; "" elsewhere."""
+    name, domain = variables.get("CODESPACE_NAME"), variables.get("GITHUB_CODESPACES_PORT_FORWARDING_DOMAIN")
+    return "https://%s-%d.%s" % (name, port, domain) if name and domain else ""
+
+
 def _announce(port, tokens, public):
     """Make the addresses known, and print them once the lab has started; returns the operator's."""
     host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
-    address = "http://%s:%d/" % (host, port)
+    address = (forwarded_address(os.environ, port) or "http://%s:%d" % (host, port)) + "/"
     # A token of the user may hold signs that mean something else in an address.
     operators, viewers = ("%s?token=%s" % (address, quote(token, safe="")) for token in tokens)
     rospy.set_param("~address", address)

@@ -28,6 +28,19 @@ def test_an_address_holds_its_token_whatever_its_signs(monkeypatch, tmp_path, to
     assert file.read_text() == address
 
 
+def test_in_a_codespace_the_address_is_the_one_that_its_owner_reaches(monkeypatch, tmp_path):
+    codespace = {"CODESPACE_NAME": "fuzzy-robot", "GITHUB_CODESPACES_PORT_FORWARDING_DOMAIN": "app.example.dev"}
+    assert node.forwarded_address(codespace, 8091) == "https://fuzzy-robot-8091.app.example.dev"
+    assert node.forwarded_address({"CODESPACE_NAME": "fuzzy-robot"}, 8091) == ""
+    node.Access({"a": True}, [node.forwarded_address(codespace, 8091)], names=[]).check_origin(
+        "https://fuzzy-robot-8091.app.example.dev", "localhost:8091")
+    for name, value in {**codespace, "ROS_HOME": str(tmp_path)}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(node.rospy, "set_param", lambda *_: None)
+    monkeypatch.setattr(node, "_print_when_started", lambda text: None)
+    assert node._announce(8091, ("a", "b"), False) == "https://fuzzy-robot-8091.app.example.dev/?token=a"
+
+
 @pytest.mark.parametrize("port", [None, 8090])
 @pytest.mark.parametrize("is_launched", [False, True])
 def test_the_operators_address_is_the_last_line_alone(port, is_launched):
