@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world: one PyBullet client, its models, its time."""
 
+import itertools
 import os
 
 import numpy as np
@@ -36,6 +37,13 @@ def plain_path(uri):
 def is_fixed(root, static=None):
     """Whether a robot with this root link is fixed in the world; ``static``: as for ``World.spawn``."""
     return root == "world" if static is None else static
+
+
+def self_colliding(merged):
+    """The pairs of links of a urdf_model.MergedRobot that collide with each other: both of them ask for it."""
+    links = [link.name for link in merged.links.values() if link.self_collide and link.collisions]
+    joined = {frozenset((joint.parent, joint.child)) for joint in merged.joints.values()}
+    return [pair for pair in itertools.combinations(links, 2) if frozenset(pair) not in joined]
 
 
 def _has_mesh(link):
@@ -154,7 +162,8 @@ class World:
 
         The frame of a robot from a URDF is that of its root link. ``warn`` is called with the replacements of missing
         meshes. ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in
-        Gazebo. ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``. ``mesh_cuts``: {link: planes}, as
+        Gazebo. ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``; by default those that the
+        description asks for, but for meshes that overlap at the start. ``mesh_cuts``: {link: planes}, as
         for ``convex_parts.cut``, in the mesh's axes [m], cuts the collision meshes of those links and replaces them by
         the convex hulls of the parts. If such a mesh is missing, the pairs of its body are left out: its replacement is
         too rough for a folded arm. ``merged``: the MergedRobot of ``robot``, which must be checked and have no missing
@@ -177,7 +186,8 @@ class World:
                 self._warn("model '%s': %s" % (name, mended))
             merged = merge_fixed(robot)
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
-        pairs = [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
+        asked = list(self_collision_pairs) or self_colliding(merged)
+        pairs = [pair for pair in asked if all(merged.frames[link].link not in rough for link in pair)]
         blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs))
         parts, root_offset = build(self._client, blueprint, pose, self._shapes,
                                    lambda text: self._warn("model '%s': %s" % (name, text)))
@@ -185,6 +195,8 @@ class World:
         if pairs:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
+        if pairs and not self_collision_pairs:
+            self._part_rough_pairs(model, pairs)
         if not static:
             self.note_placed(model)
         wheels = [] if static else fixed_wheels(merged.joints.values())
@@ -197,6 +209,17 @@ class World:
                            "a step of %g s" % (name, joint, *stiffness, self.time_step_s))
         self._models_changed()
         return model
+
+    def _part_rough_pairs(self, model, pairs):
+        """Let links of ``model`` that overlap now not collide where one has a mesh: its convex hull is larger."""
+        links = model.merged.links
+        overlapping = {frozenset((contact.link_a, contact.link_b)) for contact in self.touching(model)
+                       if contact.model_a == contact.model_b and contact.distance < 0.0
+                       and (_has_mesh(links[contact.link_a]) or _has_mesh(links[contact.link_b]))}
+        if overlapping:
+            model.set_self_collision_pairs([pair for pair in pairs if frozenset(pair) not in overlapping])
+            self._warn("model '%s': these links do not collide with each other, since their convex hulls overlap: "
+                       "%s" % (model.name, ", ".join(sorted(" and ".join(sorted(pair)) for pair in overlapping))))
 
     def make_shape(self, merged, link, static=None, mesh_cuts=None):
         """Make the collision shape of a body of ``merged`` (urdf_model.MergedRobot) beforehand.

@@ -242,3 +242,35 @@ def test_each_world_looks_ahead_as_far_as_it_was_told():
             assert bool(world.contacts()) == (world is worlds[1])
     for world in worlds:
         world.close()
+
+
+FINGER = """<link name="%(n)s"><inertial><mass value="0.1"/><inertia ixx="0.001" iyy="0.001" izz="0.001"/></inertial>
+<collision><origin xyz="%(x)g 0 0"/><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+<joint name="%(n)s" type="prismatic"><parent link="rail"/><child link="%(n)s"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" velocity="1" effort="5"/></joint>
+<gazebo reference="%(n)s"><selfCollide>%(own)s</selfCollide></gazebo>"""
+
+
+def gripper(world, collide, places=(-0.2, 0.2)):
+    fingers = "".join(FINGER % {"n": n, "x": x, "own": own} for n, x, own in zip("lr", places, collide, strict=True))
+    return world.spawn(parse_urdf('<robot name="gripper"><link name="rail"/>%s</robot>' % fingers), "gripper",
+                       Pose((0, 0, 1)), static=True)
+
+
+@pytest.mark.parametrize(("collide", "closed"), [(("true", "true"), 0.15), (("true", "false"), 0.2)])
+def test_links_that_both_ask_for_it_collide_with_each_other(world, collide, closed):
+    fingers = gripper(world, collide)
+    for _ in range(500):
+        fingers.drive_velocity(np.arange(2), np.array([0.2, -0.2]), np.full(2, 5.0))
+        world.step()
+    assert fingers.read_joints()[0] == pytest.approx((closed, -closed), abs=0.01)
+
+
+def test_rough_shapes_that_overlap_at_the_start_do_not_push_each_other(world, monkeypatch):
+    told = []
+    monkeypatch.setattr(world, "_warn", told.append)
+    monkeypatch.setattr("bullet_sim.world._has_mesh", lambda link: True)
+    fingers = gripper(world, ("true", "true"), (-0.04, 0.04))
+    step(world, 100)
+    assert np.abs(fingers.read_joints()[0]).max() < 1e-6
+    assert len(told) == 1 and "l and r" in told[0]

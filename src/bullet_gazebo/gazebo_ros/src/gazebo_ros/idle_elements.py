@@ -12,8 +12,9 @@ _ONE_MU = "friction is the same in all directions"
 
 #: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
 KNOWN = {
-    "model": "static plugin start_configuration",
-    "link": "mu mu1 kp kd turnGravityOff gravity material sensor light plugin canonicalBody maxContacts",
+    "model": "static self_collide plugin start_configuration",
+    "link": "mu mu1 kp kd selfCollide self_collide turnGravityOff gravity material sensor light plugin canonicalBody "
+            "maxContacts",
     "link/collision": "max_contacts",
     "link/collision/surface/friction/ode": "mu",
     "link/collision/surface/contact/ode": "kp kd",
@@ -25,7 +26,6 @@ WITHOUT_EFFECT = (
     ("link", {"mu2": "@mu1=1", "fdir1": "0 0 0|?mu1=mu2"}, _ONE_MU),
     ("link", {"maxVel": "0.01", "minDepth": "0"}, "the solver is Bullet's, not ODE's"),
     ("link", {"dampingFactor": "0"}, "bodies have no drag"),
-    ("link", {"selfCollide": "false", "self_collide": "false"}, "links of a model do not collide with each other"),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
     ("link", {"visual": None}, _NOT_IN_A_URDF),

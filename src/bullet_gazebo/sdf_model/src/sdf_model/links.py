@@ -20,8 +20,6 @@ _INERTIA += (("izz", 2, 2, 1.0),)
 
 def read_link(document, element, name, materials):
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame. ``materials``: MaterialScripts."""
-    if document.flag(element, "self_collide"):
-        document.note(element.find("self_collide"))
     link = Link(name, _inertial(document, element), line=element.sourceline)
     link.gravity = document.flag(element, "gravity", True)
     surfaces = []

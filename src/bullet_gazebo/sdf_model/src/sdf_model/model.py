@@ -137,8 +137,6 @@ class ModelReader:
 
     def _parts(self, document, element, prefix, origin, depth):
         """Return the Parts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
-        if document.flag(element, "self_collide"):
-            document.note(element.find("self_collide"))
         if element.get("placement_frame"):
             document.note(element, "placement_frame of model '%s'" % element.get("name"))
         parts = Parts()
@@ -154,7 +152,9 @@ class ModelReader:
             name = document.name(link)
             if name in parts.links:
                 raise document.error(link, "link '%s' appears twice" % name)
-            parts.links[name] = (read_link(document, link, name, self._materials), frames.where(name, link))
+            read = read_link(document, link, name, self._materials)
+            read.self_collide = document.flag(link, "self_collide", document.flag(element, "self_collide"))
+            parts.links[name] = (read, frames.where(name, link))
             parts.gazebo += _sensors_and_lights(document, link, name)
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))

@@ -377,6 +377,13 @@ def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
     assert (hinge.type, hinge.axis.tolist(), hinge.damping, hinge.friction) == ("continuous", [1, 0, 0], 0.5, 0.0)
 
 
+def test_links_may_collide_with_their_model():
+    found = parse_sdf_model(sdf('<self_collide>1</self_collide><link name="a"/><link name="b"><self_collide>0'
+                                "</self_collide></link>" + joint("j", "a", "b")), "m.sdf")
+    assert {name: link.self_collide for name, link in found.robot.links.items()} == {"a": True, "b": False}
+    assert found.warning == ""
+
+
 def test_a_joint_may_have_a_spring():
     dynamics = ("<dynamics><friction>0.3</friction><spring_stiffness>12</spring_stiffness>"
                 "<spring_reference>-0.4</spring_reference></dynamics>")

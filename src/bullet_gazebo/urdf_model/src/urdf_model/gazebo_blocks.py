@@ -31,6 +31,8 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
                 found[field] = value
     if found:
         link.surface = replace(link.surface or Surface(), **found)
+    for part in element.iterchildren("selfCollide", "self_collide"):
+        link.self_collide = is_true(part.text)
     for part in element.iterchildren("turnGravityOff", "gravity"):
         link.gravity = _has_weight(part)
     name = (element.findtext("material") or "").strip()

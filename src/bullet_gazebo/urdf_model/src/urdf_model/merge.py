@@ -37,6 +37,7 @@ class MergedLink:
     members: list[str] = field(default_factory=list)
     surface: Surface | None = None
     gravity: bool = True
+    self_collide: bool = False
 
 
 @dataclass
@@ -102,6 +103,7 @@ def _merge_group(robot, body, members, frames):
     surfaces = [robot.links[name].surface for name in members if robot.links[name].surface is not None]
     merged.surface = surfaces[0] if surfaces else None
     merged.gravity = robot.links[body].gravity
+    merged.self_collide = any(robot.links[name].self_collide for name in members)
     return merged
 
 

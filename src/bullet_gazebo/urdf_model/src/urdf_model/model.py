@@ -125,6 +125,7 @@ class Link:
     line: int = 0
     surface: Surface | None = None
     gravity: bool = True  # False: it has no weight
+    self_collide: bool = False  # whether it collides with links of its model that do so, too
 
 
 @dataclass

@@ -96,6 +96,11 @@ class _Reader:
                              % (joint.name, joint.mimic.joint, ", ".join(joints)))
                 joint.mimic = None
         transmissions = [self.transmission(e) for e in self.root.iterchildren("transmission")]
+        # What is said for the whole model, links may say otherwise.
+        for part in self.root.iterfind("gazebo/self_collide"):
+            if not part.getparent().get("reference"):
+                for link in links.values():
+                    link.self_collide = is_true(part.text)
         for element in self.root.iterchildren("gazebo"):
             if element.get("reference") in links:
                 read_link_block(element, links[element.get("reference")], self.warn)

@@ -238,6 +238,13 @@ def test_damping_may_be_implicit(flag, implicit):
     assert merge_fixed(robot).joints["j"].implicit_damping is implicit
 
 
+def test_links_may_collide_with_their_model():
+    robot = parse_urdf("""<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+    <parent link="a"/><child link="b"/></joint><gazebo reference="b"><selfCollide>false</selfCollide></gazebo>
+    <gazebo><self_collide>true</self_collide></gazebo></robot>""")
+    assert {name: link.self_collide for name, link in merge_fixed(robot).links.items()} == {"a": True, "b": False}
+
+
 def test_a_joint_may_have_a_spring():
     robot = parse_urdf("""<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
     <parent link="a"/><child link="b"/></joint><gazebo reference="j"><springStiffness>12</springStiffness>
