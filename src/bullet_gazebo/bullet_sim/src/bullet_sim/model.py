@@ -272,8 +272,9 @@ class Model(Body):
             self._effort_driven[rough] = self._any_effort_driven = True
             self._commanded_effort[rough], self._reading = 0.0, None
 
-    def set_joint_positions(self, index, position):
-        """Put joints ``index`` (k,) at ``position`` (k,), at rest, at once. Nothing in between is simulated.
+    def set_joint_positions(self, index, position, velocity=None):
+        """Put joints ``index`` (k,) at ``position`` (k,) at once, at rest or at ``velocity`` (k,). Nothing in between
+        is simulated.
 
         Raises BulletSimError out of bounds.
         """
@@ -283,7 +284,8 @@ class Model(Body):
             for i, value in zip(index, position, strict=True):
                 within(bounds.JOINT_POSITION, value, "the position of joint '%s'" % self.joint_names[i])
         if len(index):
-            self.parts.put(np.asarray(index), position.tolist(), [0.0] * len(index))
+            speeds = [0.0] * len(index) if velocity is None else velocity.tolist()
+            self.parts.put(np.asarray(index), position.tolist(), speeds)
             self._reading = None
         self._world.wake_all()
 

@@ -33,6 +33,7 @@ from gazebo_ros import dragging
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
 from gazebo_ros.jobs import TimedJobs
+from gazebo_ros.link_placing import joints_to, placed, rates
 from loop_ros.faults import SURVIVED
 from urdf_model import bounds
 
@@ -227,20 +228,33 @@ class BodyServices:
     def _put_link(self, state):
         model, link = self._entities.link(state.link_name)
         frame = model.merged.frames[link]
-        if frame.link != model.merged.root:
-            raise ValueError("link '%s' hangs on a joint and cannot be put anywhere by itself; use set_model_state for "
-                             "the model or set_model_configuration for its joints" % state.link_name)
         pose = self._entities.pose_in_world(pose_from_msg(state.pose), state.reference_frame).matrix()
         linear, angular = twist_from_msg(state.twist)
         rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
         linear, angular = rotation @ linear, rotation @ angular
+        if frame.link != model.merged.root and model.static:
+            self._put_joints_of(model, frame, pose, linear, angular)
+            return
         # The whole model moves, so that this link is at the given pose.
-        base = pose @ np.linalg.inv(frame.offset)
+        in_model = np.linalg.inv(model.base_pose().matrix()) @ model.link_pose(link).matrix()
+        base = pose @ np.linalg.inv(in_model)
         linear = bounds.SPEED.check(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]),
                                     "the linear velocity of the model's frame")
         model.set_base_pose(Pose.from_matrix(base))
         if not model.static:
             model.set_base_twist(linear, angular)
+
+    def _put_joints_of(self, model, frame, pose, linear, angular):
+        """Move the joints between the fixed root and a link, so that this is as near as possible to ``pose``."""
+        body = pose @ np.linalg.inv(frame.offset)
+        joints = joints_to(model.merged, frame.link)
+        index = model.index([joint.name for joint in joints])
+        position, jacobian = placed(joints, model.base_pose().matrix(), body, model.read_joints()[0][index],
+                                    model.lower[index], model.upper[index])
+        linear = bounds.SPEED.check(linear + np.cross(angular, body[:3, 3] - pose[:3, 3]),
+                                    "the linear velocity of the link's body")
+        model.set_joint_positions(index, position, rates(jacobian, linear, angular))
+        self._simulation.joints_were_set(model.name)
 
     def _get_link_properties(self, request):
         response = GetLinkPropertiesResponse()

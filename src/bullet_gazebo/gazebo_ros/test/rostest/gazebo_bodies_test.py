@@ -10,7 +10,7 @@ import rostest
 from bullet_sim_msgs.srv import AdvanceTicks
 from gazebo_msgs import srv
 from gazebo_msgs.msg import LinkState, LinkStates, ODEJointProperties
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty
@@ -181,8 +181,15 @@ class GazeboBodies(unittest.TestCase):
         self.accepted(self.set_link_state(state))
         self.close(self.position("box::body"), (7, 1, 2))
         self.assertAlmostEqual(self.get_link_state("box::body", "").link_state.twist.linear.x, 0.5, places=6)
-        state.link_name = "door::door"
-        self.refused(self.set_link_state(state), "set_model_configuration")
+        # A link on a joint goes as far as that allows.
+        x, y = 0.5 * math.cos(0.7), 0.5 * math.sin(0.7)
+        state.link_name, state.pose.position = "door::door", Point(x - 2, y, 1)
+        state.pose.orientation = Quaternion(0, 0, math.sin(0.35), math.cos(0.35))
+        state.twist = Twist(Vector3(-0.3 * y, 0.3 * x, 0), Vector3(0, 0, 0.3))
+        self.accepted(self.set_link_state(state))
+        hinge = self.get_joint_properties("hinge")
+        self.close((hinge.position[0], hinge.rate[0]), (0.7, 0.3))
+        state.pose, state.twist = Pose(Point(7, 1, 2), Quaternion(0, 0, 0, 1)), Twist()
         publisher = rospy.Publisher("/gazebo/set_link_state", LinkState, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, "a connection to /gazebo/set_link_state")
         state.link_name, state.pose.position.x = "box::body", -7
