@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Nodes and roslaunch start without what they do not use.
+
+roslib imports catkin's search for packages, and with it a library for grammars, though few programs search; by way of
+rosclean, which looks for the program ``du``, roslaunch imports setuptools, as much as all the rest of it. And a launch
+searches the workspace three times.
+"""
+import functools
+import importlib
+import shutil
+import sys
+import time
+import types
+
+_SEARCH = "catkin.find_in_workspaces"
+# How long a search for packages counts [s]: as long as a launch reads its files and starts its nodes. A user makes a
+# package while a notebook goes on.
+_REMEMBERED_S = 5.0
+
+
+def amend(module):
+    """Called when catkin or roslaunch.config has been loaded; the modules in question are imported after these."""
+    if module.__name__ == "catkin":
+        _search_later(module)
+    else:
+        _import_rosclean()
+
+
+def _search_later(catkin):
+    if _SEARCH in sys.modules:
+        return
+
+    def find_in_workspaces(*args, **kwargs):
+        return _search().find_in_workspaces(*args, **kwargs)
+
+    def of_the_search(name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(_search(), name)
+
+    later = types.ModuleType(_SEARCH)
+    later.find_in_workspaces, later.__getattr__ = find_in_workspaces, of_the_search
+    sys.modules[_SEARCH] = catkin.find_in_workspaces = later
+
+
+@functools.cache
+def _search():
+    """The module itself."""
+    sys.modules.pop(_SEARCH, None)
+    search = importlib.import_module(_SEARCH)
+    search.find_packages = remembering(search.find_packages)
+    return search
+
+
+def remembering(find, clock=time.monotonic):
+    """``find(path)``, which counts for some seconds. ``clock()`` [s]: replaceable for tests."""
+    found = {}  # {path: (time, result)}
+
+    @functools.wraps(find)
+    def find_packages(path, *args, **kwargs):
+        if args or kwargs:
+            return find(path, *args, **kwargs)
+        if path not in found or clock() - found[path][0] > _REMEMBERED_S:
+            packages = find(path)
+            found[path] = clock(), packages
+        return found[path][1]
+
+    return find_packages
+
+
+def _import_rosclean():
+    names = "distutils", "distutils.spawn"
+    if any(name in sys.modules for name in names):
+        return
+    package, spawn = (types.ModuleType(name) for name in names)
+    spawn.find_executable = shutil.which
+    sys.modules.update(zip(names, (package, spawn), strict=True))
+    try:
+        importlib.import_module("rosclean")
+    finally:
+        for name in names:
+            sys.modules.pop(name, None)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What nodes and roslaunch no longer import, and that it is there when it is used."""
+import subprocess
+import sys
+
+from lab_environment.quick_imports import remembering
+
+PROGRAM = """
+import sys
+import roslaunch
+print([name for name in ("setuptools", "distutils", "pyparsing", "catkin_pkg") if name in sys.modules])
+import rosclean
+print(rosclean.find_executable("sh"))
+from catkin.find_in_workspaces import find_in_workspaces, get_workspaces
+print(len(find_in_workspaces(["share"], project="lab_environment", first_match_only=True)), callable(get_workspaces))
+import catkin.find_in_workspaces
+print("catkin_pkg" in sys.modules, catkin.find_in_workspaces.__file__.endswith("find_in_workspaces.py"))
+import distutils.spawn
+print(callable(distutils.spawn.spawn))
+"""
+
+
+def test_a_launch_imports_what_it_uses_when_it_uses_it():
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", PROGRAM], capture_output=True, text=True, check=True)
+    unused, shell, found, search, spawns = done.stdout.splitlines()
+    assert (unused, found, search, spawns) == ("[]", "1 True", "True True", "True")
+    assert shell.endswith("/sh")
+
+
+def test_a_search_for_packages_counts_for_some_seconds():
+    asked, now = [], [0.0]
+    find = remembering(lambda path, *names: asked.append((path, *names)) or {path: len(asked)}, lambda: now[0])
+    for now[0], path in ((0.0, "a"), (1.0, "a"), (4.9, "b"), (5.1, "a"), (5.2, "a")):
+        assert find(path).keys() == {path}
+    assert find("a", "only") == {"a": 4}
+    assert asked == [("a",), ("b",), ("a",), ("a", "only")]
