@@ -47,7 +47,7 @@ def test_tells_where_the_arms_are_mounted(spawner, monkeypatch):
     spawner.parameters["robot_description"] = """<robot name="r"><link name="torso"/><link name="left_arm_mount"/>
         <joint name="left_torso_arm_mount" type="fixed"><origin xyz="0.02 0.21 0.11" rpy="0 0 0.7854"/>
         <parent link="torso"/><child link="left_arm_mount"/></joint></robot>"""
-    monkeypatch.setattr(spawner.os, "execv", lambda *_: None)
+    monkeypatch.setattr(spawner.spawn_model, "main", lambda words: 0)
     monkeypatch.setattr(spawner, "joint_arguments", lambda pose, limits: [])
     spawner.main(["start", *WORDS])
     origin = "/robot_config/jcb_urdf_config/torso_t0/joint/left_torso_arm_mount/origin/"
