@@ -2,6 +2,7 @@
 """Programs that draw leave the processors to others, in a session of their own as well."""
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -56,3 +57,31 @@ def test_a_terminals_other_programs_keep_their_priority():
 def test_wrong_words_are_said(words, said):
     done = subprocess.run([sys.executable, "-m", "sensor_renderer.priority", *words], capture_output=True, text=True)
     assert done.returncode == 1 and said in done.stderr
+
+
+FAULTS = """
+import os, signal, sys
+with open(sys.argv[1], "a") as starts:
+    starts.write("x")
+if os.path.getsize(sys.argv[1]) <= int(sys.argv[2]):
+    os.kill(os.getpid(), signal.SIGSEGV)
+sys.exit(7)
+"""
+
+
+@pytest.mark.parametrize(("faults", "starts", "code"), [(0, 1, 7), (1, 2, 7), (9, 3, -signal.SIGSEGV)])
+def test_a_window_that_dies_as_it_opens_is_opened_again(tmp_path, faults, starts, code):
+    words = ["-m", "sensor_renderer.priority", "1", sys.executable, "-c", FAULTS, str(tmp_path / "starts"), str(faults)]
+    done = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+    assert (done.returncode, (tmp_path / "starts").read_text()) == (code, "x" * starts)
+    assert done.stderr.count("segmentation fault") == starts - 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_program_that_draws(number):
+    loop = "import time; print(flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-m", "sensor_renderer.priority", "1", sys.executable, "-c", loop],
+                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True) as process:
+        process.stdout.readline()
+        process.send_signal(number)
+        assert process.wait(30) == -number
