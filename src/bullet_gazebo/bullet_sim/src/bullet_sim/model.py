@@ -12,6 +12,7 @@ from urdf_model import bounds
 from .body import BASE, Body
 from .damping import JointDamping
 from .errors import BulletSimError, within
+from .loops import close_loops
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .springs import JointSprings
@@ -78,6 +79,7 @@ class Model(Body):
         self._zeros = [0.0] * count
         self._gears = {}  # of (joint, other), by index
         self._couplings = {}  # the same -> ratio
+        self._loops = close_loops(client, self.merged, parts)
         self._damping = JointDamping(self, client, world.time_step_s, {
             index: within(bounds.DAMPING, joint.damping, "the damping of joint '%s'" % joint.name)
             for index, joint in enumerate(joints) if joint.damping > 0.0})
@@ -326,7 +328,7 @@ class Model(Body):
 
     def remove(self):
         """For World: take the body out of the physics."""
-        for gear in self._gears.values():
+        for gear in (*self._gears.values(), *self._loops):
             pybullet.removeConstraint(gear, physicsClientId=self._client)
         self.parts.remove()
 
@@ -433,6 +435,7 @@ class Model(Body):
             parts.put(np.arange(len(self._all)), joints.tolist(), velocity.tolist())
         for pair, ratio in self._couplings.items():
             self.couple(*pair, ratio)
+        self._loops = close_loops(self._client, self.merged, parts)
         self._restore_collisions()
         self._good = (base, joints)
 

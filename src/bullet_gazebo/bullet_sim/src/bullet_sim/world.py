@@ -188,7 +188,7 @@ class World:
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         asked = list(self_collision_pairs) or self_colliding(merged)
         pairs = [pair for pair in asked if all(merged.frames[link].link not in rough for link in pair)]
-        blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs))
+        blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs), in_limbs=not merged.loops)
         parts, root_offset = build(self._client, blueprint, pose, self._shapes,
                                    lambda text: self._warn("model '%s': %s" % (name, text)))
         model = Model(self._client, self, blueprint, parts, root_offset)

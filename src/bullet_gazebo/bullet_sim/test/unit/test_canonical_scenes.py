@@ -7,7 +7,7 @@ import pytest
 
 from bullet_sim import Pose, World
 from bullet_sim.sliding_wheels import fixed_wheels
-from urdf_model import Box, Link, Robot, Shape, parse_urdf
+from urdf_model import Box, Link, Loop, Robot, Shape, parse_urdf
 from urdf_model.transforms import pose_matrix
 
 G = 9.81
@@ -39,6 +39,12 @@ CART = """<robot name="cart"><link name="base"><inertial><mass value="5"/><inert
 SLIDER = """<robot name="slider"><link name="world"/><link name="it"><inertial><mass value="2"/><inertia ixx="0.02"
 iyy="0.02" izz="0.02"/></inertial></link><joint name="rail" type="prismatic"><parent link="world"/><child link="it"/>
 <axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="5" velocity="3"/><dynamics friction="%g"/></joint></robot>"""
+BAR = """<robot name="bars"><link name="world"/>%s</robot>""" % "".join("""<link name="%s"><inertial><origin xyz="%s"
+rpy="0.3 0.2 0"/><mass value="1"/><inertia ixx="0.05" iyy="0.06" izz="0.04"/></inertial></link><joint name="%s"
+type="continuous"><parent link="%s"/><child link="%s"/><origin xyz="%s"/><axis xyz="0 1 0"/></joint>""" % (
+    link, centre, joint, parent, link, place) for link, centre, joint, parent, place in (
+        ("left", "0 0 -0.25", "a", "world", "0 0 0"), ("right", "0 0 -0.25", "b", "world", "1 0 0"),
+        ("rod", "0.5 0 0", "c", "left", "0 0 -0.5")))
 TWO_WHEELER = """<robot name="two_wheeler"><link name="base"><inertial><origin xyz="0 0 0.1"/><mass value="15"/>
 <inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>%s</link>%s</robot>""" % (
     "".join('<collision><origin xyz="%g 0 -0.05"/><geometry><sphere radius="0.05"/></geometry></collision>' % x
@@ -205,6 +211,23 @@ def test_the_pose_of_a_model_on_the_world_is_that_of_its_first_link(world):
     assert it.model_pose().quaternion == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=1e-6)
     assert it.model_twist()[0] == pytest.approx((0.0, 0.0, -G), rel=1e-3)
     assert it.base_pose().position == (1.0, 2.0, 0.0)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "ball"])
+def test_a_parallelogram_of_bars_is_closed_by_a_joint(world, kind):
+    robot, at_rod, at_right = parse_urdf(BAR), np.eye(4), np.eye(4)
+    at_rod[0, 3], at_right[2, 3] = 1.0, -0.5
+    robot.loops.append(Loop("d", kind, "rod", "right", at_rod, at_right, np.array([0.0, 1.0, 0.0])))
+    bars = world.spawn(robot, "bars")
+    drive = bars.index(["a"])
+    run(world, 1.0, lambda time_s: bars.drive_velocity(drive, np.array([0.5]), np.array([100.0])))
+    a, b, c = bars.read_joints()[0][bars.index(["a", "b", "c"])]
+    assert (a, b, c) == pytest.approx((0.5, 0.5, -0.5), abs=0.01)
+    world.rebuild([bars])
+    run(world, 1.0, lambda time_s: bars.drive_velocity(drive, np.array([-0.5]), np.array([100.0])))
+    assert bars.read_joints()[0] == pytest.approx(np.zeros(3), abs=0.01)
+    world.delete("bars")
+    world.step()
 
 
 def test_a_spring_in_a_joint_swings(world):

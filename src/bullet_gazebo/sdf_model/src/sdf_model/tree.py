@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from urdf_model import Joint, Limit, Link, Robot
+from urdf_model import Joint, Limit, Link, Loop, Robot
 from urdf_model.transforms import inverse
 
 WORLD = "world"
@@ -53,9 +53,9 @@ class Parts:
 def build_robot(document, name, parts):
     """Return the Robot of ``parts``.
 
-    A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Deviations from a
-    tree are noted: joints that close a loop are left out, links without a joint are fixed to the root. A model that is
-    welded to the world becomes static.
+    A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Joints that close a
+    loop become the Robot's loops, which is noted since they have no state; links without a joint are fixed to the root,
+    with a note. A model that is welded to the world becomes static.
     """
     links = dict(parts.links)
     free = not parts.static
@@ -74,7 +74,7 @@ def build_robot(document, name, parts):
                 )
             joined.setdefault(end, []).append(joint)
     root = root or _root(links, written)
-    joints, reached, used = {}, {root}, set()
+    joints, loops, reached, used = {}, [], {root}, set()
 
     def hang(start):
         """Add all links that are joined to link ``start``, directly or through others."""
@@ -87,7 +87,7 @@ def build_robot(document, name, parts):
                 used.add(joint.name)
                 there = joint.child if joint.parent == here else joint.parent
                 if there in reached:
-                    document.note(joint.element, "joint '%s', which closes a loop" % joint.name)
+                    loops.append(joint)
                     continue
                 reached.add(there)
                 joints[joint.name] = _joint(links, joint, here, there)
@@ -112,6 +112,7 @@ def build_robot(document, name, parts):
         root,
         gazebo=parts.gazebo,
         root_origin=links[root][1],
+        loops=[loop for joint in loops for loop in _loop(document, links, joint)],
         keeps_links=True,
     )
 
@@ -152,6 +153,21 @@ def _joint(links, joint, parent, child):
         line=joint.element.sourceline,
         child_offset=inverse(joint.frame) @ links[child][1],
     )
+
+
+def _loop(document, links, joint):
+    """[the Loop of a joint beside the tree], or [] for one of a kind that is held fixed elsewhere; it is noted."""
+    kind = "ball" if joint.element.get("type") == "ball" else joint.type
+    if kind == "fixed" and joint.element.get("type") != "fixed":
+        document.note(joint.element, "joint '%s', which closes a loop" % joint.name)
+        return []
+    if joint.parent == joint.child:
+        document.note(joint.element, "joint '%s' of a link with itself" % joint.name)
+        return []
+    if kind != "fixed":
+        document.note(joint.element, "limits, dynamics and state of joint '%s', which closes a loop" % joint.name)
+    return [Loop(joint.name, kind, joint.parent, joint.child, inverse(links[joint.parent][1]) @ joint.frame,
+                 inverse(links[joint.child][1]) @ joint.frame, joint.axis)]
 
 
 def _held(links, root, link):

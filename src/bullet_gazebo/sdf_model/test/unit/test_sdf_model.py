@@ -199,6 +199,9 @@ def test_what_a_tree_cannot_have_is_said():
     content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "1 0 0 0 0 0")
     loop = parse_sdf_model(sdf(content + joint("j", "a", "b") + joint("k", "a", "b")), "m.sdf")
     assert "joint 'k', which closes a loop (m.sdf line 3)" in loop.warning
+    (closing,) = loop.robot.loops
+    assert (closing.name, closing.type, closing.parent, closing.child) == ("k", "continuous", "a", "b")
+    assert closing.in_parent[:3, 3].tolist() == [1, 0, 0] and closing.in_child[:3, 3].tolist() == [0, 0, 0]
     loose = parse_sdf_model(sdf(content), "m.sdf")
     assert "link 'b', which no joint connects: it is held by 'a' (m.sdf line 3)" in loose.warning
     assert where(loose.robot)["b"][0, 3] == 1.0

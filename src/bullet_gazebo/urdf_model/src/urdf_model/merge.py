@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import Inertial, Joint, Robot, Shape, Surface
+from .model import Inertial, Joint, Loop, Robot, Shape, Surface
 
 
 class MergedFrame(NamedTuple):
@@ -49,6 +49,7 @@ class MergedRobot:
     links: dict[str, MergedLink]
     joints: dict[str, Joint]
     frames: dict[str, MergedFrame]
+    loops: list[Loop] = field(default_factory=list)
 
 
 def merge_fixed(robot: Robot) -> MergedRobot:
@@ -83,7 +84,11 @@ def merge_fixed(robot: Robot) -> MergedRobot:
 
     links = {body: _merge_group(robot, body, members, frames) for body, members in groups.items()}
     ordered = {joints[body].name: joints[body] for body in links if body in joints}
-    return MergedRobot(robot.name, robot.root, links, ordered, frames)
+    loops = [replace(loop, parent=frames[loop.parent].link, child=frames[loop.child].link,
+                     in_parent=frames[loop.parent].offset @ loop.in_parent,
+                     in_child=frames[loop.child].offset @ loop.in_child) for loop in robot.loops]
+    loops = [loop for loop in loops if loop.parent != loop.child]
+    return MergedRobot(robot.name, robot.root, links, ordered, frames, loops)
 
 
 def _merge_group(robot, body, members, frames):

@@ -154,6 +154,19 @@ class Joint:
         return self.type in MOVABLE_TYPES
 
 
+@dataclass
+class Loop:
+    """A joint beside the tree of links, which it closes to a loop; it has no state."""
+
+    name: str
+    type: str  # revolute, continuous, prismatic, fixed or ball
+    parent: str
+    child: str
+    in_parent: np.ndarray  # 4x4, the joint's frame in the parent's, in the posture at position 0
+    in_child: np.ndarray  # 4x4, the same in the child's
+    axis: np.ndarray  # (3,), unit, in the joint's frame
+
+
 @dataclass(frozen=True)
 class TransmissionJoint:
     name: str  # empty where the description has none
@@ -182,6 +195,7 @@ class Robot:
     warnings: list[str] = field(default_factory=list)
     # 4x4, the root link's frame in the model's, which is what a pose in the world refers to. One in a URDF, not in SDF.
     root_origin: np.ndarray = field(default_factory=lambda: np.eye(4))
+    loops: list[Loop] = field(default_factory=list)
     keeps_links: bool = False  # whether fixed links all stay links for Gazebo, as those of an SDF
 
     def movable_joints(self):
