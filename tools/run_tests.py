@@ -44,6 +44,8 @@ EXIT_SKIPPED = 77
 # Factor of all time limits. They are written for an idle machine with two fast cores; others may be half as fast, or
 # have neighbours. Only a test that hangs takes longer by it.
 STRETCH = 2.0
+# Most .test files wait for motions half of their time, and the last worker runs only those that mostly wait: plugin.py.
+WORKERS_BESIDE_CORES = 2
 # Fewer files run in this process itself, which is quicker, and lets pytest's --pdb work.
 MIN_FILES_FOR_WORKERS = 3
 USAGE = "./baxter.sh test [NAME…] [OPTION…] [pytest's options]"
@@ -93,8 +95,7 @@ def run(selection: Selection, options: argparse.Namespace) -> int:
     """All rounds; the exit code. Raises ValueError, QuotaError."""
     share = contextlib.nullcontext() if options.busy is None else Quota(options.busy)
     stretch = STRETCH if options.busy is None else STRETCH * max(1.0, WHOLE_MACHINE_PERCENT / options.busy)
-    # One worker more than cores: plugin.py.
-    workers = 1 if options.busy is not None else len(os.sched_getaffinity(0)) + 1
+    workers = 1 if options.busy is not None else len(os.sched_getaffinity(0)) + WORKERS_BESIDE_CORES
     words = pytest_words(selection, options.long, stretch, workers)
     with share:
         print(f"Testing {selection.title}{'' if options.busy is None else f', on {options.busy:g} % of one core'}",
