@@ -115,8 +115,7 @@ class ControllerManagerServices:
     def _reload(self, request):
         return ReloadControllerLibrariesResponse(self._succeeds(self._do_reload, request.force_kill))
 
-    # -- the work of the services
-    # -----------------------------------------------------------------------------------------------
+    # -- the work of the services ------------------------------------------------------------------------------------
 
     def _states(self):
         return [ControllerState(loaded.name, loaded.state, loaded.kind,

@@ -41,7 +41,8 @@ class JointTrajectoryController(Controller):
     Further parameters, with their defaults:
 
     ``constraints/goal_time`` 0.0 s
-        allowed delay at a goal ``constraints/stopped_velocity_tolerance`` 0.01 rad/s or m/s
+        allowed delay at a goal
+    ``constraints/stopped_velocity_tolerance`` 0.01 rad/s or m/s
         the velocity below which a joint has stopped, at a goal
     ``constraints/<joint>/trajectory``, ``constraints/<joint>/goal`` 0 rad or m
         position error allowed on the way and at a goal; 0: any
@@ -222,8 +223,7 @@ class JointTrajectoryController(Controller):
             self.log.error("%s: goal aborted: %s" % (self.context.namespace, verdict.text))
             handle.abort(result, verdict.text)
 
-    # -- publications and queries
-    # -----------------------------------------------------------------------------------------------
+    # -- publications and queries ------------------------------------------------------------------------------------
 
     def _publish(self, time_s):
         if _take(self._state_pace, self._uptime) and self._state.has_listeners:
