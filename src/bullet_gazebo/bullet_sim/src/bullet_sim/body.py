@@ -8,6 +8,7 @@ import numpy as np
 from urdf_model import Inertial, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
+from .builder import set_collision_filter
 from .errors import BulletSimError, within
 from .pose import Pose
 from .quiet_pybullet import pybullet
@@ -204,9 +205,9 @@ class Body:
         Bullet keeps contacts from step to step, and sometimes a false one: its normal comes from two nearly parallel
         edges, and it can hold a body that should come free.
         """
-        index = self._link_index[self._frame(link).link]
-        # Every body is in group 1 and collides with all; setting this again makes Bullet drop the body's contacts.
-        pybullet.setCollisionFilterGroupMask(*self.parts.places[index], 1, -1, physicsClientId=self._client)
+        body = self._frame(link).link
+        set_collision_filter(self._client, self.parts.places[self._link_index[body]], self.merged.links[body].surface,
+                             renew=True)
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
 

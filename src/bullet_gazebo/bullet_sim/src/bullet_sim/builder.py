@@ -14,7 +14,7 @@ from urdf_model import Cylinder, MergedRobot, Robot, Sphere, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .mass_matrix import moving_inertial
-from .parts import Parts, limbs
+from .parts import Parts, Place, limbs
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE
@@ -93,6 +93,7 @@ def build(client, blueprint, pose, shapes, warn):
         pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
                                 sleepThreshold=_ASLEEP_M2_PER_S2, physicsClientId=client)
     pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0), physicsClientId=client)
+    set_collision_filter(client, Place(bodies[0], -1), root.surface)
     return Parts(client, bodies, joints), root_offset
 
 
@@ -142,8 +143,9 @@ def _build_limb(client, blueprint, numbers, base, shapes, warn):
                 physicsClientId=client,
             )
         most = _WHEEL_FRICTION if is_wheel(joint) else 1.0
-        pybullet.changeDynamics(body, local, **_contact(merged.links[joint.child].surface, most),
-                                physicsClientId=client)
+        surface = merged.links[joint.child].surface
+        pybullet.changeDynamics(body, local, **_contact(surface, most), physicsClientId=client)
+        set_collision_filter(client, Place(body, local), surface)
     return body
 
 
@@ -179,6 +181,17 @@ def _as_wheel(shape, axis):
 def is_wheel(joint):
     """Whether the link behind a joint can be a wheel: its radius decides how far it goes, its friction how it pulls."""
     return joint.type == "continuous"
+
+
+def set_collision_filter(client, place, surface, renew=False):
+    """Let the link at a Place collide with those that share a bit with it (``Surface.bitmask``); ``renew``: also where
+    it collides with all, so that Bullet drops the link's contacts."""
+    if surface is not None and surface.bitmask is not None:
+        # PyBullet's own groups are 1, and 2 for bodies without mass.
+        group = surface.bitmask << 2
+        pybullet.setCollisionFilterGroupMask(*place, group, group | 3 if group else 0, physicsClientId=client)
+    elif renew:
+        pybullet.setCollisionFilterGroupMask(*place, 1, -1, physicsClientId=client)
 
 
 def _contact(surface, most):

@@ -274,3 +274,15 @@ def test_rough_shapes_that_overlap_at_the_start_do_not_push_each_other(world, mo
     step(world, 100)
     assert np.abs(fingers.read_joints()[0]).max() < 1e-6
     assert len(told) == 1 and "l and r" in told[0]
+
+
+@pytest.mark.parametrize(("upper", "lower", "lands"), [
+    (None, None, True), (1, None, True), (1, 3, True), (1, 2, False), (0, None, False), (0x8000, 0x8000, True)])
+def test_links_collide_where_they_share_a_bit(world, upper, lower, lands):
+    table, box = parse_urdf(BOX % ""), parse_urdf(BOX % "")
+    table.links["box"].surface, box.links["box"].surface = Surface(bitmask=lower), Surface(bitmask=upper)
+    world.spawn(table, "table", Pose((0, 0, 0)), static=True)
+    falling = world.spawn(box, "falling", Pose((0, 0, 0.11)))
+    falling.renew_contacts("box")
+    step(world, 200)
+    assert (falling.base_pose().position[2] > 0.09) is lands

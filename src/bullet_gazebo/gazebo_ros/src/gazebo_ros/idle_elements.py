@@ -17,6 +17,7 @@ KNOWN = {
             "maxContacts",
     "link/collision": "max_contacts",
     "link/collision/surface/friction/ode": "mu",
+    "link/collision/surface/contact": "collide_bitmask",
     "link/collision/surface/contact/ode": "kp kd",
     **{"link/collision/" + path: names for path, names in sdf.HARMLESS.items() if path.startswith("surface")},
     "joint": "implicitSpringDamper cfmDamping springStiffness springReference provideFeedback sensor plugin "

@@ -9,7 +9,7 @@ _FORCES = "the force on the link's joint is measured in the axes of the link"
 _SOLVER = "the solver is Bullet's, not ODE's"
 _HARD_STOPS = "the stops of joints are hard"
 _ONE_MU = "friction is the same in all directions"
-_ALL_COLLIDE = "bitmasks are not compared"
+_NO_FEELING = "such a link passes through others, and its contacts are not told"
 _PLUGINS_NOISE = "the plugin's own elements say what it measures, and with which noise"
 _OWN_VIEW = "the window has a view of its own"
 
@@ -85,7 +85,7 @@ HARMLESS = {
     "visual": "meta",
     "geometry/heightmap": "use_terrain_paging sampling",
     "surface/friction": "bullet",
-    "surface/contact": "bullet",
+    "surface/contact": "bullet collide_bitmask",
     "surface": "soft_contact",
     "joint": "meta",
     "joint/physics": "provide_feedback simbody",
@@ -143,7 +143,7 @@ WITHOUT_EFFECT = (
                                     "surface_radius": "0"}, "points of contact resist no turning"),
     ("surface/friction/torsional/ode", {"slip": "0"}, "points of contact resist no turning"),
     ("surface/contact", {"collide_without_contact": "0", "collide_without_contact_bitmask": "1",
-                         "collide_bitmask": "65535|0xffff", "category_bitmask": "65535|0xffff"}, _ALL_COLLIDE),
+                         "category_bitmask": "65535|0xffff"}, _NO_FEELING),
     ("surface/contact", {"poissons_ratio": "0.3", "elastic_modulus": "-1"}, "kp alone says how stiff contacts are"),
     ("surface/contact/ode", {"soft_cfm": "0", "soft_erp": "0.2", "max_vel": "0.01", "min_depth": "0"}, _SOLVER),
     ("material", {"lighting": "true"}, "all materials are lit"),

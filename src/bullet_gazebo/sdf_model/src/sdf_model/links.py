@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface, bounds
-from urdf_model.model import MAY_BE_INFINITE
+from urdf_model.model import ALL_BITS, MAY_BE_INFINITE
 from urdf_model.transforms import pose_matrix
 
 from .materials import read_material
@@ -132,4 +132,21 @@ def _surface(document, collision):
             if used != value:
                 document.mend(part, "<%s> of %g, for which %g is used" % (tag, value, used))
             found[name] = used
+    mask = _bitmask(document, element)
+    if mask != ALL_BITS:
+        found["bitmask"] = mask
     return Surface(**found) if found else None
+
+
+def _bitmask(document, surface):
+    contact = surface.find("contact")
+    if contact is None:
+        return ALL_BITS
+    if document.flag(contact, "collide_without_contact"):
+        return 0  # it pushes nothing
+    text = document.text(contact, "collide_bitmask", hex(ALL_BITS))
+    try:
+        return int(text, 0) & ALL_BITS
+    except ValueError:
+        document.mend(contact, "<collide_bitmask> of '%s', for which %#x is used" % (text, ALL_BITS))
+        return ALL_BITS

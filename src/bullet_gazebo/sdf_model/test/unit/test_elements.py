@@ -70,7 +70,8 @@ LINK = """<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></
     ("<friction><ode><mu2>1</mu2></ode><bullet><friction>0.1</friction></bullet></friction>", ""),
     ("<friction><torsional><coefficient>0.1</coefficient><ode/></torsional></friction>", "coefficient"),
     ("<contact><collide_bitmask>65535</collide_bitmask><ode/></contact><bounce/>", ""),
-    ("<contact><collide_bitmask>2</collide_bitmask></contact>", "collide_bitmask"),
+    ("<contact><collide_bitmask>2</collide_bitmask></contact>", ""),
+    ("<contact><collide_without_contact>1</collide_without_contact></contact>", "collide_without_contact"),
     ("<contact><ode><max_vel>0.01</max_vel><min_depth>0.001</min_depth></ode></contact>", "min_depth"),
     ("<foo>1</foo>", "foo")])
 def test_what_has_an_effect_in_gazebo_alone_is_named_with_its_line(inside, named):

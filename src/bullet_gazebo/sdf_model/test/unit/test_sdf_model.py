@@ -380,6 +380,18 @@ def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
     assert (hinge.type, hinge.axis.tolist(), hinge.damping, hinge.friction) == ("continuous", [1, 0, 0], 0.5, 0.0)
 
 
+@pytest.mark.parametrize(("contact", "bitmask"), [
+    ("<collide_bitmask>0x06</collide_bitmask>", 6), ("<collide_bitmask>2</collide_bitmask>", 2),
+    ("<collide_bitmask>65535</collide_bitmask>", None), ("<collide_bitmask>all</collide_bitmask>", None),
+    ("<collide_without_contact>true</collide_without_contact>", 0)])
+def test_a_surface_has_a_bitmask(contact, bitmask):
+    found = parse_sdf_model(sdf("""<link name="a"><collision name="c"><geometry><sphere><radius>1</radius></sphere>
+        </geometry><surface><friction><ode><mu>0.5</mu></ode></friction><contact>%s</contact></surface></collision>
+        </link>""" % contact), "m.sdf")
+    assert found.robot.links["a"].surface.bitmask == bitmask
+    assert ("all" in contact) == ("collide_bitmask" in found.warning)
+
+
 def test_links_may_collide_with_their_model():
     found = parse_sdf_model(sdf('<self_collide>1</self_collide><link name="a"/><link name="b"><self_collide>0'
                                 "</self_collide></link>" + joint("j", "a", "b")), "m.sdf")

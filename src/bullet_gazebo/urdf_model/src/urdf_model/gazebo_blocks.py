@@ -11,7 +11,7 @@ from typing import Any
 
 from . import bounds
 from .materials import GLOWS, MATERIALS
-from .model import MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
+from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
 
 # Element -> field of Surface. Both spellings of the first one are in use.
 _SURFACE = {"mu": "friction", "mu1": "friction", "kp": "stiffness", "kd": "damping"}
@@ -29,6 +29,12 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
             value = _of_surface(part, field, link.name, warn)
             if value is not None:
                 found[field] = value
+    for part in element.iterfind("collision/surface/contact/collide_bitmask"):
+        try:
+            found["bitmask"] = int((part.text or "").strip(), 0) & ALL_BITS
+        except ValueError:
+            warn(part, "<collide_bitmask> of link '%s' is '%s', which is no number, and is left out"
+                 % (link.name, part.text))
     if found:
         link.surface = replace(link.surface or Surface(), **found)
     for part in element.iterchildren("selfCollide", "self_collide"):

@@ -105,6 +105,9 @@ class Mimic:
 #: Fields of Surface that may be infinite: a contact that never slides, and a rigid one.
 MAY_BE_INFINITE = ("friction", "stiffness")
 
+#: The bits of a Surface.
+ALL_BITS = 0xFFFF
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -114,6 +117,7 @@ class Surface:
     stiffness: float | None = None  # N/m, may be infinite
     damping: float | None = None  # N s/m
     restitution: float | None = None  # 0 to 1
+    bitmask: int | None = None  # two links collide where they have a bit in common; None: ALL_BITS
 
 
 @dataclass

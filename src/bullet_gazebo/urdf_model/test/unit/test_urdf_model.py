@@ -238,6 +238,12 @@ def test_damping_may_be_implicit(flag, implicit):
     assert merge_fixed(robot).joints["j"].implicit_damping is implicit
 
 
+def test_a_link_may_have_a_bitmask():
+    robot = parse_urdf("""<robot name="r"><link name="a"/><gazebo reference="a"><collision><surface><contact>
+    <collide_bitmask>0x02</collide_bitmask></contact></surface></collision></gazebo></robot>""")
+    assert robot.links["a"].surface.bitmask == 2
+
+
 def test_links_may_collide_with_their_model():
     robot = parse_urdf("""<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
     <parent link="a"/><child link="b"/></joint><gazebo reference="b"><selfCollide>false</selfCollide></gazebo>
