@@ -22,7 +22,7 @@ VENV=$LAB_ROOT/.venv
 NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
-STEPS=(apt venv pip meshes overlay build urdf kernels pictures)
+STEPS=(apt venv overlay pip meshes build urdf kernels pictures)
 # Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
@@ -128,6 +128,35 @@ wait_for_apt() {
     return 1
 }
 
+# With the virtual environment's Python, installed executables get a first line that finds its packages.
+# -j without -l, which catkin_make would add: on a busy machine make would then wait for other processes.
+build_all() { catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)" "$@"; }
+
+# The first configuration takes one core for a minute, and pip waits for the network: they run beside each other.
+# If it fails, step build does it again, and tells.
+configuring="" configured_in_part=$STATE/configuring
+start_configuring() {
+    if [[ -d build ]]; then return; fi
+    write "$configured_in_part" "until CMake has read all packages"
+    trap stop_configuring EXIT
+    set -m # a process group of its own, which can be stopped as a whole
+    { build_all cmake_check_build_system && rm -f "$configured_in_part"; } >"$LOGS/configure.log" 2>&1 </dev/null &
+    configuring=$!
+    set +m
+}
+
+stop_configuring() { if [[ -n $configuring ]]; then kill -- "-$configuring" 2>/dev/null; fi; }
+
+finish_configuring() {
+    if [[ -n $configuring ]]; then
+        wait "$configuring" || true
+        configuring=""
+        cat "$LOGS/configure.log"
+    fi
+    # What was killed may have half-written files, which CMake takes as finished.
+    if [[ -e $configured_in_part ]]; then rm -rf build devel "$configured_in_part"; fi
+}
+
 # A usable environment is Debian's Python's, sees Debian's packages, and was made in this very folder.
 venv_is_ours() {
     [[ -x $VENV/bin/pip ]] && head -n 1 "$VENV/bin/pip" | grep -qF "$VENV/bin/python" &&
@@ -164,6 +193,7 @@ step_pip() {
         note="all there"
         return
     fi
+    start_configuring
     # Wheels exist for all; without one, compiling takes minutes to hours. Other processors have no wheel of pybullet.
     if [[ $(uname -m) == x86_64 ]]; then wheels_only=(--only-binary :all:); fi
     run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" -r requirements.txt
@@ -242,6 +272,7 @@ step_build() {
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
     # First in PATH, before catkin's own.
     run ln -sfn ../../tools/catkin_make "$VENV/bin/catkin_make"
+    run finish_configuring
     # make takes a file that a killed compiler has half written as finished.
     if was_cut_off build; then
         run rm -rf build devel
@@ -255,11 +286,9 @@ step_build() {
     if [[ -f build/CMakeCache.txt ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$LAB_ROOT/src" build/CMakeCache.txt; then
         run rm -rf build devel
     fi
-    # -j without -l, which catkin_make would add: on a busy machine make would then wait for other processes.
-    # With the virtual environment's Python, installed executables get a first line that finds its packages.
-    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)" cmake_check_build_system
+    run build_all cmake_check_build_system
     run "$VENV/bin/python3" tools/generate_messages.py build
-    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)"
+    run build_all
     remove_dead_relays
     stamp "$key"
     note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"

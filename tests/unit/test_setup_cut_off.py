@@ -4,6 +4,7 @@
 The commands of the steps are fakes here, which can hang half-way or fail; test_setup_for_real.py has the real ones.
 """
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -21,9 +22,9 @@ LIMIT_S = 60
 COMMANDS = {
     "apt": "apt-get install*",
     "venv": "python3 -m venv*",
+    "overlay": "vcs import*",
     "pip": "python3 -m pip install*",
     "meshes": "cp -r*",
-    "overlay": "vcs import*",
     "build": "catkin_make*",
     "urdf": "rosrun xacro*",
     "kernels": "python3 -m baxter_sim_kinematics*",
@@ -76,7 +77,8 @@ whole_work() {
         "vcs import"*) mkdir -p "$root/src_overlay/sdk/.git"; touch "$root/src_overlay/sdk/.git/index" ;;
         "catkin_make"*)
             mkdir -p "$root/build" "$root/devel"
-            touch "$root/build/CMakeCache.txt" "$root/devel/setup.bash"
+            echo "CMAKE_HOME_DIRECTORY:INTERNAL=$root/src" >"$root/build/CMakeCache.txt"
+            touch "$root/devel/setup.bash"
             ;;
         "rosrun xacro"*) echo whole ;;
     esac
@@ -161,13 +163,23 @@ def assert_whole(root):
     assert not (root / ".baxter/at_work").exists()
 
 
+def kill_session(leader):
+    """Kill a process and all that it has started, as a machine that is switched off does."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if int((folder / "stat").read_text().rpartition(")")[2].split()[3]) == leader:
+                os.kill(int(folder.name), signal.SIGKILL)
+
+
 @pytest.mark.parametrize("step", COMMANDS)
 def test_killed_and_run_again(workspace, step):
     root, fakes = workspace
     (fakes / "hang").write_text(COMMANDS[step])
     process = start(root)
     wait_for(fakes / "hanging", process)
-    os.killpg(process.pid, signal.SIGKILL)
+    # The first configuration runs beside earlier steps.
+    wait_until(lambda: (root / ".baxter/at_work").read_text().strip() == step, "set-up to be at step " + step, LIMIT_S)
+    kill_session(process.pid)
     finish(process)
     (fakes / "hang").unlink()
     status, said = finish(start(root))
@@ -247,16 +259,16 @@ def test_an_interrupt_says_where_and_leaves_nothing_running(workspace):
 
 def test_what_outlives_a_killed_set_up_is_waited_for(workspace):
     root, fakes = workspace
-    (fakes / "hang").write_text(COMMANDS["build"])
+    (fakes / "hang").write_text(COMMANDS["pip"])
     first = start(root)
     wait_for(fakes / "hanging", first)
-    first.kill()  # set-up alone; catkin_make goes on
+    first.kill()  # set-up alone; pip goes on
     first.wait()
     (fakes / "hang").unlink()
     second = start(root)
     told = second.stdout.readline()
-    assert "another set-up is running" in told and f"step 6 of 9 ({TITLES['build']}) since " in told
-    assert (root / "build" / "half.o").exists()
+    assert "another set-up is running" in told and f"step 4 of 9 ({TITLES['pip']}) since " in told
+    assert list(root.rglob("site-packages/half"))
     os.killpg(first.pid, signal.SIGKILL)
     status, said = finish(second)
     assert status == 0, said
@@ -292,6 +304,19 @@ def test_no_network_is_told_before_apt_waits_for_it(tmp_path, source, answers, t
         command = ["bash", "-uc", script, "test", ROOT, tmp_path / "a.list"]
         done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
         assert (expected in done.stdout) and bool(done.stdout) == bool(expected), done.stdout
+
+
+def test_what_was_set_up_on_another_system_is_made_again(workspace):
+    root, _ = workspace
+    assert finish(start(root))[0] == 0
+    here = (root / ".baxter/system").read_text()
+    (root / ".baxter/system").write_text("another system\n")
+    (root / "build" / "half.o").touch()
+    (root / ".venv/lib/python3.11/site-packages/half").touch()
+    status, said = finish(start(root))
+    assert status == 0 and "another system" in said, said
+    assert_whole(root)
+    assert (root / ".baxter/system").read_text() == here
 
 
 def test_a_state_that_could_not_be_written_is_taken_for_the_worst(workspace):
