@@ -8,7 +8,7 @@ import numpy as np
 from urdf_model import Inertial, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
-from .builder import set_collision_filter
+from .builder import inertial_frame, set_collision_filter
 from .errors import BulletSimError, within
 from .pose import Pose
 from .quiet_pybullet import pybullet
@@ -35,9 +35,7 @@ class Body:
         self.parts = parts
         self._client = client
         self._world = world
-        self._root_offset = root_offset
-        self._root_offset_inverse = inverse(root_offset)
-        self._root_is_centre = bool(np.array_equal(root_offset, np.eye(4)))
+        self._set_root_offset(root_offset)
         # Pose of a fixed root, cached so that a tick need not ask for it.
         self._base_quaternion = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=client)[1]
         self._link_index = {merged.root: BASE, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
@@ -222,11 +220,12 @@ class Body:
             rotation.T @ link.inertial.inertia @ rotation,
         )
 
-    def set_inertial(self, body, mass, inertia):
-        """Set mass [kg] and inertia (3, 3) about the centre of mass [kg m^2, axes of the link's frame] of a body.
+    def set_inertial(self, body, mass, inertia, centre=None):
+        """Set mass [kg] and inertia (3, 3) about the centre of mass [kg m^2, axes of the link's frame] of a body, and
+        that ``centre`` (3,) [m, link's frame] if it is given.
 
-        Raises BulletSimError for a fixed root, for impossible values, and for an inertia with other principal axes than
-        before: PyBullet sets the axes when it makes the body.
+        The multibody is rebuilt for another centre or other principal axes, which PyBullet sets when it makes the body.
+        Raises BulletSimError for a fixed root and for impossible values.
         """
         link = self._body(body)
         index = self._link_index[body]
@@ -241,30 +240,56 @@ class Body:
             raise BulletSimError(
                 "a mass of %g kg cannot be set; expected at least %g kg" % (mass, bounds.LEAST_MASS_KG)
             )
-        rotation = self.merged.frames[body].offset[:3, :3]
+        offset = self.merged.frames[body].offset
+        rotation = offset[:3, :3]
         inertia = rotation @ inertia @ rotation.T
+        centre = link.inertial.centre if centre is None else within(
+            bounds.POSITION, offset[:3, 3] + rotation @ np.asarray(centre, dtype=float),
+            "the centre of mass of link '%s'" % body)
         arguments = {"physicsClientId": self._client}
         place = self.parts.places[index]
         info = pybullet.getDynamicsInfo(*place, **arguments)
         axes = Pose((0.0, 0.0, 0.0), info[4]).matrix()[:3, :3]
         turned = axes.T @ inertia @ axes
         moments = np.diag(turned)
+        is_turned = np.abs(turned - np.diag(moments)).max() > 1e-3 * moments.max()
+        if is_turned:
+            moments = np.linalg.eigvalsh(inertia)
         if moments.min() <= 0.0:
             raise BulletSimError("the inertia %s has a moment that is not positive" % inertia.tolist())
         if moments.min() < bounds.LEAST_INERTIA_PER_MASS_M2 * mass:
             raise BulletSimError("the inertia %s has a moment of %g kg m^2; expected at least %g for a mass of %g kg"
                                  % (inertia.tolist(), moments.min(), bounds.LEAST_INERTIA_PER_MASS_M2 * mass, mass))
-        if np.abs(turned - np.diag(moments)).max() > 1e-3 * moments.max():
-            raise BulletSimError(
-                "the principal axes of link '%s' cannot be turned; give an inertia with the present axes" % body
-            )
-        pybullet.changeDynamics(*place, mass=mass, **arguments)
-        # After the mass, which makes PyBullet guess an inertia of its own.
-        pybullet.changeDynamics(*place, localInertiaDiagonal=moments.tolist(), **arguments)
-        link.inertial = Inertial(mass, link.inertial.centre, inertia)
+        if is_turned or not np.allclose(centre, link.inertial.centre, rtol=0.0, atol=1e-9):
+            self._rebuild_with(link, Inertial(mass, centre, inertia))
+        else:
+            pybullet.changeDynamics(*place, mass=mass, **arguments)
+            # After the mass, which makes PyBullet guess an inertia of its own.
+            pybullet.changeDynamics(*place, localInertiaDiagonal=moments.tolist(), **arguments)
+            link.inertial = Inertial(mass, link.inertial.centre, inertia)
         if body in self._weightless:
             self._weightless[body] = mass
         self.wake()
+
+    def _rebuild_with(self, link, inertial):
+        """Rebuild the multibodies with another inertial of a link; poses and velocities stay."""
+        base, joints, twist, velocity = self.motion()
+        frame = self.frame_of((base,)).matrix()
+        link.inertial = inertial
+        if not self.static and link.name == self.merged.root:
+            offset = inertial_frame(link)
+            if twist is not None:
+                # PyBullet's is that of the centre of mass.
+                moved = frame[:3, :3] @ (offset[:3, 3] - self._root_offset[:3, 3])
+                twist = np.asarray(twist[0]) + np.cross(twist[1], moved), twist[1]
+            self._set_root_offset(offset)
+            pose = Pose.from_matrix(frame @ offset)
+            base = pose.position, pose.quaternion
+        self._world.rebuild([self], {self: (base, joints, twist, velocity)})
+
+    def _set_root_offset(self, offset):
+        self._root_offset, self._root_offset_inverse = offset, inverse(offset)
+        self._root_is_centre = bool(np.array_equal(offset, np.eye(4)))
 
     def has_weight(self, body):
         """Whether gravity acts on the body ``body``."""

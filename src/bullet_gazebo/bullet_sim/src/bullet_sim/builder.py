@@ -223,6 +223,11 @@ _COLUMNS = (
 )
 
 
+def inertial_frame(link):
+    """Return the inertial frame (4, 4) of a link that moves, in its body's frame."""
+    return _inertial(link, lambda text: None)[2]
+
+
 def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     given = link.inertial.mass

@@ -215,8 +215,8 @@ class Model(Body):
         within(bounds.DAMPING, damping, "the damping of joint '%s'" % self.joint_names[index])
         self._damping.set(index, damping)
 
-    def set_inertial(self, body, mass, inertia):
-        super().set_inertial(body, mass, inertia)
+    def set_inertial(self, body, mass, inertia, centre=None):
+        super().set_inertial(body, mass, inertia, centre)
         if self._link_index[body] != BASE:
             self._damping.restore_inertia(self._link_index[body])
 

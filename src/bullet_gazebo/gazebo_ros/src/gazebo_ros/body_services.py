@@ -278,18 +278,17 @@ class BodyServices:
             model, link = self._entities.link(request.link_name)
             old, had_weight = model.inertial(link), model.has_weight(link)
             pose = pose_from_msg(request.com)
-            if not np.allclose(pose.position, old.centre, atol=1e-6):
-                raise ValueError("the centre of mass of link '%s' stays at %s; it cannot be moved to %s"
-                                 % (request.link_name, _numbers(old.centre), _numbers(pose.position)))
+            centre = old.centre if np.allclose(pose.position, old.centre, atol=1e-6) else np.array(pose.position)
             inertia = np.zeros((3, 3))
             for name, i, j in _INERTIA:
                 inertia[i, j] = inertia[j, i] = getattr(request, name)
             rotation = pose.matrix()[:3, :3]
             inertia = rotation @ inertia @ rotation.T
-            if not (request.mass == old.mass and np.allclose(inertia, old.inertia, rtol=1e-12, atol=0.0)):
-                model.set_inertial(link, request.mass, inertia)
+            if not (request.mass == old.mass and np.allclose(inertia, old.inertia, rtol=1e-12, atol=0.0)
+                    and centre is old.centre):
+                model.set_inertial(link, request.mass, inertia, centre)
                 self._changes.note((model.name, link, "inertial"),
-                                   lambda: model.set_inertial(link, old.mass, old.inertia))
+                                   lambda: model.set_inertial(link, old.mass, old.inertia, old.centre))
             model.set_weight(link, request.gravity_mode)
             self._changes.note((model.name, link, "weight"), lambda: model.set_weight(link, had_weight))
         except _REFUSALS as error:
@@ -350,7 +349,3 @@ def _single(config, name):
     if values and not np.isfinite(values[0]):
         raise ValueError("%s is %s, expected a finite number" % (name, values[0]))
     return values[0] if values else None
-
-
-def _numbers(values):
-    return "(%s)" % ", ".join("%.4g" % value for value in values)

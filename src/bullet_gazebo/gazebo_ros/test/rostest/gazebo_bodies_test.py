@@ -207,7 +207,9 @@ class GazeboBodies(unittest.TestCase):
         self.advance(ticks=250)
         self.close(self.position("box::body"), (5, 0, 1.2))
         request.com.position.x = 0.1
-        self.refused(self.set_link_properties(request), "centre of mass")
+        self.accepted(self.set_link_properties(request))
+        self.assertAlmostEqual(self.get_link_properties("box::body").com.position.x, 0.1)
+        self.close(self.position("box::body"), (5, 0, 1.2))
         request.com.position.x, request.mass = 0.0, -1.0
         self.refused(self.set_link_properties(request), "positive")
         self.refused(self.get_link_properties("box::wheel"), "wheel", "body")
