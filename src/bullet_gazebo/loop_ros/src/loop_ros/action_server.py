@@ -5,12 +5,17 @@ On the wire it behaves as ``actionlib.ActionServer``; inside it works differentl
 through queues and are handled when the loop calls :meth:`ActionServer.spin`; status, feedback and results go out
 through publishers that never wait. One thread; time is an argument. Without rospy.
 """
+from __future__ import annotations
+
 import io
 import itertools
+from collections.abc import Callable
+from typing import Any
 
 import genpy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
+from loop_ros.protocol import Topics
 from sim_time.stamps import stamp
 
 #: Period of the status while nothing changes, and how long a finished goal stays in it [s].
@@ -45,45 +50,45 @@ class WrongState(Exception):
 class GoalHandle:
     """One goal: ``goal`` (the message's goal part, None for a goal that was cancelled before it came), ``status``."""
 
-    def __init__(self, server, goal, goal_id, state):
+    def __init__(self, server: ActionServer, goal: Any, goal_id: GoalID, state: int) -> None:
         self.goal = goal
         self.status = GoalStatus(goal_id=goal_id, status=state)
-        self.ended_s = None
+        self.ended_s: float | None = None
         self._server = server
 
     @property
-    def state(self):
+    def state(self) -> int:
         """One of the constants of ``actionlib_msgs/GoalStatus``."""
         return self.status.status
 
-    def accept(self, text=""):
+    def accept(self, text: str = "") -> None:
         """Start work on the goal."""
         self._step("accept", text)
 
-    def reject(self, result=None, text=""):
+    def reject(self, result: Any = None, text: str = "") -> None:
         """Refuse the goal. ``result``: message, default an empty one; the same below."""
         self._step("reject", text, result)
 
-    def cancel(self, result=None, text=""):
+    def cancel(self, result: Any = None, text: str = "") -> None:
         """End the goal early: a client cancelled it, or a new goal replaces it."""
         self._step("cancel", text, result)
 
-    def abort(self, result=None, text=""):
+    def abort(self, result: Any = None, text: str = "") -> None:
         """End the goal: the work has failed."""
         self._step("abort", text, result)
 
-    def succeed(self, result=None, text=""):
+    def succeed(self, result: Any = None, text: str = "") -> None:
         """End the goal: the work is done."""
         self._step("succeed", text, result)
 
-    def publish_feedback(self, feedback):
+    def publish_feedback(self, feedback: Any) -> None:
         """Publish the progress of the goal."""
         self._server._publish_feedback(self.status, feedback)
 
-    def _may(self, step):
+    def _may(self, step: str) -> bool:
         return self.state in _STEPS[step]
 
-    def _step(self, step, text, result=None):
+    def _step(self, step: str, text: str, result: Any = None) -> None:
         if not self._may(step):
             raise WrongState("cannot %s a goal that is %s" % (step, _STATE_NAMES[self.state]))
         self.status.status = _STEPS[step][self.state]
@@ -96,7 +101,8 @@ class GoalHandle:
 class ActionServer:
     """Serves one action. Every method belongs to the loop's thread."""
 
-    def __init__(self, topics, name, action_class, on_goal, on_cancel):
+    def __init__(self, topics: Topics, name: str, action_class: Callable[[], Any],
+                 on_goal: Callable[[GoalHandle], object], on_cancel: Callable[[GoalHandle], object]) -> None:
         """Open the five topics below ``name``.
 
         ``topics`` makes them: a ``loop_ros.protocol.Topics``. ``action_class``: e.g. ``FollowJointTrajectoryAction``.
@@ -112,13 +118,13 @@ class ActionServer:
         self._status = topics.publisher(name + "/status", GoalStatusArray, latch=True)
         self._feedback = topics.publisher(name + "/feedback", self._feedback_class)
         self._result = topics.publisher(name + "/result", self._result_class)
-        self._handles = []
+        self._handles: list[GoalHandle] = []
         self._last_cancel = genpy.Time()
         self._time_s = 0.0
-        self._next_status_s = None
+        self._next_status_s: float | None = None
         self._count = 0
 
-    def spin(self, time_s):
+    def spin(self, time_s: float) -> None:
         """Handle new goals and cancel requests, and publish the status when it is due. ``time_s``: now, control time
         [s]."""
         if time_s < self._time_s:
@@ -137,13 +143,13 @@ class ActionServer:
             self._publish_status()
 
     @property
-    def feedback_is_heard(self):
+    def feedback_is_heard(self) -> bool:
         """Whether the feedback topic has subscribers."""
         return self._feedback.has_listeners
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _take_goal(self, message):
+    def _take_goal(self, message: Any) -> None:
         goal_id = message.goal_id
         _require_answerable(goal_id)
         for handle in self._handles:
@@ -166,7 +172,7 @@ class ActionServer:
         else:
             self._call_owner(handle, self._on_goal)
 
-    def _call_owner(self, handle, callback):
+    def _call_owner(self, handle: GoalHandle, callback: Callable[[Any], Any]) -> None:
         """Call the owner's ``callback`` with a goal. If it raises, the goal is aborted, so that no client waits for
         it."""
         try:
@@ -179,7 +185,7 @@ class ActionServer:
                 handle.abort(text=text)
             raise
 
-    def _take_cancel(self, message):
+    def _take_cancel(self, message: Any) -> None:
         _require_answerable(message)
         everything = not message.id and not message.stamp
         known = False
@@ -199,7 +205,7 @@ class ActionServer:
             self._handles.append(early)
         self._last_cancel = max(self._last_cancel, message.stamp)
 
-    def _publish_result(self, handle, result):
+    def _publish_result(self, handle: GoalHandle, result: Any) -> None:
         handle.ended_s = self._time_s
         message = self._result_class(status=handle.status)
         message.header.stamp = self._now()
@@ -207,13 +213,13 @@ class ActionServer:
             message.result = result
         self._result.publish(message)
 
-    def _publish_feedback(self, status, feedback):
+    def _publish_feedback(self, status: GoalStatus, feedback: Any) -> None:
         if self._feedback.has_listeners:
             message = self._feedback_class(status=status, feedback=feedback)
             message.header.stamp = self._now()
             self._feedback.publish(message)
 
-    def _publish_status(self):
+    def _publish_status(self) -> None:
         forgotten_s = self._time_s - REMEMBERED_S
         self._handles = [handle for handle in self._handles if handle.ended_s is None or handle.ended_s > forgotten_s]
         message = GoalStatusArray(status_list=[handle.status for handle in self._handles])
@@ -221,26 +227,26 @@ class ActionServer:
         self._status.publish(message)
         self._next_status_s = self._time_s + STATUS_PERIOD_S
 
-    def _time_went_back(self):
+    def _time_went_back(self) -> None:
         self._next_status_s = None
         # After time was reset, old stamps would cancel new goals for a long while. Also, actionlib derives goal ids
         # from the time: a new goal may have the id of a finished one.
         self._last_cancel = genpy.Time()
         self._handles = [handle for handle in self._handles if handle.ended_s is None]
 
-    def _now(self):
+    def _now(self) -> genpy.Time:
         return stamp(self._time_s)
 
 
-def _require_answerable(goal_id):
+def _require_answerable(goal_id: GoalID) -> None:
     """Raise if the id cannot be serialized: genpy can read stamps that it cannot write, and then no status could be
     published."""
     goal_id.serialize(io.BytesIO())
 
 
-def _numbered(msg_class):
+def _numbered(msg_class: type) -> type:
     """``msg_class`` with a field ``arrival`` that is not on the wire: it counts the messages of all topics."""
-    def deserialize(self, data):
+    def deserialize(self: Any, data: bytes) -> Any:
         self.arrival = next(_arrivals)
         return msg_class.deserialize(self, data)
 

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors that the loop catches and survives: counted for /diagnostics, logged at a limited rate. ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import os
 import time
+from collections.abc import Callable
+from typing import Any, Protocol
 
 #: Exceptions of user code that the loop catches. ``sys.exit`` in a callback does not end the simulator.
 SURVIVED = (Exception, SystemExit)
@@ -19,23 +23,27 @@ class Fault:
 
     __slots__ = ("count", "text", "told_s")
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count = 0
         self.text = ""
-        self.told_s = None
+        self.told_s: float | None = None
+
+
+class _ErrorLog(Protocol):
+    def error(self, text: str) -> object: ...
 
 
 class Faults:
     """Counts faults by place: a topic, a service, a part of the loop. Callable from any thread."""
 
-    def __init__(self, log, clock=time.monotonic):
+    def __init__(self, log: _ErrorLog, clock: Callable[[], float] = time.monotonic) -> None:
         """``log``: ``error(text)``. ``clock`` is replaceable for tests."""
         self._log = log
         self._clock = clock
         #: {place: Fault}, in the order in which places were first noted.
-        self.places = {}
+        self.places: dict[str, Fault] = {}
 
-    def note(self, place, error, consequence="it is left out"):
+    def note(self, place: str, error: BaseException, consequence: str = "it is left out") -> None:
         """Count ``error`` at ``place``, and log it unless that place was logged recently."""
         fault = self.places.get(place)
         if fault is None:
@@ -51,7 +59,7 @@ class Faults:
             again = "" if fault.count == 1 else " (%d times by now)" % fault.count
             self._log.error("%s: %s; %s%s" % (place, fault.text, consequence, again))
 
-    def guarded(self, place, function, *arguments):
+    def guarded(self, place: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call ``function(*arguments)`` and return its result. If it raises, count the error and return None."""
         try:
             return function(*arguments)
@@ -60,7 +68,7 @@ class Faults:
             return None
 
 
-def described(error):
+def described(error: BaseException) -> str:
     """An exception in one line: its type, the beginning of its text, and where it was raised."""
     text = " ".join(str(error).split())
     if len(text) > _TEXT_CHARACTERS:

@@ -5,7 +5,10 @@
 :class:`loop_ros.node_handle.NodeHandle`, which uses a :class:`LoopRos`. The simulator's implementation is
 ``loop_ros.ros_objects.RosObjects``; tests use ``loop_ros.testing.FakeRos``. Nothing here waits.
 """
-from typing import Protocol
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
 
 
 class Publisher(Protocol):
@@ -15,64 +18,66 @@ class Publisher(Protocol):
     has_listeners: bool
     #: Function without arguments -> messages, or None. While the world is paused, when nothing else is published, who
     #: connects gets these: the state that the world is in.
-    present: object
+    present: Callable[[], list[Any]] | None
 
-    def publish(self, message):
+    def publish(self, message: Any) -> None:
         """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` if it cannot be serialized."""
 
-    def renew(self):
+    def renew(self) -> None:
         """The state that ``present`` tells is another one: in a paused world, everybody gets it."""
 
-    def close(self):
+    def close(self) -> None:
         """Stop publishing."""
 
 
 class Subscription(Protocol):
     """One topic that is subscribed to. It keeps up to ``depth`` unread messages for the loop."""
 
-    def take(self):
+    def take(self) -> Any:
         """The newest unread message, or None; older ones are dropped."""
+        ...
 
-    def drain(self):
+    def drain(self) -> list[Any]:
         """All unread messages, oldest first: a list."""
+        ...
 
-    def handle(self, handler):
+    def handle(self, handler: Callable[[Any], Any]) -> None:
         """Call ``handler(message)`` for each unread message, oldest first; if it raises, the message is dropped and the
         error is counted."""
 
-    def guarded(self, handler, *arguments):
+    def guarded(self, handler: Callable[[Any], Any], *arguments: Any) -> None:
         """Call ``handler(*arguments)``; an error is counted as the fault of a message."""
 
-    def close(self):
+    def close(self) -> None:
         """Unsubscribe and drop the unread messages."""
 
 
 class Service(Protocol):
     """A service that is served."""
 
-    def close(self):
+    def close(self) -> None:
         """No longer serve it. Closing it twice does no harm."""
 
 
 class Log(Protocol):
     """Lines of the log. The throttled ones come at most once in ``period_s`` wall seconds from a place in the code."""
 
-    def info(self, text):
+    def info(self, text: str) -> None:
         """A line at level info."""
 
-    def warn(self, text):
+    def warn(self, text: str) -> None:
         """A line at level warning."""
 
-    def error(self, text):
+    def error(self, text: str) -> None:
         """A line at level error."""
 
-    def info_throttle(self, period_s, text):
+    def info_throttle(self, period_s: float, text: str) -> None:
         """As ``info``."""
 
-    def warn_throttle(self, period_s, text):
+    def warn_throttle(self, period_s: float, text: str) -> None:
         """As ``warn``."""
 
-    def error_throttle(self, period_s, text):
+    def error_throttle(self, period_s: float, text: str) -> None:
         """As ``error``."""
 
 
@@ -80,23 +85,26 @@ class Topics(Protocol):
     """Makes the publishers, subscriptions and services of one owner. Names are absolute or relative to the owner's
     namespace."""
 
-    def publisher(self, topic, msg_class, latch=False) -> Publisher:
+    def publisher(self, topic: str, msg_class: type, latch: bool = False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message."""
+        ...
 
-    def subscription(self, topic, msg_class, depth=1) -> Subscription:
+    def subscription(self, topic: str, msg_class: type, depth: int = 1) -> Subscription:
         """Subscribe to ``topic``; ``depth``: how many unread messages are kept, the newest ones, at least 1."""
+        ...
 
-    def service(self, name, srv_class, handler) -> Service:
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> Service:
         """Serve ``name``; ``handler(request)`` runs in the loop between two ticks and returns the response."""
+        ...
 
-    def close(self):
+    def close(self) -> None:
         """Close all of them."""
 
 
 class Faults(Protocol):
     """Errors that the loop survives, counted by place."""
 
-    def note(self, place, error, consequence=""):
+    def note(self, place: str, error: BaseException, consequence: str = "") -> None:
         """Count ``error`` at ``place``: a topic, a service, a part of the loop."""
 
 
@@ -106,39 +114,51 @@ class LoopRos(Protocol):
 
     faults: Faults
 
-    def publisher(self, topic, msg_class, latch=False, greet=False) -> Publisher:
+    def publisher(self, topic: str, msg_class: type, latch: bool = False, greet: bool = False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, but without the
         latched flag."""
+        ...
 
-    def subscription(self, topic, msg_class, depth=1, notice=lambda: None) -> Subscription:
+    def subscription(self, topic: str, msg_class: type, depth: int = 1,
+                     notice: Callable[[], object] = lambda: None) -> Subscription:
         """As :meth:`Topics.subscription`; ``notice()`` is called after each message, in any thread."""
+        ...
 
-    def service(self, name, srv_class, handler) -> Service:
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> Service:
         """As :meth:`Topics.service`."""
+        ...
 
-    def service_in_thread(self, name, srv_class, handler) -> Service:
+    def service_in_thread(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> Service:
         """Serve ``name``; ``handler(request)`` runs in a separate thread."""
+        ...
 
-    def served(self):
+    def served(self) -> list[str]:
         """Names of the services that are served now: a list."""
+        ...
 
-    def subscribed(self):
+    def subscribed(self) -> list[str]:
         """Names of the topics that are subscribed to now: a list."""
+        ...
 
-    def withdraw(self, name):
+    def withdraw(self, name: str) -> Callable[[Any], Any] | None:
         """Close all owners' service and subscriptions of this name; returns the service's handler, or None where there
         is no such service."""
+        ...
 
-    def call_in_loop(self, function, *arguments):
+    def call_in_loop(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Any thread but the loop's: call ``function(*arguments)`` in the loop between two ticks; return its result or
         raise its error."""
+        ...
 
-    def deliveries(self):
+    def deliveries(self) -> dict[str, int]:
         """How many messages the subscriptions have received: {topic: count}."""
+        ...
 
-    def reads(self):
+    def reads(self) -> int:
         """How often the loop has read what has come for its subscriptions. Between two ticks with the same number, no
         message could arrive."""
+        ...
 
-    def flush(self, timeout_s=10.0):
+    def flush(self, timeout_s: float = 10.0) -> bool:
         """Any thread but the loop's: wait until everything that was opened is registered; returns whether it is."""
+        ...

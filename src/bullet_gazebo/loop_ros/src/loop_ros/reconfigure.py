@@ -4,8 +4,12 @@
 Nothing here waits and nothing starts a thread: requests are answered in the loop's thread, messages go out through
 publishers that do not block.
 """
+from __future__ import annotations
+
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import rospy
 from dynamic_reconfigure.msg import (
@@ -19,6 +23,8 @@ from dynamic_reconfigure.msg import (
     ParamDescription,
 )
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
+
+from loop_ros.protocol import Topics
 
 __all__ = ["Setting", "SettingsServer"]
 
@@ -43,10 +49,10 @@ class Setting:
     meaning: str = ""
 
     @property
-    def kind(self):
+    def kind(self) -> type:
         return type(self.value)
 
-    def checked(self, value):
+    def checked(self, value: Any) -> Any:
         """``value`` clamped to the range; raises ``ValueError`` if it is not finite."""
         if not math.isfinite(value):
             raise ValueError("%s is %s, expected a finite number" % (self.name, value))
@@ -56,7 +62,8 @@ class Setting:
 class SettingsServer:
     """Serves the settings of one name. Every method belongs to the loop's thread."""
 
-    def __init__(self, topics, name, settings, apply):
+    def __init__(self, topics: Topics, name: str, settings: Iterable[Setting],
+                 apply: Callable[[dict[str, Any]], object]) -> None:
         """Open ``<name>/set_parameters``, ``<name>/parameter_descriptions`` and ``<name>/parameter_updates``.
 
         ``topics`` makes them: a ``loop_ros.protocol.Topics``, of which ``publisher`` and ``service`` are called.
@@ -72,7 +79,7 @@ class SettingsServer:
         topics.service(name + "/set_parameters", Reconfigure, self._answer)
         self._updates.publish(self._config(self.values))
 
-    def show(self, **values):
+    def show(self, **values: Any) -> None:
         """Publish values that did not change through the service."""
         if any(self.values[name] != value for name, value in values.items()):
             self.values.update(values)
@@ -80,7 +87,7 @@ class SettingsServer:
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _answer(self, request):
+    def _answer(self, request: Any) -> ReconfigureResponse:
         values = dict(self.values)
         try:
             for kind, (_, field, _) in _KINDS.items():
@@ -94,7 +101,7 @@ class SettingsServer:
         self.show(**values)
         return ReconfigureResponse(self._config(self.values))
 
-    def _setting(self, name, kind):
+    def _setting(self, name: str, kind: type) -> Setting:
         setting = self._settings.get(name)
         if setting is None:
             raise ValueError("there is no setting '%s'; settings: %s" % (name, ", ".join(self._settings)))
@@ -102,14 +109,14 @@ class SettingsServer:
             raise ValueError("%s is a %s, not a %s" % (name, _KINDS[setting.kind][0], _KINDS.get(kind, ("str",))[0]))
         return setting
 
-    def _config(self, values):
+    def _config(self, values: dict[str, Any]) -> Config:
         config = Config(groups=[GroupState(_GROUP, True, 0, 0)])
         for name, value in values.items():
             _, field, message = _KINDS[self._settings[name].kind]
             getattr(config, field).append(message(name, value))
         return config
 
-    def _description(self):
+    def _description(self) -> ConfigDescription:
         settings = self._settings.values()
         parameters = [ParamDescription(setting.name, _KINDS[setting.kind][0], 0, setting.meaning, "")
                       for setting in settings]

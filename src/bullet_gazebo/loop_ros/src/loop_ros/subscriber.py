@@ -5,6 +5,8 @@ rospy connects and handshakes; from then on the loop reads the sockets itself. r
 take the interpreter lock from the loop twice per message (docs/decisions/0006). Nothing here imports rospy, so that it
 can be tested with plain pairs of sockets.
 """
+from __future__ import annotations
+
 import collections
 import ctypes
 import errno
@@ -14,6 +16,8 @@ import socket
 import struct
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 from rospy_limits.limits import size_fault
 
@@ -50,7 +54,8 @@ _EMPTY = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 class Connection:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
-    def __init__(self, connected, deliver, largest_bytes, held=b""):
+    def __init__(self, connected: socket.socket, deliver: Callable[[bytes], object], largest_bytes: int,
+                 held: bytes = b"") -> None:
         """``connected``: a connected stream socket. A duplicate of it is read, because rospy may close it at any time.
         ``deliver(data)`` takes the bytes of each message, in the loop. A message longer than ``largest_bytes`` ends the
         connection. ``held``: bytes that were read already and are not delivered yet."""
@@ -64,11 +69,11 @@ class Connection:
         #: Reason of the end; "" if the publisher simply closed the connection.
         self.fault = ""
 
-    def fileno(self):
+    def fileno(self) -> int:
         """The file descriptor; -1 when the connection has ended."""
         return self._socket.fileno()
 
-    def read(self, buffer):
+    def read(self, buffer: ctypes.Array[ctypes.c_char]) -> bool:
         """Read one portion and deliver the complete messages; returns whether there may be more.
 
         ``buffer``: a ctypes array to read into, of LARGEST_PORTION_BYTES.
@@ -84,7 +89,7 @@ class Connection:
         self.deliver_complete()
         return count == portion and not self.ended.is_set()
 
-    def deliver_complete(self):
+    def deliver_complete(self) -> None:
         """Deliver the complete messages, in the loop. ``read`` calls it; it is also called once before the first
         read."""
         held, start = self._held, 0
@@ -100,13 +105,13 @@ class Connection:
             start = end
         del held[:start]
 
-    def end(self, fault=""):
+    def end(self, fault: str = "") -> None:
         """Stop reading, in the loop or when the loop has ended."""
         self.fault = fault
         self._socket.close()
         self.ended.set()
 
-    def _portion(self):
+    def _portion(self) -> int:
         missing = 0
         if len(self._held) >= _LENGTH.size:
             missing = _LENGTH.unpack_from(self._held)[0] + _LENGTH.size - len(self._held)
@@ -120,24 +125,24 @@ class SubscriberHub:
     near: what follows from the number must not depend on the wall clock.
     """
 
-    def __init__(self, clock=time.perf_counter):
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
         """No connections yet. ``clock`` is replaceable for tests."""
         self.reads = 0
         self._clock = clock
-        self._new = collections.deque()
+        self._new: collections.deque[Connection] = collections.deque()
         self._closed = False
-        self._connections = []
-        self._entries = None
+        self._connections: list[Connection] = []
+        self._entries: Any = ()  # a ctypes array of _PollEntry, one for each connection
         self._looked_at = -LOOK_PERIOD_S
         self._buffer = (ctypes.c_char * LARGEST_PORTION_BYTES)()
 
-    def add(self, connection):
+    def add(self, connection: Connection) -> None:
         """Any thread: add a :class:`Connection`, to be read from the next turn on."""
         self._new.append(connection)
         if self._closed:
             connection.end()
 
-    def service(self):
+    def service(self) -> None:
         """Loop thread: deliver the messages that have arrived. Never waits."""
         self.reads += 1
         if self._new:
@@ -158,7 +163,7 @@ class SubscriberHub:
         if any(connection.ended.is_set() for connection in ready):
             self._follow([connection for connection in self._connections if not connection.ended.is_set()])
 
-    def close(self):
+    def close(self) -> None:
         """Call when the loop has ended: end all connections."""
         self._closed = True
         self._take_new()
@@ -166,7 +171,7 @@ class SubscriberHub:
             connection.end()
         self._follow([])
 
-    def _take_new(self):
+    def _take_new(self) -> None:
         connections = self._connections
         while self._new:
             connection = self._new.popleft()
@@ -175,13 +180,13 @@ class SubscriberHub:
                 connections = [*connections, connection]
         self._follow(connections)
 
-    def _follow(self, connections):
+    def _follow(self, connections: list[Connection]) -> None:
         self._connections = connections
         self._entries = (_PollEntry * len(connections))(
             *(_PollEntry(connection.fileno(), select.POLLIN, 0) for connection in connections))
 
 
-def _survive(connection, function, *arguments):
+def _survive(connection: Connection, function: Callable[..., Any], *arguments: Any) -> Any:
     """The result of ``function(*arguments)``. An error that nobody foresaw, such as no memory for a message, ends this
     connection: those behind it must be read."""
     try:

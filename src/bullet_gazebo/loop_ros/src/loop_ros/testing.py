@@ -4,7 +4,11 @@
 ``test_fake_ros.py`` runs the same cases against this and the simulator's own code. Subscriptions, faults and the
 answers of services are the real code.
 """
+from __future__ import annotations
+
 import io
+from collections.abc import Callable
+from typing import Any
 
 from loop_ros.faults import Faults
 from loop_ros.names import checked_name
@@ -15,32 +19,33 @@ from loop_ros.subscription import Subscription
 class FakeLog:
     """``lines``: the texts of all levels, in their order. The throttled variants keep every line."""
 
-    def __init__(self):
-        self.lines, self._levels = [], []
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._levels: list[str] = []
 
-    def info(self, text):
+    def info(self, text: str) -> None:
         self._take("info", text)
 
-    def warn(self, text):
+    def warn(self, text: str) -> None:
         self._take("warn", text)
 
-    def error(self, text):
+    def error(self, text: str) -> None:
         self._take("error", text)
 
-    def info_throttle(self, period_s, text):
+    def info_throttle(self, period_s: float, text: str) -> None:
         self._take("info", text)
 
-    def warn_throttle(self, period_s, text):
+    def warn_throttle(self, period_s: float, text: str) -> None:
         self._take("warn", text)
 
-    def error_throttle(self, period_s, text):
+    def error_throttle(self, period_s: float, text: str) -> None:
         self._take("error", text)
 
-    def of(self, level):
+    def of(self, level: str) -> list[str]:
         """The texts of one level."""
         return [text for found, text in zip(self._levels, self.lines, strict=True) if found == level]
 
-    def _take(self, level, text):
+    def _take(self, level: str, text: str) -> None:
         self.lines.append(text)
         self._levels.append(level)
 
@@ -48,11 +53,11 @@ class FakeLog:
 class FakeFaults(Faults):
     """``noted``: list of (place, error)."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(FakeLog())
-        self.noted = []
+        self.noted: list[tuple[str, BaseException]] = []
 
-    def note(self, place, error, consequence="it is left out"):
+    def note(self, place: str, error: BaseException, consequence: str = "it is left out") -> None:
         self.noted.append((place, error))
         super().note(place, error, consequence)
 
@@ -65,29 +70,33 @@ class FakeRos:
     :class:`FakeFaults`.
     """
 
-    def __init__(self, heard=lambda topic: True, clock=lambda: 0.0):
+    def __init__(self, heard: Callable[[str], bool] = lambda topic: True,
+                 clock: Callable[[], float] = lambda: 0.0) -> None:
         """``heard(topic)``: whether the topic has a subscriber from the start; ``clock()``: see
         :attr:`FakePublisher.timed`."""
-        self.publishers, self.subscriptions, self.services = {}, {}, {}
+        self.publishers: dict[str, FakePublisher] = {}
+        self.subscriptions: dict[str, FakeTopic] = {}
+        self.services: dict[str, Callable[[Any], Any]] = {}
         self.faults = FakeFaults()
         self._heard, self._clock = heard, clock
-        self._handlers = {}  # name: (service, handler)
-        self._delivered_before = {}
+        self._handlers: dict[str, tuple[_FakeService, Callable[[Any], Any]]] = {}
+        self._delivered_before: dict[str, int] = {}
         self._reads = 0
 
-    def publisher(self, topic, msg_class, latch=False, greet=False):
+    def publisher(self, topic: str, msg_class: type, latch: bool = False, greet: bool = False) -> FakePublisher:
         _check(topic)
         first = self.publishers.get(topic)
         sent = _Sent(self._heard(topic), self._clock) if first is None else first._sent
         return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
 
-    def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
+    def subscription(self, topic: str, msg_class: type, depth: int = 1,
+                     notice: Callable[[], object] = lambda: None) -> Subscription:
         _check(topic)
         subscription = Subscription(depth, notice, self._counting(topic))
         subscribed = self.subscriptions.setdefault(topic, FakeTopic(msg_class))
         subscribed.all.append(subscription)
 
-        def leave():
+        def leave() -> None:
             if subscription in subscribed.all:
                 self._delivered_before[topic] = self._delivered_before.get(topic, 0) + subscription.delivered
                 subscribed.all.remove(subscription)
@@ -97,23 +106,23 @@ class FakeRos:
         subscription.on_close = leave
         return subscription
 
-    def service(self, name, srv_class, handler):
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> _FakeService:
         _check(name)
         service = _FakeService(self, name)
         self._handlers[name] = service, handler
         self.services[name] = answering(name, handler, self.faults)
         return service
 
-    def service_in_thread(self, name, srv_class, handler):
+    def service_in_thread(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> _FakeService:
         return self.service(name, srv_class, handler)
 
-    def served(self):
+    def served(self) -> list[str]:
         return list(self.services)
 
-    def subscribed(self):
+    def subscribed(self) -> list[str]:
         return list(self.subscriptions)
 
-    def withdraw(self, name):
+    def withdraw(self, name: str) -> Callable[[Any], Any] | None:
         if name in self.subscriptions:
             self.subscriptions[name].close()
         service, handler = self._handlers.get(name, (None, None))
@@ -121,32 +130,32 @@ class FakeRos:
             service.close()
         return handler
 
-    def call_in_loop(self, function, *arguments):
+    def call_in_loop(self, function: Callable[..., Any], *arguments: Any) -> Any:
         return function(*arguments)
 
-    def deliveries(self):
+    def deliveries(self) -> dict[str, int]:
         return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscribed.all)
                 for topic, subscribed in self.subscriptions.items()}
 
-    def reads(self):
+    def reads(self) -> int:
         # Messages arrive at any time.
         self._reads += 1
         return self._reads
 
-    def flush(self, timeout_s=10.0):
+    def flush(self, timeout_s: float = 10.0) -> bool:
         return True
 
-    def close(self):
+    def close(self) -> None:
         for opened in [*self.publishers.values(), *self.subscriptions.values()]:
             opened.close()
         for service, _ in list(self._handlers.values()):
             service.close()
 
-    def _counting(self, topic):
+    def _counting(self, topic: str) -> Callable[[BaseException], None]:
         return lambda error: self.faults.note(topic, error, "the message is dropped")
 
 
-def _check(name):
+def _check(name: str) -> None:
     """Tests may leave out the leading slash."""
     checked_name(name if name.startswith("/") else "/" + name)
 
@@ -154,12 +163,13 @@ def _check(name):
 class _Sent:
     """The messages of all publishers of a topic while it had a subscriber."""
 
-    def __init__(self, heard, clock):
+    def __init__(self, heard: bool, clock: Callable[[], float]) -> None:
         self.heard, self.clock = heard, clock
-        self.messages, self.times = [], []
-        self.last = None
+        self.messages: list[Any] = []
+        self.times: list[float] = []
+        self.last: Any = None
 
-    def send(self, message):
+    def send(self, message: Any) -> None:
         self.messages.append(message)
         self.times.append(self.clock())
 
@@ -172,9 +182,11 @@ class FakePublisher:
     gets the last message. ``renewed``: how often :meth:`renew` was called; there is no pause here.
     """
 
-    def __init__(self, sent, msg_class, keeps_last, publishers, topic):
+    def __init__(self, sent: _Sent, msg_class: type, keeps_last: bool, publishers: dict[str, FakePublisher],
+                 topic: str) -> None:
         self.topic, self.msg_class, self.is_closed = topic, msg_class, False
-        self.present, self.renewed = None, 0
+        self.present: Callable[[], list[Any]] | None = None
+        self.renewed = 0
         self.keeps_last = keeps_last
         self._sent = sent
         self._publishers = publishers
@@ -182,29 +194,29 @@ class FakePublisher:
         publishers.setdefault(topic, self)
 
     @property
-    def messages(self):
+    def messages(self) -> list[Any]:
         return self._sent.messages
 
     @property
-    def timed(self):
+    def timed(self) -> list[tuple[float, Any]]:
         """[(the clock's time, message)]"""
         return list(zip(self._sent.times, self._sent.messages, strict=True))
 
     @property
-    def has_listeners(self):
+    def has_listeners(self) -> bool:
         return self._sent.heard and not self.is_closed
 
     @has_listeners.setter
-    def has_listeners(self, heard):
+    def has_listeners(self, heard: bool) -> None:
         late = heard and not self._sent.heard
         self._sent.heard = heard
         if late and self._sent.last is not None:
             self._sent.send(self._sent.last)
 
-    def renew(self):
+    def renew(self) -> None:
         self.renewed += 1
 
-    def publish(self, message):
+    def publish(self, message: Any) -> None:
         if self.is_closed or not (self.keeps_last or self._sent.heard):
             return
         if getattr(message, "_has_header", False):
@@ -218,7 +230,7 @@ class FakePublisher:
         if self.keeps_last:
             self._sent.last = received
 
-    def close(self):
+    def close(self) -> None:
         self.is_closed = True
         if self._publishers.get(self.topic) is self:
             del self._publishers[self.topic]
@@ -227,23 +239,24 @@ class FakePublisher:
 class FakeTopic:
     """All subscriptions to one topic: ``put`` a message into each of them."""
 
-    def __init__(self, msg_class):
-        self.msg_class, self.all = msg_class, []
+    def __init__(self, msg_class: type) -> None:
+        self.msg_class = msg_class
+        self.all: list[Subscription] = []
 
-    def put(self, message):
+    def put(self, message: Any) -> None:
         for subscription in list(self.all):
             subscription.put(message)
 
-    def close(self):
+    def close(self) -> None:
         for subscription in list(self.all):
             subscription.close()
 
 
 class _FakeService:
-    def __init__(self, ros, name):
+    def __init__(self, ros: FakeRos, name: str) -> None:
         self._ros, self._name = ros, name
 
-    def close(self):
+    def close(self) -> None:
         service, _ = self._ros._handlers.get(self._name, (None, None))
         if service is self:
             del self._ros._handlers[self._name], self._ros.services[self._name]
