@@ -72,6 +72,7 @@ class Model(Body):
         count = len(joints)
         self._all = list(range(count))
         self._packing = struct.Struct("%dd" % (3 * count))
+        self._told = None  # bytes of the last `drive_position`, if no other drive has come since
         self._reading, self._read_at = None, -1  # the last result of `read_joints`, and the number of steps then
         self._sizes = 0.0, 0.0, 0.0  # lengths of Bullet's vectors of positions, velocities and efforts then
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
@@ -135,6 +136,9 @@ class Model(Body):
         ``position`` is the set-point at the end of the step. With ``velocity`` (k,), the set-point's own velocity, a
         moving set-point is followed without lag.
         """
+        told = [None if values is None else values.tobytes() for values in (index, position, max_effort, velocity)]
+        if told == self._told:
+            return  # Bullet's motors keep what they were told, and a robot at rest is told the same at each tick
         self._drive_otherwise(index)
         gains = len(index)
         if velocity is not None:
@@ -151,9 +155,11 @@ class Model(Body):
             positionGains=[POSITION_GAIN] * gains,
             velocityGains=[1.0] * gains,
         )
+        self._told = told
 
     def drive_velocity(self, index, velocity, max_effort):
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
+        self._told = None
         self._drive_otherwise(index)
         velocity = velocity.tolist()
         self._refuse_nan(index, velocity, "velocity")
@@ -227,6 +233,7 @@ class Model(Body):
 
     def step_changed(self):
         """For World: the length of a tick has changed."""
+        self._told = None  # Bullet turns the greatest effort into an impulse of a tick
         self._damping.step_changed(self._world.time_step_s)
         if self.springs is not None:
             self.springs.step_changed(self._world.time_step_s)

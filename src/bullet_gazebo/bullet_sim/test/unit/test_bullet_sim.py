@@ -133,6 +133,36 @@ def test_a_damped_arm_may_have_an_inertia_that_no_body_has(world):
     assert arm.read_joints()[1] == pytest.approx([0.2, 0.2], abs=0.01)
 
 
+def test_a_drive_that_is_told_the_same_again_moves_the_same(monkeypatch):
+    """Bit for bit, though Bullet is told once; whatever else happens to the joints or the step in between."""
+    motions, calls = [], []
+    for always_tells in (True, False):
+        world = World()
+        model = world.spawn(parse_urdf(ARM), "arm", static=True)
+        command = model.parts.command
+        if not always_tells:
+            monkeypatch.setattr(model.parts, "command", lambda *a, tell=command, **c: calls.append(a) or tell(*a, **c))
+        target, rows = np.array([-0.4, 0.8]), []
+        between = {40: lambda m: m.drive_velocity(BOTH, np.ones(2), m.max_effort), 60: lambda m: m.release(BOTH),
+                   80: lambda m: m.drive_effort(BOTH, np.ones(2)), 100: lambda m: m.carry(BOTH[:1], np.zeros(1)),
+                   120: lambda m: m.set_joint_positions(BOTH, np.zeros(2)),
+                   140: lambda m: m._world.set_time_step(0.001), 160: lambda m: m._world.rebuild([m])}
+        for tick in range(180):
+            if tick in between:
+                between[tick](model)
+                if tick % 40 == 0:
+                    world.step()
+            if always_tells:
+                model._told = None
+            model.drive_position(BOTH, target, 0.5 * model.max_effort)
+            world.step()
+            rows.append([values.tobytes() for values in model.read_joints()])
+        motions.append(rows)
+        world.close()
+    assert motions[0] == motions[1]
+    assert len(calls) < 30
+
+
 def test_position_drive_holds_and_reports_the_gravity_torque(world, arm):
     target = np.array([0.3, -0.7])
     arm.set_joint_positions(BOTH, target)
