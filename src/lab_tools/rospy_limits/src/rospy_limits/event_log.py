@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Log lines for events that others can cause at any rate. ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import threading
 import time
+from collections.abc import Callable, Hashable
 
 PERIOD_S = 60.0
 # A line quotes what others send. Its longest text [characters]; kinds that are remembered, the oldest are forgotten.
@@ -19,14 +22,14 @@ def printable(text: str) -> str:
 class EventLog:
     """One line for the first event of a kind, then at most one a minute, with the count since then."""
 
-    def __init__(self, write, clock=time.monotonic):
+    def __init__(self, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         """``write(text)`` takes a line; ``clock`` is replaceable for tests."""
         self._write = write
         self._clock = clock
         self._lock = threading.Lock()
-        self._kinds = {}
+        self._kinds: dict[Hashable, tuple[float, int]] = {}
 
-    def add(self, kind, text):
+    def add(self, kind: Hashable, text: str) -> None:
         """Any thread: note an event of ``kind`` (hashable); ``text`` describes it."""
         now = self._clock()
         with self._lock:

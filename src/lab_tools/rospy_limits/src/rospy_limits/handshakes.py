@@ -4,6 +4,8 @@
 One thread serves them all: a client that sends nothing, or a byte a second, delays nobody. Each connection has a
 deadline, and each address a maximum number of connections.
 """
+from __future__ import annotations
+
 import collections
 import contextlib
 import errno
@@ -12,9 +14,12 @@ import socket
 import struct
 import time
 import weakref
+from collections.abc import Callable
+from typing import Any
 
 from rospy_limits import limits
-from rospy_limits.threads import SURVIVED, lasting
+from rospy_limits.event_log import EventLog
+from rospy_limits.threads import SURVIVED, ThreadFaults, lasting
 
 _LENGTH = struct.Struct("<I")
 _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
@@ -31,14 +36,14 @@ KEEPALIVE = (60, 10, 9)
 class _Pending:
     __slots__ = ("socket", "address", "deadline", "data", "wanted")
 
-    def __init__(self, connection, address, deadline):
+    def __init__(self, connection: socket.socket, address: tuple[str, int], deadline: float) -> None:
         self.socket = connection
         self.address = address
         self.deadline = deadline
         self.data = bytearray()
         self.wanted = _LENGTH.size
 
-    def read(self):
+    def read(self) -> bool:
         """Read available bytes; returns whether the header is complete. Raises ``OSError`` and ``HeaderRefused``."""
         while True:
             portion = self.socket.recv(min(self.wanted - len(self.data), 65536))
@@ -62,7 +67,7 @@ class HeaderRefused(Exception):
     """A client's data is not a valid handshake header; the text says why."""
 
 
-def _notice_lost_peers(connection):
+def _notice_lost_peers(connection: socket.socket) -> None:
     """Enable TCP keep-alive, as rospy does on connections that it makes."""
     with contextlib.suppress(OSError, AttributeError):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -74,7 +79,8 @@ def _notice_lost_peers(connection):
 class HandshakeServer:
     """Serves one listening socket until :meth:`close`."""
 
-    def __init__(self, listener, serve, events, faults, clock=time.monotonic):
+    def __init__(self, listener: socket.socket, serve: Callable[..., Any], events: EventLog, faults: ThreadFaults,
+                 clock: Callable[[], float] = time.monotonic) -> None:
         """``listener``: a listening socket, which the caller still owns. ``serve(connection, address, header)`` takes
         over a connection with its header [bytes, from the length on]; it must not wait for the client, and where it
         raises, the connection is closed. ``events``: :class:`EventLog`; ``faults``:
@@ -96,19 +102,19 @@ class HandshakeServer:
         self._selector.register(listener, selectors.EVENT_READ)
 
     @property
-    def pending(self):
+    def pending(self) -> int:
         """Number of connections in their handshake."""
         return len(self._pending)
 
-    def close(self):
+    def close(self) -> None:
         """Any thread: end :meth:`run`."""
         self._closing = True
         with contextlib.suppress(OSError):
             self._waker.send(b"x")
 
-    def run(self):
+    def run(self) -> None:
         """Serve until :meth:`close`, whatever comes."""
-        def serve(ends):
+        def serve(ends: Callable[[], bool]) -> None:
             while not ends():
                 self.turn()
 
@@ -121,7 +127,7 @@ class HandshakeServer:
             self._wake.close()
             self._waker.close()
 
-    def turn(self, timeout_s=None):
+    def turn(self, timeout_s: float | None = None) -> None:
         """Wait for data, a deadline or ``timeout_s`` [s]; then handle it."""
         ready = self._selector.select(self._timeout() if timeout_s is None else timeout_s)
         # First those with data: only silent connections may be closed to make room.
@@ -132,13 +138,13 @@ class HandshakeServer:
             self._accept()
         self._expire()
 
-    def _timeout(self):
+    def _timeout(self) -> float | None:
         deadlines = [] if self._paused_until is None else [self._paused_until]
         if self._pending:
             deadlines.append(next(iter(self._pending.values())).deadline)
         return max(0.0, min(deadlines) - self._clock()) if deadlines else None
 
-    def _accept(self):
+    def _accept(self) -> None:
         for _ in range(ACCEPTED_AT_ONCE):
             try:
                 connection, address = self._listener.accept()
@@ -153,7 +159,7 @@ class HandshakeServer:
                 return
             self._take(connection, address)
 
-    def _take(self, connection, address):
+    def _take(self, connection: socket.socket, address: tuple[str, int]) -> None:
         host = address[0]
         if self._is_full(host):
             self._events.add(("full", host), "connection from %s refused: it has %d already"
@@ -164,14 +170,14 @@ class HandshakeServer:
         pending = _Pending(connection, address, self._clock() + limits.HANDSHAKE_S)
         self._read(pending, is_new=True)
 
-    def _is_full(self, host):
+    def _is_full(self, host: str) -> bool:
         """Counts open sockets; they are held weakly, since their new owner closes them."""
         held = self._open[host]
         if len(held) >= limits.CONNECTIONS_PER_ADDRESS:
             held[:] = [reference for reference in held if (still := reference()) is not None and still.fileno() >= 0]
         return len(held) >= limits.CONNECTIONS_PER_ADDRESS
 
-    def _read(self, pending, is_new=False):
+    def _read(self, pending: _Pending, is_new: bool = False) -> None:
         """Read what has come. An error that nobody foresaw costs this connection alone."""
         try:
             self._read_or_serve(pending, is_new)
@@ -181,7 +187,7 @@ class HandshakeServer:
                 with contextlib.suppress(Exception):
                     end()
 
-    def _read_or_serve(self, pending, is_new):
+    def _read_or_serve(self, pending: _Pending, is_new: bool) -> None:
         """Most headers arrive together with the connection: those are never registered."""
         try:
             complete = pending.read()
@@ -204,13 +210,13 @@ class HandshakeServer:
             _notice_lost_peers(pending.socket)
             self._serve(pending.socket, pending.address, bytes(pending.data))
 
-    def _remember(self, pending):
+    def _remember(self, pending: _Pending) -> None:
         held = self._open[pending.address[0]]
         if len(held) % 256 == 255:
             held[:] = [reference for reference in held if (still := reference()) is not None and still.fileno() >= 0]
         held.append(weakref.ref(pending.socket))
 
-    def _wait_for(self, pending):
+    def _wait_for(self, pending: _Pending) -> None:
         host = pending.address[0]
         if self._in_handshake[host] >= limits.HANDSHAKES_PER_ADDRESS:
             oldest = next(other for other in self._pending.values() if other.address[0] == host)
@@ -220,7 +226,7 @@ class HandshakeServer:
         self._in_handshake[host] += 1
         self._selector.register(pending.socket, selectors.EVENT_READ, pending)
 
-    def _forget(self, pending):
+    def _forget(self, pending: _Pending) -> None:
         if self._pending.pop(id(pending), None) is None:
             return
         host = pending.address[0]
@@ -229,11 +235,11 @@ class HandshakeServer:
             del self._in_handshake[host]
         self._selector.unregister(pending.socket)
 
-    def _drop(self, pending):
+    def _drop(self, pending: _Pending) -> None:
         self._forget(pending)
         pending.socket.close()
 
-    def _expire(self):
+    def _expire(self) -> None:
         now = self._clock()
         if self._paused_until is not None and now >= self._paused_until:
             self._paused_until = None
@@ -245,11 +251,11 @@ class HandshakeServer:
             self._drop(oldest)
             self._tell_idle(oldest.address[0])
 
-    def _tell_idle(self, host):
+    def _tell_idle(self, host: str) -> None:
         self._events.add(("idle", host), "connection from %s closed: no complete handshake header within %g s, or one "
                          "of more than %d without" % (host, limits.HANDSHAKE_S, limits.HANDSHAKES_PER_ADDRESS))
 
-    def _make_room(self, error):
+    def _make_room(self, error: OSError) -> None:
         """Without free descriptors the listener would be ready all the time, and accepting would always fail."""
         self._events.add("files", "no connection can be accepted: %s; those without a handshake are closed"
                          % error.strerror)

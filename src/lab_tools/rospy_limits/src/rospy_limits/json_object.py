@@ -3,8 +3,11 @@
 
 Python's own reader raises other errors on some valid JSON: brackets a thousand deep, integers of any length.
 """
+from __future__ import annotations
+
 import json
 import re
+from typing import Any
 
 LONGEST = 10000  # characters of a text; the robot's longest is about 100
 DEEPEST = 8  # objects and lists within each other; a tool.s weight takes six
@@ -21,7 +24,7 @@ class JsonRefused(ValueError):
     """The text is not a JSON object, or exceeds a limit; the message says what was found and what is allowed."""
 
 
-def read_object(text):
+def read_object(text: str) -> dict[str, Any]:
     """The JSON object in ``text`` as a dict, an empty one for white space.
 
     NaN and Infinity are accepted, as Python writes them. Raises :class:`JsonRefused`.
@@ -40,7 +43,7 @@ def read_object(text):
     return values
 
 
-def _fault(text):
+def _fault(text: str) -> str:
     if len(text) > LONGEST:
         return "%d characters, and at most %d are read" % (len(text), LONGEST)
     depth = 0
@@ -51,21 +54,21 @@ def _fault(text):
     return ""
 
 
-def _integer(digits):
+def _integer(digits: str) -> int:
     if len(digits) > MOST_DIGITS + digits.startswith("-"):
         raise ValueError("an integer of %d digits; at most %d are read" % (len(digits), MOST_DIGITS))
     return _bounded(int(digits), digits)
 
 
-def _number(text):
+def _number(text: str) -> float:
     return _bounded(float(text), text)
 
 
-def _bounded(value, text):
+def _bounded(value: Any, text: str) -> Any:
     if not abs(value) <= LARGEST:
         raise ValueError("the number %s; its magnitude may be up to %g" % (_quoted(text), LARGEST))
     return value
 
 
-def _quoted(text):
+def _quoted(text: str) -> str:
     return repr(text if len(text) <= SHOWN else text[:SHOWN] + " ...")

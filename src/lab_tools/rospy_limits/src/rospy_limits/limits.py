@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The limits, each with its reason. ROS-free."""
+from __future__ import annotations
 
 #: From the connection to the end of its handshake header [s]. Clients send it at once; on a five times slower machine
 #: they needed two seconds.
@@ -38,7 +39,7 @@ SIZE_PARAMETER = "~largest_message_bytes"
 OPEN_FILES = 65536
 
 
-def size_fault(announced_bytes, limit_bytes):
+def size_fault(announced_bytes: int, limit_bytes: int) -> str:
     """The error text for a message that is too large."""
     return "a message of %d bytes is announced, at most %d are taken (parameter %s)" % (
         announced_bytes, limit_bytes, SIZE_PARAMETER)

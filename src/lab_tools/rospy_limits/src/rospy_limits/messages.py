@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages and requests with a too large announced size are refused before they are read."""
+from __future__ import annotations
+
 import contextlib
+import socket
 import struct
+from collections.abc import Callable
+from typing import Any
 
 import rospy
 from rospy.exceptions import TransportTerminated
 from rospy.impl.transport import INBOUND
 
 from rospy_limits import limits
+from rospy_limits.event_log import EventLog
 
 _LENGTH = struct.Struct("<I")
 _known = []
@@ -17,7 +23,7 @@ class MessageTooLarge(TransportTerminated):
     """A message announces more bytes than allowed; rospy does not reconnect after this error."""
 
 
-def largest_message_bytes():
+def largest_message_bytes() -> int:
     """The longest message or request that this node takes [bytes]: its parameter, read once, or the default."""
     if _known:
         return _known[0]
@@ -34,10 +40,10 @@ def largest_message_bytes():
     return _known[0]
 
 
-def checked_read(read_messages):
+def checked_read(read_messages: Callable[..., Any]) -> Callable[..., Any]:
     """``TCPROSTransportProtocol.read_messages``, which raises :class:`MessageTooLarge` before it waits for more."""
 
-    def read(protocol, buffer, message_queue, connection):
+    def read(protocol: Any, buffer: Any, message_queue: Any, connection: socket.socket) -> Any:
         length, = _LENGTH.unpack(buffer.getbuffer()[:_LENGTH.size])
         if length > largest_message_bytes():
             raise MessageTooLarge(limits.size_fault(length, largest_message_bytes()))
@@ -46,11 +52,11 @@ def checked_read(read_messages):
     return read
 
 
-def checked_answer(read_messages):
+def checked_answer(read_messages: Callable[..., Any]) -> Callable[..., Any]:
     """``TCPROSServiceClient.read_messages``, with the same limit for what a service answers: its first byte says
     whether it is fine, then comes the length."""
 
-    def read(protocol, buffer, message_queue, connection):
+    def read(protocol: Any, buffer: Any, message_queue: Any, connection: socket.socket) -> Any:
         if buffer.tell() > _LENGTH.size:
             length, = _LENGTH.unpack(buffer.getbuffer()[1:1 + _LENGTH.size])
             if length > largest_message_bytes():
@@ -60,10 +66,10 @@ def checked_answer(read_messages):
     return read
 
 
-def reported_receive(receive_once, events):
+def reported_receive(receive_once: Callable[..., Any], events: EventLog) -> Callable[..., Any]:
     """``TCPROSTransport.receive_once``, with a line about a publisher whose message is too large."""
 
-    def receive(transport):
+    def receive(transport: Any) -> Any:
         try:
             return receive_once(transport)
         except MessageTooLarge as error:

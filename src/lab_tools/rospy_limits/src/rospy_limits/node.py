@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Installs the limits."""
+from __future__ import annotations
+
 import contextlib
 import resource
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rosgraph.xmlrpc
 import rospy
@@ -47,7 +51,7 @@ def limit_ports(publishes: bool = True) -> ThreadFaults:
     tcpros_base.read_ros_handshake_header = registration.read_header
     client = tcpros_service.TCPROSServiceClient
     client.read_messages = messages.checked_answer(client.read_messages)
-    service = tcpros_service.ServiceImpl
+    service: Any = tcpros_service.ServiceImpl
     service.handle, service._write_service_error = services.connection_server(events, faults), services.write_error
     rosgraph.xmlrpc.ThreadingXMLRPCServer = xmlrpc_server.limited_server(events, faults)
     manager, handler = rospy_registration.RegManager, masterslave.ROSHandler
@@ -57,9 +61,9 @@ def limit_ports(publishes: bool = True) -> ThreadFaults:
     return faults
 
 
-def _publish(faults):
+def _publish(faults: ThreadFaults) -> Callable[[Callable[[], bool]], None]:
     """The loop of the thread that publishes the errors of threads, if there are any."""
-    def publish(ends):
+    def publish(ends: Callable[[], bool]) -> None:
         publisher = None
         while not ends():
             faults.news.wait()
@@ -69,7 +73,7 @@ def _publish(faults):
 
                 publisher = publisher or rospy.Publisher("/diagnostics", DiagnosticArray, latch=True, queue_size=1)
                 faults.news.clear()
-                text, values = faults.summary()
+                text, values = faults.summary() or ("", {})
                 name = rospy.get_name()
                 message = DiagnosticArray(status=[DiagnosticStatus(
                     DiagnosticStatus.WARN, "%s: %s" % (name, STATUS_NAME), text, name,
@@ -80,7 +84,7 @@ def _publish(faults):
     return publish
 
 
-def _ask_for_files():
+def _ask_for_files() -> None:
     """Raise the limit of open files as far as the system allows, up to the useful maximum."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = limits.OPEN_FILES if hard == resource.RLIM_INFINITY else min(limits.OPEN_FILES, hard)

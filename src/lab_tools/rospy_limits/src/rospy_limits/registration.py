@@ -1,23 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How a node learns of publishers and connects to them: rospy's thread for it lasts, and headers have a limit."""
+from __future__ import annotations
+
 import functools
+import socket
 import struct
 from collections.abc import Callable
+from typing import Any
 
 import rosgraph.network
 from rospy.core import is_shutdown
 
 from rospy_limits import limits
-from rospy_limits.threads import lasting
+from rospy_limits.threads import ThreadFaults, lasting
 
 _LENGTH = struct.Struct("<I")
 _PORTION = 65536
 
 
-def lasting_run(run: Callable, faults) -> Callable:
+def lasting_run(run: Callable, faults: ThreadFaults) -> Callable:
     """``rospy.impl.registration.RegManager.run``, again after each error, until the node ends."""
     @functools.wraps(run)
-    def run_on(manager):
+    def run_on(manager: Any) -> None:
         lasting(faults, "that connects to publishers", lambda _: run(manager))(
             lambda: manager.handler.done or is_shutdown())
     return run_on
@@ -27,7 +31,7 @@ def limited_update(update: Callable) -> Callable:
     """``ROSHandler.publisherUpdate``, which refuses what would cost a thread each for ever: more publishers than a
     topic can have, and addresses that nobody can be called at."""
     @functools.wraps(update)
-    def limited(self, *arguments):
+    def limited(self: Any, *arguments: Any) -> Any:
         publishers = arguments[2] if len(arguments) == 3 and isinstance(arguments[2], list) else ()
         if len(publishers) > limits.PUBLISHERS:
             return -1, "%d publishers of a topic, at most %d are taken" % (len(publishers), limits.PUBLISHERS), 0
@@ -38,7 +42,7 @@ def limited_update(update: Callable) -> Callable:
     return limited
 
 
-def read_header(connection, buffer, _portion=None) -> dict[str, str]:
+def read_header(connection: socket.socket, buffer: Any, _portion: Any = None) -> dict[str, str]:
     """The replacement of ``read_ros_handshake_header`` where a subscriber or a client reads the other side's header.
 
     ``buffer`` (BytesIO) afterwards holds what came behind it; what is left in it from an earlier connection is dropped.

@@ -3,8 +3,12 @@
 
 Each message wakes its thread, and a simulator does not even make those without a subscriber.
 """
+from __future__ import annotations
+
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 # Between two looks at who needs it [s].
 _LOOK_S = 1.0
@@ -17,13 +21,15 @@ class Demand:
     ``clock`` and ``timer``, a ``threading.Timer``, are replaceable for tests.
     """
 
-    def __init__(self, listen, rest, linger_s, is_needed=lambda: False, clock=time.monotonic, timer=threading.Timer):
+    def __init__(self, listen: Callable[[], object], rest: Callable[[], object], linger_s: float,
+                 is_needed: Callable[[], bool] = lambda: False, clock: Callable[[], float] = time.monotonic,
+                 timer: Callable[..., Any] = threading.Timer) -> None:
         self._listen, self._rest, self._linger_s, self._is_needed = listen, rest, linger_s, is_needed
         self._clock, self._timer = clock, timer
         self._lock = threading.Lock()
         self._listens, self._needed_until = False, 0.0
 
-    def need(self):
+    def need(self) -> None:
         """Any thread: somebody needs it now. When it returns, ``listen()`` has been called; what that raises, this
         raises."""
         with self._lock:
@@ -33,12 +39,12 @@ class Demand:
                 self._listens = True
                 self._look_in(min(_LOOK_S, self._linger_s))
 
-    def _look_in(self, seconds):
+    def _look_in(self, seconds: float) -> None:
         timer = self._timer(seconds, self._look)
         timer.daemon = True
         timer.start()
 
-    def _look(self):
+    def _look(self) -> None:
         with self._lock:
             now = self._clock()
             try:

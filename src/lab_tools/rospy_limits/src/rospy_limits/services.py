@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Replaces rospy's code that serves one connection of a service."""
+from __future__ import annotations
+
 import collections
 import select
+import socket
 import struct
 import threading
+from collections.abc import Callable
+from typing import Any
 
 from rospy.exceptions import TransportException, TransportTerminated
 
 from rospy_limits import limits
+from rospy_limits.event_log import EventLog
 from rospy_limits.messages import MessageTooLarge
-from rospy_limits.threads import SURVIVED
+from rospy_limits.threads import SURVIVED, ThreadFaults
 
 #: Before an error's text: that the request failed, and the text's length.
 _ERROR = struct.Struct("<BI")
@@ -18,29 +24,29 @@ _ERROR = struct.Struct("<BI")
 class _Counts:
     """Number of connections of each address."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._counts = collections.Counter()
 
-    def enter(self, host):
+    def enter(self, host: str) -> bool:
         with self._lock:
             if self._counts[host] >= limits.SERVICES_PER_ADDRESS:
                 return False
             self._counts[host] += 1
             return True
 
-    def leave(self, host):
+    def leave(self, host: str) -> None:
         with self._lock:
             self._counts[host] -= 1
             if not self._counts[host]:
                 del self._counts[host]
 
 
-def connection_server(events, faults):
+def connection_server(events: EventLog, faults: ThreadFaults) -> Callable[..., Any]:
     """The replacement of ``rospy.impl.tcpros_service.ServiceImpl.handle``. Runs in the connection's thread."""
     counts = _Counts()
 
-    def handle(service, transport, header):
+    def handle(service: Any, transport: Any, header: dict[str, str]) -> None:
         if header.get("probe") == "1":
             transport.close()
             return
@@ -66,14 +72,14 @@ def connection_server(events, faults):
     return handle
 
 
-def write_error(service, transport, text):
+def write_error(service: Any, transport: Any, text: str) -> None:
     """The replacement of ``ServiceImpl._write_service_error``. A text may quote half of a surrogate pair, which cannot
     be sent; rospy then sends nothing."""
     data = text.encode("utf-8", "backslashreplace")
     transport.write_data(_ERROR.pack(0, len(data)) + data)
 
 
-def _serve(service, transport, is_persistent, caller, events):
+def _serve(service: Any, transport: Any, is_persistent: bool, caller: str, events: EventLog) -> None:
     if not is_persistent and not _has_come(transport, limits.REQUEST_S):
         events.add(("request", service.resolved_name), "%s: connection of %s closed: no request within %g s"
                    % (service.resolved_name, caller, limits.REQUEST_S))
@@ -93,21 +99,21 @@ def _serve(service, transport, is_persistent, caller, events):
         _reject(service, transport, caller, error, events)
 
 
-def _forget_unsent(buffer):
+def _forget_unsent(buffer: Any) -> None:
     """Drop a partly serialized response: it would be sent in front of the next one."""
     if buffer.tell():
         buffer.seek(0)
         buffer.truncate()
 
 
-def _reject(service, transport, caller, error, events):
+def _reject(service: Any, transport: Any, caller: str, error: BaseException, events: EventLog) -> None:
     text = "request refused: %s" % error
     events.add(("request", service.resolved_name, caller), "%s: connection of %s closed: %s"
                % (service.resolved_name, caller, text))
     _refuse(service, transport, text)
 
 
-def _has_come(transport, timeout_s):
+def _has_come(transport: Any, timeout_s: float) -> bool:
     """Whether a first byte arrives in time; the end of the connection counts as one."""
     poller = select.poll()
     try:
@@ -117,7 +123,7 @@ def _has_come(transport, timeout_s):
         return True  # closed from this side meanwhile
 
 
-def _refuse(service, transport, text):
+def _refuse(service: Any, transport: Any, text: str) -> None:
     """Send the reason, which the client gets as the text of a ServiceException, and close."""
     try:
         service._write_service_error(transport, text)
@@ -127,7 +133,7 @@ def _refuse(service, transport, text):
     transport.close()
 
 
-def _read_away(connection, most_bytes=1 << 20, wait_s=0.5):
+def _read_away(connection: socket.socket, most_bytes: int = 1 << 20, wait_s: float = 0.5) -> None:
     """Read some of the sent bytes: closing with unread bytes would reset the connection before the client reads the
     answer."""
     connection.settimeout(wait_s)

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Replaces rospy's server for topics and services."""
+from __future__ import annotations
+
+import socket
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import rosgraph.network
 import rospy.impl.tcpros_base as tcpros_base
 from rospy.core import is_shutdown_requested
 
+from rospy_limits.event_log import EventLog
 from rospy_limits.handshakes import HandshakeServer
+from rospy_limits.threads import ThreadFaults
 
 #: Connections that the kernel holds until they are accepted. rospy uses 5; beyond, clients wait for a second.
 BACKLOG = 128
@@ -15,29 +22,30 @@ BACKLOG = 128
 LONGEST_REASON = 2000
 
 
-def limited_server(events, faults):
+def limited_server(events: EventLog, faults: ThreadFaults) -> type:
     """The replacement of the class ``rospy.impl.tcpros_base.TCPServer``."""
 
     class LimitedTCPServer(tcpros_base.TCPServer):
-        def __init__(self, inbound_handler, port=0):
+        def __init__(self, inbound_handler: Callable[..., Any], port: int = 0) -> None:
             super().__init__(inbound_handler, port)
-            self.server_sock.listen(BACKLOG)
-            self._handshakes = HandshakeServer(self.server_sock, inbound_handler, events, faults)
+            listener: Any = self.server_sock
+            listener.listen(BACKLOG)
+            self._handshakes = HandshakeServer(listener, inbound_handler, events, faults)
 
-        def run(self):
+        def run(self) -> None:
             self._handshakes.run()
 
-        def shutdown(self):
+        def shutdown(self) -> None:
             self._handshakes.close()
             super().shutdown()
 
     return LimitedTCPServer
 
 
-def connection_handler(events):
+def connection_handler(events: EventLog) -> Callable[..., Any]:
     """The replacement of ``TCPROSServer._tcp_server_callback``: it gets the header that has been read."""
 
-    def take(server, connection, address, data):
+    def take(server: Any, connection: socket.socket, address: tuple[str, int], data: Any) -> None:
         try:
             header = rosgraph.network.decode_ros_handshake_header(data)
         except Exception as error:  # noqa: BLE001  (rosgraph's reader raises other errors, too, on what is no header)
@@ -57,7 +65,8 @@ def connection_handler(events):
     return take
 
 
-def _answer(handler, connection, address, header, events):
+def _answer(handler: Any, connection: socket.socket, address: tuple[str, int], header: dict[str, str],
+            events: EventLog) -> None:
     """Let rospy take over the connection, or send rospy's reason of refusal and close it."""
     try:
         reason = handler(connection, address, header)

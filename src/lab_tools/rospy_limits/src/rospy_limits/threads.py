@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Threads that serve others: they outlive errors that nobody foresaw, and every thread's end by an error is counted.
 ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
+
+from rospy_limits.event_log import EventLog
 
 #: Exceptions that do not end a thread that serves others.
 SURVIVED = (Exception, SystemExit)
@@ -16,7 +21,7 @@ STATUS_NAME = "threads"
 _MOST_PLACES, _LONGEST_TEXT = 100, 300
 
 
-def lasting(faults, place: str, loop: Callable, retry_s: float = RETRY_S) -> Callable:
+def lasting(faults: ThreadFaults, place: str, loop: Callable, retry_s: float = RETRY_S) -> Callable:
     """A function of ``ends`` that runs ``loop(ends)`` until it returns, and again after each error.
 
     ``faults``: its ``note(place, error, consequence)`` counts them: :class:`ThreadFaults` or
@@ -39,7 +44,7 @@ def lasting(faults, place: str, loop: Callable, retry_s: float = RETRY_S) -> Cal
 class ThreadFaults:
     """How often threads were restarted, or ended, by an error. Any thread."""
 
-    def __init__(self, events):
+    def __init__(self, events: EventLog) -> None:
         """``events``: :class:`rospy_limits.event_log.EventLog`."""
         self._events = events
         self._lock = threading.Lock()
@@ -70,7 +75,7 @@ class ThreadFaults:
 
     def count_ends(self, hook: Callable) -> Callable:
         """A ``threading.excepthook`` that counts the threads that an error ends, and then calls ``hook``."""
-        def ended(arguments):
+        def ended(arguments: Any) -> None:
             if arguments.exc_value is not None and not isinstance(arguments.exc_value, SystemExit):
                 with contextlib.suppress(Exception):
                     name = arguments.thread.name if arguments.thread is not None else "without a name"

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The descriptor that rospy opens for each topic of a node, closed as soon as the topic is."""
+from __future__ import annotations
+
 import select
 
 _BROKEN = select.EPOLLHUP | select.EPOLLERR | select.EPOLLRDHUP
@@ -12,17 +14,17 @@ class TopicPoller:
     until the garbage collector looks for reference cycles, in a large node after many minutes.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._epoll = select.epoll()
 
-    def add_fd(self, descriptor):
+    def add_fd(self, descriptor: int) -> None:
         """Watch a connection."""
         self._epoll.register(descriptor, _BROKEN)
 
-    def remove_fd(self, descriptor):
+    def remove_fd(self, descriptor: int) -> None:
         """Forget a connection."""
         self._epoll.unregister(descriptor)
 
-    def error_iter(self):
+    def error_iter(self) -> list[int]:
         """The descriptors of the connections that have broken."""
         return [descriptor for descriptor, event in self._epoll.poll(0) if event & _BROKEN]
