@@ -12,14 +12,15 @@ from urdf_model import OutOfBounds, bounds
 
 
 class ForceTorqueSensor(PacedSensor):
-    """``libgazebo_ros_ft_sensor.so``: publishes the wrench through the joint ``jointName``, movable or fixed, on
+    """``libgazebo_ros_ft_sensor.so``: publishes the wrench through the joint ``jointName``, by default the one whose
+    ``<sensor>`` it is in, movable or fixed, on
     ``topicName``, in the axes of the child link and about the joint: the wrench of the child on the parent."""
 
     message_class = WrenchStamped
 
     def __init__(self, context):
         super().__init__(context)
-        name = unscoped(context.model.name, context.element_text("jointName", ""))
+        name = unscoped(context.model.name, context.element_text("jointName", self.link or ""))
         try:
             self._joint = JointWrench(context.world, context.model, name)
         except BulletSimError as error:

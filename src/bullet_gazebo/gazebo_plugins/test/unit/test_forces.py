@@ -51,6 +51,13 @@ def test_weight_hangs_on_every_joint_fixed_ones_too(make, joint, mass, lever):
     assert lab.sent("wrench")[-1].header.frame_id in ("boom", "flange", "tool")
 
 
+def test_a_sensor_may_be_in_the_sensor_of_its_joint(make):
+    around = '<gazebo reference="mount"><sensor type="force_torque" name="ft">%s</sensor></gazebo>'
+    lab = make(ARM, ForceTorqueSensor, {"topicName": "wrench"}, Pose((0, 0, 1)), sensor=around,
+               filename="libgazebo_ros_ft_sensor.so").run(0.02)
+    np.testing.assert_allclose(said(lab)[0], (0, -1.5 * G, 0), atol=1e-6)
+
+
 def test_a_turning_arm_pulls_outwards(make):
     lab = sensor(make, "mount")
     index = lab.model.index(["turn", "twist"])

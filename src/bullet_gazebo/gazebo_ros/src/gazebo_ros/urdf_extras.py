@@ -6,6 +6,7 @@ from loop_ros.names import IllegalName, checked_name
 
 #: The element, inside <gazebo>, in which spawn_model hands over the joint positions of its option -J.
 START_CONFIGURATION = "start_configuration"
+_OF_JOINTS = "libgazebo_ros_ft_sensor.so"
 
 
 class ExtrasError(Exception):
@@ -18,7 +19,7 @@ def plugins(robot):
 
 
 def sensor_plugins(robot, warn):
-    """The ``<plugin>`` elements of the ``<sensor>`` elements of links.
+    """The ``<plugin>`` elements of the ``<sensor>`` elements of links, and of those of joints that measure force.
 
     A sensor elsewhere is left out with its plugins, and ``warn(text)`` is called.
     """
@@ -28,11 +29,12 @@ def sensor_plugins(robot, warn):
             link, inside = gazebo.get("reference"), sensor.findall("plugin")
             if link in robot.links:
                 found += inside
-            elif link in robot.joints and sensor.get("type") == "force_torque" and not inside:
-                pass  # hardware of a controller
+            elif link in robot.joints and sensor.get("type") == "force_torque" and all(
+                    (plugin.get("filename") or "").endswith(_OF_JOINTS) for plugin in inside):
+                found += inside  # without a plugin it is hardware of a controller
             elif link in robot.joints:
-                warn("sensor '%s' of '%s' is on a joint, '%s', and is left out; sensors are served on links"
-                     % (sensor.get("name", ""), robot.name, link))
+                warn("sensor '%s' of '%s' is on a joint, '%s', and is left out; there, <sensor type=\"force_torque\"> "
+                     "is served, without a plugin or with %s" % (sensor.get("name", ""), robot.name, link, _OF_JOINTS))
             else:
                 warn("sensor '%s' is on link '%s', which '%s' does not have, and is left out; links: %s"
                      % (sensor.get("name", ""), link, robot.name, ", ".join(robot.links)))
@@ -40,7 +42,8 @@ def sensor_plugins(robot, warn):
 
 
 def sensor_of(plugin):
-    """The ``<sensor>`` that a plugin element stands in and the name of its link; ``(None, None)`` outside of one."""
+    """The ``<sensor>`` that a plugin element stands in and the name of its link or joint; ``(None, None)`` outside of
+    one."""
     sensor = plugin.getparent()
     if sensor is None or sensor.tag != "sensor":
         return None, None

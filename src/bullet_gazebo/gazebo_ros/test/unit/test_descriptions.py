@@ -120,6 +120,18 @@ def test_a_start_position_of_an_unknown_joint_is_passed_over():
     assert len(told) == 1 and "knee" in told[0] and "hinge" in told[0]
 
 
+def test_the_force_sensor_of_a_joint_may_have_its_plugin_inside():
+    sensor = ('<gazebo reference="hinge"><sensor name="ft" type="force_torque"><plugin filename="%s"/></sensor>'
+              "</gazebo></robot>")
+    robot = parse_urdf(URDF.replace("</robot>", sensor % "libgazebo_ros_ft_sensor.so"))
+    plugin = urdf_extras.sensor_plugins(robot, pytest.fail)[-1]
+    assert plugin.get("filename") == "libgazebo_ros_ft_sensor.so"
+    assert urdf_extras.sensor_of(plugin)[1] == "hinge"
+    told = []
+    urdf_extras.sensor_plugins(parse_urdf(URDF.replace("</robot>", sensor % "libother.so")), told.append)
+    assert len(told) == 1 and "hinge" in told[0]
+
+
 def test_unknown_plugins_are_one_warning():
     spawner = object.__new__(Spawner)
     spawner._log, spawner._library = FakeLog(), SimpleNamespace(plugins=PluginTable({}))

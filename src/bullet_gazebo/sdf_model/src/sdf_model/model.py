@@ -170,6 +170,7 @@ class ModelReader:
                 raise document.error(joint, "joint '%s' appears twice" % read.name)
             names.add(read.name)
             parts.joints.append(read)
+            parts.gazebo += _sensors_and_lights(document, joint, read.name)
         self._hold_kinematic(document, element, parts)
         parts.gazebo += _plugins(document, element)
         parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
@@ -258,8 +259,8 @@ def _moved(parts, prefix, origin):
 
 
 def _sensors_and_lights(document, link, name):
-    """Return the <sensor> and <light> elements of a link as a <gazebo> element that refers to it, the way a URDF has
-    them."""
+    """Return the <sensor> and <light> elements of a link or joint as a <gazebo> element that refers to it, the way a
+    URDF has them."""
     for light in link.iterchildren("light"):
         read_light(document, light, np.eye(4))  # complains here, where file and line are known
     found = link.findall("sensor") + link.findall("light")

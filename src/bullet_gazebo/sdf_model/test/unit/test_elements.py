@@ -40,7 +40,8 @@ def test_defaults_are_harmless():
 
 
 def test_honoured_elements_are_read_by_the_source():
-    source = "".join(path.read_text(encoding="utf-8") for name in ("sdf_model", "gazebo_ros", "sensor_renderer")
+    source = "".join(path.read_text(encoding="utf-8") for name in (
+        "sdf_model", "gazebo_ros", "gazebo_plugins", "sensor_renderer", "../ros_control/gazebo_ros_control")
                      for path in (BULLET_GAZEBO / name / "src").rglob("*.py") if path.name != "elements.py")
     names = {name for names in elements.HONOURED.values() for name in names.split()}
     # The distortion's are fields of a tuple, the others mean no shape and the file itself.

@@ -392,6 +392,13 @@ def test_a_surface_has_a_bitmask(contact, bitmask):
     assert ("all" in contact) == ("collide_bitmask" in found.warning)
 
 
+def test_a_joint_may_have_a_sensor():
+    robot = read('<link name="a"/><link name="b"/>' + joint("j", "a", "b").replace(
+        "</joint>", '<sensor name="ft" type="force_torque"><update_rate>10</update_rate></sensor></joint>')).robot
+    (block,) = robot.gazebo
+    assert block.get("reference") == "j" and block.find("sensor").get("name") == "ft"
+
+
 def test_links_may_collide_with_their_model():
     found = parse_sdf_model(sdf('<self_collide>1</self_collide><link name="a"/><link name="b"><self_collide>0'
                                 "</self_collide></link>" + joint("j", "a", "b")), "m.sdf")
