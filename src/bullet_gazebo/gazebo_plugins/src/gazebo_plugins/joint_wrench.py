@@ -3,7 +3,7 @@
 import numpy as np
 
 from bullet_sim import BulletSimError
-from urdf_model import Box, Cylinder, Mesh, Sphere
+from urdf_model.distance import distance_from
 from urdf_model.merge import combine
 from urdf_model.transforms import inverse
 
@@ -13,8 +13,8 @@ class JointWrench:
 
     Newton and Euler: the change of the momentum of all links behind the joint equals the sum of their weight, contacts,
     the wrenches of ``Model.apply_wrench``, and the joint's wrench. This also works for fixed joints, which do not exist
-    in the physics. In a body that the joint divides, a contact belongs to the link with the nearest shape; a mesh
-    counts as its link's origin.
+    in the physics. In a body that the joint divides, a contact belongs to the link with the nearest shape
+    (``urdf_model.distance``).
 
     :param world: bullet_sim.World
     :param model: bullet_sim.Model, which has a joint of this name in its description
@@ -167,18 +167,4 @@ def _distance(model, link, where):
     """How far a point (3,) of the world is from the nearest collision shape of a link [m]."""
     in_link = np.linalg.inv(model.link_pose(link).matrix()) @ (*where, 1.0)
     shapes = model.robot.links[link].collisions
-    return min((_from_shape(shape, (inverse(shape.origin) @ in_link)[:3]) for shape in shapes), default=np.inf)
-
-
-def _from_shape(shape, point):
-    geometry = shape.geometry
-    if isinstance(geometry, Box):
-        return float(np.linalg.norm(np.maximum(np.abs(point) - np.asarray(geometry.size) / 2.0, 0.0)))
-    if isinstance(geometry, Sphere):
-        return max(float(np.linalg.norm(point)) - geometry.radius, 0.0)
-    if isinstance(geometry, Cylinder):
-        outside = np.array([np.hypot(point[0], point[1]) - geometry.radius, abs(point[2]) - geometry.length / 2.0])
-        return float(np.linalg.norm(np.maximum(outside, 0.0)))
-    if isinstance(geometry, Mesh):
-        return float(np.linalg.norm(point))
-    return np.inf
+    return min((max(distance_from(shape, in_link[:3]), 0.0) for shape in shapes), default=np.inf)

@@ -6,12 +6,9 @@ import numpy as np
 from gazebo_msgs.msg import ContactState
 from geometry_msgs.msg import Vector3, Wrench
 
-from urdf_model import Box, CollisionName, Cylinder, Plane, Sphere, collision_names
+from urdf_model import CollisionName, collision_names
+from urdf_model.distance import distance_from
 from urdf_model.transforms import inverse
-
-# A mesh counts as so far away from a contact [m]: its triangles are not searched, and a shape with a formula that is
-# nearer is the one that was touched.
-_MESH_IS_AT_M = 0.002
 
 
 class CollisionNames:
@@ -35,8 +32,8 @@ class CollisionNames:
         if len(rows) == 1:
             return _full(model_name, rows[0][1])
         frame = model.link_pose(body).matrix() @ inverse(model.merged.frames[body].offset)
-        point = inverse(frame) @ (*position, 1.0)
-        return _full(model_name, min(rows, key=lambda row: abs(_distance(row[0], point)))[1])
+        point = (inverse(frame) @ (*position, 1.0))[:3]
+        return _full(model_name, min(rows, key=lambda row: abs(distance_from(row[0], point)))[1])
 
     def _rows(self, model):
         if model not in self._known:
@@ -53,22 +50,6 @@ class CollisionNames:
 
 def _full(model_name, name):
     return "%s::%s::%s" % (model_name, *name)
-
-
-def _distance(shape, point):
-    """Distance [m] of ``point`` (4,), in the frame of the shape's body, from the surface; below 0 inside."""
-    point, geometry = (inverse(shape.origin) @ point)[:3], shape.geometry
-    if isinstance(geometry, Sphere):
-        return np.linalg.norm(point) - geometry.radius
-    if isinstance(geometry, Plane):
-        return point[2]
-    if isinstance(geometry, Box):
-        beyond = np.abs(point) - np.array(geometry.size) / 2.0
-    elif isinstance(geometry, Cylinder):
-        beyond = np.array([np.hypot(*point[:2]) - geometry.radius, abs(point[2]) - geometry.length / 2.0])
-    else:
-        return _MESH_IS_AT_M
-    return np.linalg.norm(np.maximum(beyond, 0.0)) + min(beyond.max(), 0.0)
 
 
 def contact_states(contacts, names, about=None):

@@ -5,7 +5,6 @@ from urdf_model.element_table import ElementTable
 
 _NO_WIND = "there is no wind"
 _NO_SOUND = "there is no sound"
-_FORCES = "the force on the link's joint is measured in the axes of the link"
 _SOLVER = "the solver is Bullet's, not ODE's"
 _HARD_STOPS = "the stops of joints are hard"
 _ONE_MU = "friction is the same in all directions"
@@ -61,6 +60,7 @@ HONOURED = {
     "sensor/camera/clip": "near far",
     "sensor/camera/noise": "type mean stddev",
     "sensor/camera/distortion": "k1 k2 k3 p1 p2 center",
+    "sensor/force_torque": "frame measure_direction",
     "sensor/ray/scan/horizontal": "samples resolution min_angle max_angle",
     "sensor/ray/scan/vertical": "samples resolution min_angle max_angle",
     "sensor/ray/range": "min max",
@@ -172,7 +172,6 @@ WITHOUT_EFFECT = (
                                  "dynamic_bias_correlation_time": "0", "precision": "0"}, "noise is white")
       for ray in ("ray", "lidar")),
     *(("sensor/%s/range" % ray, {"resolution": "0|0.01"}, "ranges are not rounded") for ray in ("ray", "lidar")),
-    ("sensor/force_torque", {"frame": "child", "measure_direction": "child_to_parent"}, _FORCES),
     ("sensor/force_torque", {"force": None, "torque": None}, _PLUGINS_NOISE),
     ("sensor", {"imu": None, "air_pressure": None, "altimeter": None, "gps": None, "navsat": None, "sonar": None,
                 "logical_camera": None, "magnetometer": None, "rfid": None, "rfidtag": None, "transceiver": None},

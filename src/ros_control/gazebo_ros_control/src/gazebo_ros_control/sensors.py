@@ -4,42 +4,72 @@ import numpy as np
 
 from controller_manager.interfaces import FORCE_TORQUE_SENSOR, IMU_SENSOR
 from gazebo_plugins.joint_wrench import JointWrench
-from urdf_model.transforms import quaternion_from_matrix
+from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 
 class SimulatedImu:
-    """Call ``read`` before each step: its result is that of the previous step. ``frame``: the link that it is on."""
+    """Call ``read`` before each step: its result is that of the previous step. ``frame``: the link that it is on, at
+    ``place`` (4, 4) in it."""
 
-    def __init__(self, world, model, link):
-        self._world, self._model, self.frame = world, model, link
+    def __init__(self, world, model, link, place):
+        self._world, self._model, self.frame, self._place = world, model, link, place
         self._last = None
 
     def read(self):
-        """Quaternion (4,) in the world, turn rate (3,) [rad/s] and acceleration (3,) [m/s2] in the link's axes, gravity
-        upwards at rest; None if it was not called at the previous step."""
+        """Quaternion (4,) in the world, turn rate (3,) [rad/s], and acceleration (3,) [m/s2] in its axes, gravity up
+        at rest; None if it was not called at the previous step."""
         linear, angular = (np.asarray(part) for part in self._model.link_twist(self.frame))
+        link = self._model.link_pose(self.frame).matrix()
+        linear = linear + np.cross(angular, link[:3, :3] @ self._place[:3, 3])
         last, self._last = self._last, (self._world.steps, linear)
         if last is None or last[0] != self._world.steps - 1:
             return None
-        axes = self._model.link_pose(self.frame).matrix()[:3, :3]
+        axes = link[:3, :3] @ self._place[:3, :3]
         change = (linear - last[1]) / self._world.time_step_s - np.asarray(self._world.gravity)
         return quaternion_from_matrix(axes), axes.T @ angular, axes.T @ change
 
 
 class SimulatedForceTorque:
-    """As :class:`SimulatedImu`, of a joint; ``frame``: the link behind it."""
+    """As :class:`SimulatedImu`, of a joint; ``frame``: the link whose axes it measures in.
 
-    def __init__(self, world, model, joint):
-        self._world, self._wrench = world, JointWrench(world, model, joint)
-        self.frame = self._wrench.child
-        self._noted = None
+    ``sensor``: its element. ``<force_torque>`` may have ``<frame>``: child, parent or sensor (the child's, turned as
+    its ``<pose>``), and ``<measure_direction>``: child_to_parent or parent_to_child.
+    """
+
+    def __init__(self, world, model, joint, sensor):
+        self._world, self._model, self._wrench = world, model, JointWrench(world, model, joint)
+        self.frame = child = self._wrench.child
+        self._turn = np.eye(3)  # from the child's axes
+        self._axes = (sensor.findtext("force_torque/frame") or "child").strip()
+        if self._axes == "parent":
+            self.frame = model.robot.joints[joint].parent
+        elif self._axes == "sensor":
+            self._turn = sensor_place(sensor)[:3, :3].T
+        direction = (sensor.findtext("force_torque/measure_direction") or "child_to_parent").strip()
+        self._sign = -1.0 if direction == "parent_to_child" else 1.0
+        self._child, self._noted = child, None
 
     def read(self):
-        """Force (3,) [N] and torque (3,) [Nm] that the child exerts on the parent, in the child's axes, or None."""
+        """Force (3,) [N] and torque (3,) [Nm] that the child exerts on the parent, or None."""
         found = self._wrench.measure() if self._noted == self._world.steps - 1 else None
         self._wrench.note()
         self._noted = self._world.steps
-        return found
+        if found is None:
+            return None
+        turn = self._turn
+        if self._axes == "parent":
+            parent, child = (self._model.link_pose(link).matrix()[:3, :3] for link in (self.frame, self._child))
+            turn = parent.T @ child
+        return tuple(self._sign * (turn @ part) for part in found)
+
+
+def sensor_place(sensor):
+    """The pose (4, 4) of a ``<sensor>`` in its link; as in the link's frame where it gives none or no six numbers."""
+    try:
+        values = [float(word) for word in (sensor.findtext("pose") or "").split()]
+    except ValueError:
+        values = []
+    return pose_matrix(values[:3], values[3:]) if len(values) == 6 and np.isfinite(values).all() else np.eye(4)
 
 
 def simulated_sensors(world, model):
@@ -51,7 +81,7 @@ def simulated_sensors(world, model):
         for sensor in gazebo.findall("sensor"):
             name = sensor.get("name") or where
             if sensor.get("type") == "imu" and where in model.robot.links:
-                found[IMU_SENSOR][name] = SimulatedImu(world, model, where)
+                found[IMU_SENSOR][name] = SimulatedImu(world, model, where, sensor_place(sensor))
             elif sensor.get("type") == "force_torque" and where in model.robot.joints:
-                found[FORCE_TORQUE_SENSOR][name] = SimulatedForceTorque(world, model, where)
+                found[FORCE_TORQUE_SENSOR][name] = SimulatedForceTorque(world, model, where, sensor)
     return found

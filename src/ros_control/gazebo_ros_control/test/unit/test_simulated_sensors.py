@@ -48,3 +48,25 @@ def test_a_turning_arm_feels_weight_and_pull(lab):
     world.step()
     # Two steps since the last call: no difference is computed.
     assert imu.read() is None and wrist.read() is None
+
+
+@pytest.mark.parametrize(("elements", "frame", "force"), [
+    ("", "tool", (0, 0.5 * 9.81, 0)), ("<frame>child</frame>", "tool", (0, 0.5 * 9.81, 0)),
+    ("<frame>parent</frame>", "boom", (0, 0, -0.5 * 9.81)), ("<frame>sensor</frame>", "tool", (0, 0, 0.5 * 9.81)),
+    ("<measure_direction>parent_to_child</measure_direction>", "tool", (0, -0.5 * 9.81, 0))])
+def test_sensors_measure_in_the_axes_that_they_name(elements, frame, force):
+    # The tool is turned by -90 degrees about x: its y points down. So the sensor's by 90: its z is the tool's y.
+    text = ARM.replace('<origin xyz="0.6 0 0"/>', '<origin xyz="0.6 0 0" rpy="-1.5707963267948966 0 0"/>').replace(
+        'type="force_torque"/>', 'type="force_torque"><pose>0 0 0 -1.5707963267948966 0 0</pose><force_torque>%s'
+        "</force_torque></sensor>" % elements).replace(
+        'type="imu"/>', 'type="imu"><pose>0 0 0 3.141592653589793 0 0</pose></sensor>')
+    world = World(time_step_s=0.001)
+    sensors = simulated_sensors(world, world.spawn(parse_urdf(text), "arm", Pose((0, 0, 1))))
+    imu, wrist = sensors[IMU_SENSOR]["imu"], sensors[FORCE_TORQUE_SENSOR]["wrist_ft"]
+    for _ in range(3):
+        felt, wrench = imu.read(), wrist.read()
+        world.step()
+    assert wrist.frame == frame
+    np.testing.assert_allclose(wrench[0], force, atol=1e-3)
+    np.testing.assert_allclose(felt[2], (0, 9.81, 0), atol=1e-3)
+    world.close()
