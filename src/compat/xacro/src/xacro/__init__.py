@@ -5,27 +5,40 @@
 ROS 2 and would ask ament. Because Python finds this module first, every way into the engine (the ``xacro`` command of
 the virtual environment included) resolves packages alike. Raises ImportError where the engine is not installed.
 """
+from __future__ import annotations
+
 import functools
 import importlib
 import importlib.metadata
 import importlib.util
 import re
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import rospkg
+
+#: A function of the engine: node, macros, symbols.
+_Walk = Callable[[Any, Any, Any], Any]
 
 
-def _engine_folder():
+def _engine_folder() -> Path:
     """Folder of PyPI's xacro. An installed workspace lists ours under that name too, so look at what is inside."""
     for distribution in importlib.metadata.distributions(name="xacro"):
-        folder = distribution.locate_file("xacro")
+        folder = Path(str(distribution.locate_file("xacro")))
         if (folder / "substitution_args.py").is_file():
             return folder
     raise ImportError("the xacro engine is not installed; run the workspace's set-up, or: %s -m pip install xacro"
                       % sys.executable, name="xacro")
 
 
-def _load_engine(folder):
+def _load_engine(folder: Path) -> Any:
     spec = importlib.util.spec_from_file_location(
         "xacro", str(folder / "__init__.py"), submodule_search_locations=[str(folder)])
+    if spec is None or spec.loader is None:
+        raise ImportError("%s is no Python package" % folder, name="xacro")
     engine = importlib.util.module_from_spec(spec)
     sys.modules["xacro"] = engine  # replaces the module that is just being imported
     spec.loader.exec_module(engine)
@@ -33,12 +46,12 @@ def _load_engine(folder):
 
 
 @functools.cache
-def _rospack():
+def _rospack() -> rospkg.RosPack:
     import rospkg  # here, because most files have no $(find) and need not wait for this import
     return rospkg.RosPack()
 
 
-def _find(package):
+def _find(package: str) -> str:
     """Path of a ROS package; raises the engine's SubstitutionException, which says where it looked."""
     rospack = _rospack()
     if package not in rospack.list():
@@ -48,10 +61,10 @@ def _find(package):
     return rospack.get_path(package)
 
 
-def _without_inorder(main):
+def _without_inorder(main: Callable[[], Any]) -> Callable[[], Any]:
     """The engine's command without its warning about --inorder, since it knows only this order."""
     @functools.wraps(main)
-    def command():
+    def command() -> Any:
         sys.argv[1:] = [word for word in sys.argv[1:] if word not in ("--inorder", "-i")]
         return main()
     return command
@@ -70,12 +83,12 @@ _WITHOUT_PREFIX = {"property": ("name",), "macro": ("name",), "include": ("filen
                    "if": ("value",), "unless": ("value",), "insert_block": ("name",)}
 
 
-def _with_melodics_names(eval_all, handle_macro_call):
+def _with_melodics_names(eval_all: _Walk, handle_macro_call: _Walk) -> tuple[_Walk, _Walk]:
     """The engine's two functions for files of ROS melodic and before, in which elements and macros of xacro may lack
     the prefix ``xacro:``. They get it, with a warning that names file and lines; noetic ignores them."""
-    told = set()
+    told: set[str] = set()
 
-    def add_prefix(node):
+    def add_prefix(node: Any) -> None:
         name = node.tagName
         if name not in told:
             told.add(name)
@@ -83,12 +96,12 @@ def _with_melodics_names(eval_all, handle_macro_call):
                             % (name, name, _places(name)))
         node.tagName = node.nodeName = "xacro:" + name
 
-    def is_of_xacro(node):
+    def is_of_xacro(node: Any) -> bool:
         wanted = _WITHOUT_PREFIX.get(getattr(node, "tagName", ""))
         return wanted is not None and all(node.hasAttribute(name) for name in wanted)
 
     @functools.wraps(eval_all)
-    def evaluate(node, macros, symbols):
+    def evaluate(node: Any, macros: Any, symbols: Any) -> Any:
         # What a plugin has for elements is its own business.
         if node.tagName != "plugin":
             for child in filter(is_of_xacro, node.childNodes):
@@ -96,7 +109,7 @@ def _with_melodics_names(eval_all, handle_macro_call):
         return eval_all(node, macros, symbols)
 
     @functools.wraps(handle_macro_call)
-    def handle(node, macros, symbols):
+    def handle(node: Any, macros: Any, symbols: Any) -> Any:
         if node.tagName in macros and node.tagName not in _OF_URDF:
             add_prefix(node)
         return handle_macro_call(node, macros, symbols)
@@ -104,7 +117,7 @@ def _with_melodics_names(eval_all, handle_macro_call):
     return evaluate, handle
 
 
-def _places(name):
+def _places(name: str) -> str:
     """Position of an element in the files that are being read, as text."""
     for path in reversed([path for path in _engine.filestack or () if path]):
         try:
@@ -117,9 +130,11 @@ def _places(name):
     return "in a file that is included"
 
 
+#: Of the engine, which takes the place of this module.
+main: Callable[[], Any]
 _engine = _load_engine(_engine_folder())
 _engine.main = _without_inorder(_engine.main)
 _engine.eval_all, _engine.handle_macro_call = _with_melodics_names(_engine.eval_all, _engine.handle_macro_call)
-_substitution_args = importlib.import_module("xacro.substitution_args")  # the engine's
+_substitution_args: Any = importlib.import_module("xacro.substitution_args")  # the engine's
 _substitution_args._eval_find = _find         # $(find PACKAGE)
 _substitution_args._eval_dict["find"] = _find  # $(eval find('PACKAGE'))
