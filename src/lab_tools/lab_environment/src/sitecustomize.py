@@ -24,7 +24,8 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "moveit_msgs.msg._PositionIKRequest": "lab_environment.former_fields",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
            "rosgraph.roslogging": "lab_environment.full_disk",
-           "roslaunch.config": "lab_environment.hidden_tokens lab_environment.quick_imports",
+           "roslaunch.config": "lab_environment.hidden_tokens lab_environment.quick_imports "
+                             "lab_environment.rosout_clock",
            "catkin": "lab_environment.quick_imports",
            "roslaunch.parent": "lab_environment.launch_guard lab_environment.launch_end"}
 

@@ -12,9 +12,6 @@ import socket
 import subprocess
 import sys
 import time
-from pathlib import Path
-
-import rospkg
 
 from lab_environment.family import children_of, direct_children
 
@@ -48,7 +45,7 @@ def main():
 async def _run(options):
     """The lab, until a part of it or the supervisor ends; returns which, as a text."""
     lab = await asyncio.create_subprocess_exec("roslaunch", "-p", str(options.master), *options.launch,
-                                               stdin=subprocess.DEVNULL, env=environment_of_roslaunch(os.environ))
+                                               stdin=subprocess.DEVNULL)
     listener = socket.socket(fileno=options.listener)
     listener.setblocking(False)
     forwarder = await asyncio.start_unix_server(lambda *streams: forward(streams, options.page), sock=listener)
@@ -60,13 +57,6 @@ async def _run(options):
             task.cancel()
         first = done.pop()
         return "%s has ended (%s)" % (ends[first], first.result())
-
-
-def environment_of_roslaunch(environment):
-    """``environment`` with the labs' own roscore.xml; all else of ROS's folder of settings stays."""
-    logging = Path(rospkg.get_etc_ros_dir(environment), "python_logging.conf")
-    found = {"ROS_PYTHON_LOG_CONFIG_FILE": str(logging)} if logging.is_file() else {}
-    return {**found, **environment, "ROS_ETC_DIR": str(Path(rospkg.RosPack().get_path("lab_class")) / "core")}
 
 
 async def _page(options):
