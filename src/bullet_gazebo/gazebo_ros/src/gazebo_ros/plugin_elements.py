@@ -26,6 +26,7 @@ PLUGINS = {
     "libgazebo_ros_openni_kinect.so": (_DEPTH, _LENS, _TRIGGER),
     "libgazebo_ros_laser.so": ("topicName frameName updateRate",),
     "libgazebo_ros_gpu_laser.so": ("topicName frameName updateRate",),
+    "libgazebo_ros_block_laser.so": ("topicName frameName updateRate gaussianNoise hokuyoMinIntensity",),
     "libgazebo_ros_range.so": ("topicName frameName updateRate fov radiation gaussianNoise",),
     "libgazebo_ros_imu.so": ("topicName frameName bodyName serviceName updateRate gaussianNoise rpyOffset", _OFFSET),
     "libgazebo_ros_imu_sensor.so": (

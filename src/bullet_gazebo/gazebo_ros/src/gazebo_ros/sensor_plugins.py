@@ -87,7 +87,7 @@ class PacedSensor(ModelPlugin):
         self._pace.restart()
 
 
-class _RaySensor(PacedSensor):
+class RaySensor(PacedSensor):
     """A sensor of rays, cast into the collision shapes."""
 
     def __init__(self, context):
@@ -130,7 +130,7 @@ class _RaySensor(PacedSensor):
         self._sweep = Sweep(self.pattern, world.ray_test_batch, world.random)
 
 
-class Laser(_RaySensor):
+class Laser(RaySensor):
     """``libgazebo_ros_laser.so``, ``libgazebo_ros_gpu_laser.so``. Of several rows the middle one is published. The
     intensities are 0, as in Gazebo for surfaces without a ``<laser_retro>``."""
 
@@ -149,7 +149,7 @@ class Laser(_RaySensor):
                          ranges=row.tolist(), intensities=self._intensities)
 
 
-class RangeFinder(_RaySensor):
+class RangeFinder(RaySensor):
     """``libgazebo_ros_range.so``: the nearest of all rays, the largest range when none meets anything."""
 
     message_class = Range
