@@ -15,7 +15,8 @@ _POINT = np.dtype([(name, kind) for name, (_, kind) in _FIELDS.items()])
 
 class BlockLaser(RaySensor):
     """``libgazebo_ros_block_laser.so``: sensor_msgs/PointCloud of all rays, row by row from the lowest, with
-    intensities of 0. A ray that hits nothing is infinitely far. Element besides those of a laser: ``gaussianNoise`` [m]."""
+    intensities of 0. A ray that hits nothing is infinitely far. Element besides those of a laser: ``gaussianNoise``
+    [m]."""
 
     message_class = PointCloud
 
