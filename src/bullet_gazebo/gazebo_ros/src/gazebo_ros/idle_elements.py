@@ -12,7 +12,7 @@ _ONE_MU = "friction is the same in all directions"
 
 #: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
 KNOWN = {
-    "model": "static self_collide plugin start_configuration",
+    "model": "static self_collide joint plugin start_configuration",
     "link": "mu mu1 kp kd selfCollide self_collide turnGravityOff gravity material sensor light plugin canonicalBody "
             "maxContacts",
     "link/collision": "max_contacts",

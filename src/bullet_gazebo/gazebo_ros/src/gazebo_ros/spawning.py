@@ -29,7 +29,7 @@ from gazebo_ros.world_lights import lights_of_links
 from loop_ros.faults import SURVIVED, described
 from loop_ros.names import IllegalName
 from model_files.resources import ResourceFinder
-from sdf_model import ModelFolders, SdfError, parse_sdf_model
+from sdf_model import ModelFolders, SdfError, add_loops, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 from world_picture.shared_picture import NoPicture, PictureWriter
 from world_picture.snapshot import SnapshotError
@@ -120,6 +120,7 @@ class Spawner:
         except UrdfError as error:
             raise SpawnRefused(str(error)) from error
         self._warn(name, idle_elements(robot, "its description"))
+        add_loops(robot)
         return self.prepare_robot(name, xml, robot, namespace, parameters, drawing=xml)
 
     def prepare_sdf(self, name, xml, namespace, parameters):

@@ -5,6 +5,7 @@ from .document import SdfError
 from .folders import ModelFolders, description_file
 from .lights import Light, Scene, parse_light
 from .model import SdfModel, parse_sdf_model
+from .urdf_joints import add_loops
 from .world import SdfWorld, parse_sdf_world
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "SdfError",
     "SdfModel",
     "SdfWorld",
+    "add_loops",
     "description_file",
     "parse_light",
     "parse_sdf_model",
