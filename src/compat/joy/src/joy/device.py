@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A joystick's device file."""
+from __future__ import annotations
+
 import array
 import errno
 import fcntl
@@ -23,16 +25,16 @@ class Device:
     Raises DeviceLost when it cannot be opened.
     """
 
-    def __init__(self, path):
+    def __init__(self, path: str) -> None:
         self._path = path
         try:
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
-            hint = _HINTS.get(error.errno)
+            hint = _HINTS.get(error.errno or 0)
             raise DeviceLost("no joystick at %s: %s%s" % (path, error.strerror, "; " + hint if hint else "")) from None
         self.axes, self.buttons = self._count(_AXES), self._count(_BUTTONS)
 
-    def read(self, timeout_s):
+    def read(self, timeout_s: float) -> bytes:
         """Return the bytes that arrive within a time [s]; may be empty. Raises DeviceLost."""
         try:
             if not select.select([self._file], [], [], timeout_s)[0]:
@@ -46,10 +48,10 @@ class Device:
             raise DeviceLost("joystick %s is lost: it was closed" % self._path)
         return data
 
-    def close(self):
+    def close(self) -> None:
         os.close(self._file)
 
-    def _count(self, request):
+    def _count(self, request: int) -> int:
         found = array.array("B", [0])
         try:
             fcntl.ioctl(self._file, request, found)

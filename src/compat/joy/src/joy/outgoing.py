@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """When a message about a joystick is due."""
+from __future__ import annotations
+
 import math
 
 
@@ -10,7 +12,7 @@ class Outgoing:
     sent again [Hz], 0 (never) to 1000. Raises ValueError for values out of range.
     """
 
-    def __init__(self, coalesce_s=0.001, repeat_hz=0.0):
+    def __init__(self, coalesce_s: float = 0.001, repeat_hz: float = 0.0) -> None:
         if not 0.0 <= coalesce_s <= 1.0:
             raise ValueError("coalesce_interval is %s; it must be from 0 to 1 s" % coalesce_s)
         if not 0.0 <= repeat_hz <= 1000.0:
@@ -19,21 +21,21 @@ class Outgoing:
         self._period_s = 1.0 / repeat_hz if repeat_hz else math.inf
         self._due_s = math.inf
 
-    def changed(self, now_s, at_once):
+    def changed(self, now_s: float, at_once: bool) -> None:
         """Note a change; at_once: it was a button, which does not wait."""
         self._due_s = min(self._due_s, now_s + (0.0 if at_once else self._coalesce_s))
 
-    def is_due(self, now_s):
+    def is_due(self, now_s: float) -> bool:
         return now_s >= self._due_s
 
-    def wait_s(self, now_s):
+    def wait_s(self, now_s: float) -> float | None:
         """Until the next message is due [s]; infinite when none is."""
         return max(0.0, self._due_s - now_s)
 
-    def sent(self, now_s):
+    def sent(self, now_s: float) -> None:
         """Note that a message was sent."""
         self._due_s = now_s + self._period_s
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Stop repeating: the joystick is gone."""
         self._due_s = math.inf
