@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Baxter in a world, in your own program: no ROS, no environment variables.
+
+    from baxter_lab import Lab, pose
+
+    with Lab() as lab:
+        lab.robot.enable()
+        lab.robot.left.move(pose((0.7, 0.3, 0.1)))
+
+`Lab` is the front door; docs/python.md begins with twenty lines that pick up a block.
+"""
+from baxter_sim_hardware.simulated import Which
+from bullet_sim import BulletSimError
+
+from .cameras import Picture
+from .errors import LabError, MeshesMissing, NotReached
+from .lab import Lab, Options, Thing, pose
+from .robot import Arm, Baxter, CommandRefused, Event, Gripper, Mode, NoSolution, State
+
+__all__ = ["Arm", "Baxter", "BulletSimError", "CommandRefused", "Event", "Gripper", "Lab", "LabError", "MeshesMissing",
+           "Mode", "NoSolution", "NotReached", "Options", "Picture", "State", "Thing", "Which", "pose"]

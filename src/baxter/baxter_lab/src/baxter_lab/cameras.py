@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pictures of a lab: by the robot's own cameras, and from anywhere."""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sensor_renderer.best import best_renderer
+from sensor_renderer.mirror import Mirror
+from sensor_renderer.pinhole import OPTICAL, Pinhole
+from sensor_renderer.viewpoint import looking_at
+from urdf_model.writer import drawing_urdf
+from world_picture.drawing import DrawingCache
+
+from .errors import LabError
+
+#: {camera: the link that it looks out of, along its x axis}
+LINKS = {"head": "head_camera", "left_hand": "left_hand_camera", "right_hand": "right_hand_camera"}
+#: Baxter's cameras at their start: width [pixels], height, horizontal field of view [rad]; nearest, furthest [m].
+ROBOTS_FIELD_RAD, NEAR_M, FAR_M = 1.3962634, 0.02, 100.0
+OUTSIDE_FIELD_RAD = 0.75
+
+
+class Picture(NamedTuple):
+    """pixels (height, width, 3) uint8; depth (height, width) [m], or None where it was not asked for; camera (4, 4):
+    its optical frame (x right, y down, z ahead) in `base`; matrix (3, 3): focal lengths and middle [pixels]."""
+
+    pixels: np.ndarray
+    depth: np.ndarray | None
+    camera: np.ndarray
+    matrix: np.ndarray
+
+
+class Cameras:
+    """Draws the world of a lab. lab: `lab.Lab`. What it draws with is made at the first picture."""
+
+    def __init__(self, lab):
+        self._lab, self._mirror, self._renderer, self._shown = lab, None, None, None
+
+    def close(self) -> None:
+        """Free what it draws with."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def take(self, camera: str, width: int = 640, height: int = 400, depth: bool = False) -> Picture:
+        """A picture by one of the robot's cameras: head, left_hand, right_hand. Raises LabError for another name."""
+        if camera not in LINKS:
+            raise LabError("there is no camera '%s'; there are %s" % (camera, ", ".join(LINKS)))
+        frame = self._lab.robot.simulated.model.link_pose(LINKS[camera]).matrix() @ OPTICAL
+        return self._draw(Pinhole.from_field_of_view(width, height, ROBOTS_FIELD_RAD, NEAR_M, FAR_M), frame, depth)
+
+    def look(self, eye, target, width: int = 640, height: int = 480, depth: bool = False) -> Picture:
+        """A picture from `eye` (3,) towards `target` (3,) [m]."""
+        pinhole = Pinhole.from_field_of_view(width, height, OUTSIDE_FIELD_RAD, NEAR_M, FAR_M)
+        return self._draw(pinhole, looking_at(np.asarray(eye, dtype=float), np.asarray(target, dtype=float)), depth)
+
+    def _draw(self, pinhole, frame, depth):
+        self._follow()
+        pixels, distance = self._renderer.render(self._mirror, pinhole, frame, True, depth)
+        matrix = np.array([[pinhole.fx, 0.0, pinhole.cx], [0.0, pinhole.fy, pinhole.cy], [0.0, 0.0, 1.0]])
+        return Picture(pixels.copy(), distance.copy() if depth else None, frame, matrix)
+
+    def _follow(self):
+        """Bring the mirror to the world's present state."""
+        models = self._lab.world.models
+        if self._mirror is None:
+            self._mirror = Mirror(DrawingCache(), self._lab.find_mesh, self._lab._warn)
+            self._renderer, problem = best_renderer()
+            if problem:
+                self._lab._warn(problem)
+        shown = [(name, model) for name, model in models.items()]
+        if shown != self._shown:
+            self._mirror.set_scene([_entry(name, model) for name, model in shown])
+            self._shown = shown
+        values = []
+        for model in models.values():
+            pose = model.base_pose()
+            values += [*pose.position, *pose.quaternion, *model.read_joints()[0].tolist()]
+        self._mirror.set_state(np.array(values))
+
+
+def _entry(name, model):
+    """What the renderer has to know of a model."""
+    return {"name": name, "urdf": drawing_urdf(model.merged), "joints": list(model.joint_names),
+            "static": model.static}

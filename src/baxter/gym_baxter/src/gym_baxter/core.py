@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An environment without Gymnasium: a task in a lab, with actions, observations, rewards, and exact states."""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_lab import Lab, Options
+from baxter_lab.saving import restorer
+from baxter_model import SIDES, poses
+from urdf_model.transforms import quaternion_from_matrix
+
+from .controls import ArmControl, action_size, checked
+from .tasks import TASKS, robosuite_start
+
+STEP_S = 0.002
+COMMAND_TICKS = 5  # set-points are streamed at 100 Hz, as programs on the robot do
+OBSERVATIONS = ("state", "pixels", "pixels_agent_pos")
+CAMERAS = ("head", "left_hand", "right_hand")
+
+
+class Choices(NamedTuple):
+    """control: one of `controls.CONTROLS`; control_freq: actions a second [Hz], which divides 500; obs_type: one of
+    OBSERVATIONS; cameras: of CAMERAS, each a picture of `size` x `size`; robosuite_order: the right arm first;
+    options: of the robot."""
+
+    control: str = "joint_delta"
+    control_freq: int = 20
+    obs_type: str = "state"
+    cameras: tuple = CAMERAS
+    size: int = 84
+    robosuite_order: bool = False
+    options: Options = Options()
+
+
+class Stepped(NamedTuple):
+    """Of one action: observation, reward (0 to 1), whether the task is done."""
+
+    observation: dict
+    reward: float
+    succeeded: bool
+
+
+class Core:
+    """task: a name in `tasks.TASKS`; choices: `Choices`. Raises ValueError for unknown names, MeshesMissing."""
+
+    def __init__(self, task: str, choices: Choices = Choices()):  # noqa: B008 (a tuple)
+        if task not in TASKS:
+            raise ValueError("task is %r; choices are %s" % (task, ", ".join(TASKS)))
+        if choices.obs_type not in OBSERVATIONS:
+            raise ValueError("obs_type is %r; choices are %s" % (choices.obs_type, ", ".join(OBSERVATIONS)))
+        ticks = 1.0 / (STEP_S * choices.control_freq) if choices.control_freq > 0 else 0.0
+        if ticks < 1.0 or abs(ticks - round(ticks)) > 1e-9:
+            raise ValueError("control_freq is %r Hz; it must divide 500" % (choices.control_freq,))
+        self.choices, self._ticks = choices, round(ticks)
+        self.action_size = action_size(choices.control)  # before a world is made, as all refusals
+        self.sides = SIDES[::-1] if choices.robosuite_order else SIDES
+        self.lab = Lab(choices.options, time_step_s=STEP_S)
+        self.task = TASKS[task](self.lab)
+        self._start_robot()
+        self._controls = [ArmControl(self.lab.robot.arms[side], choices.control) for side in self.sides]
+        self._start = self.lab.save()
+
+    def _start_robot(self):
+        table = poses()
+        start = robosuite_start() if self.task.POSE is None else {
+            side: np.array(list(table.angles(self.task.POSE, side).values())) for side in SIDES}
+        self.lab.robot.enable()
+        self.lab.robot.put(start)
+
+    @property
+    def steps(self) -> int:
+        """Actions of an episode."""
+        return self.task.STEPS
+
+    def close(self) -> None:
+        """End the world."""
+        self.lab.close()
+
+    def reset(self, random: np.random.Generator) -> dict:
+        """Begin an episode by `random`; returns the observation. What was before has no influence, to the last bit."""
+        self.lab.restore(self._start)
+        self.task.begin(random)
+        for control in self._controls:
+            control.reset()
+        return self.observation()
+
+    def step(self, action) -> Stepped:
+        """One action, (action_size,) of numbers from -1 to 1. Raises ValueError."""
+        action = checked(action, self.action_size)
+        begins = [control.target.copy() for control in self._controls]
+        for control, part in zip(self._controls, np.split(action, len(self._controls)), strict=True):
+            control.take(part)
+        for tick in range(self._ticks):
+            if tick % COMMAND_TICKS == 0:
+                share = min((tick + COMMAND_TICKS) / self._ticks, 1.0)
+                for control, begin in zip(self._controls, begins, strict=True):
+                    control.send(share, begin)
+            self.lab.step()
+        return Stepped(self.observation(), self.task.reward(), self.task.succeeded())
+
+    # -- what is observed
+
+    def observation(self) -> dict:
+        """{"state": (n,) float64} or {"pixels": {camera: (size, size, 3) uint8}, "agent_pos": (n,)}, or a part."""
+        kind, found = self.choices.obs_type, {}
+        if kind == "state":
+            found["state"] = np.concatenate([self.agent_pos(), self.task.observed()])
+        else:
+            size = self.choices.size
+            found["pixels"] = {name: self.lab.cameras.take(name, size, size).pixels for name in self.choices.cameras}
+            if kind == "pixels_agent_pos":
+                found["agent_pos"] = self.agent_pos()
+        return found
+
+    def agent_pos(self) -> np.ndarray:
+        """Of each arm, in the actions' order: angles (7) [rad], speeds (7) [rad/s], the hand's place (3) [m] and
+        quaternion x y z w, how far the gripper is open, 0 to 1."""
+        values = []
+        for side in self.sides:
+            arm = self.lab.robot.arms[side]
+            pose = arm.pose
+            values += [*arm.angles, *arm.velocities, *pose[:3, 3], *quaternion_from_matrix(pose),
+                       arm.gripper.position / 100.0]
+        return np.array(values)
+
+    # -- states
+
+    def save(self):
+        """The whole state: the physics, the robot's control logic, the task's."""
+        logic = [restorer(vars(control)) for control in self._controls]
+        return self.lab.save(), logic, {name: value for name, value in vars(self.task).items() if name == "goal"}
+
+    def restore(self, state) -> dict:
+        """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
+        for bit. Raises LabError."""
+        saved, logic, task = state
+        self.lab.restore(saved)
+        for again in logic:
+            again()
+        vars(self.task).update(task)
+        return self.observation()

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The environments for Gymnasium."""
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import EzPickle
+
+from .core import Choices, Core
+from .tasks import TASKS
+
+#: Where a picture for people is taken from, and what it looks at [m].
+_EYE, _TARGET = (2.2, 1.3, 0.7), (0.55, 0.0, 0.0)
+_PICTURE = (480, 360)
+#: No number of a state is greater [rad, rad/s, m]: tables are within reach, and nothing here flies.
+_FAR = 100.0
+
+
+class BaxterEnv(gymnasium.Env, EzPickle):
+    """One task: the arguments are those of `core.Choices`. An episode ends when the task is done, and is truncated by
+    Gymnasium's TimeLimit. `info` has ``is_success``. `reset(options={"state": s})` begins at a state of ``save()``."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
+
+    def __init__(self, task: str, render_mode: str | None = None, **choices):
+        EzPickle.__init__(self, task, render_mode, **choices)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError("render_mode is %r; choices are None and rgb_array" % (render_mode,))
+        self.render_mode = render_mode
+        self._core = Core(task, Choices(**choices))
+        self.metadata = {**type(self).metadata, "render_fps": self._core.choices.control_freq}
+        self.action_space = spaces.Box(-1.0, 1.0, (self._core.action_size,), np.float32)
+        self._core.reset(np.random.default_rng(0))
+        self.observation_space = _space(self._given(self._core.observation()))
+
+    def _given(self, observation):
+        return observation["state"] if self._core.choices.obs_type == "state" else (
+            observation if "agent_pos" in observation else observation["pixels"])
+
+    def reset(self, *, seed=None, options=None):
+        """Begin an episode."""
+        super().reset(seed=seed)
+        state = (options or {}).get("state")
+        found = self._core.reset(self.np_random) if state is None else self._core.restore(state)
+        return self._given(found), {"is_success": False}
+
+    def step(self, action):
+        """One action."""
+        observation, reward, succeeded = self._core.step(action)
+        return self._given(observation), float(reward), bool(succeeded), False, {"is_success": bool(succeeded)}
+
+    def save(self):
+        """The whole present state, for ``reset(options={"state": ...})`` of this environment."""
+        return self._core.save()
+
+    def render(self):
+        """A picture from outside, (360, 480, 3) uint8, with render_mode rgb_array."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() needs gymnasium.make(..., render_mode=\"rgb_array\")")
+            return None
+        return self._core.lab.cameras.look(_EYE, _TARGET, *_PICTURE).pixels
+
+    def close(self):
+        """End the world."""
+        self._core.close()
+
+
+def _space(value):
+    if isinstance(value, dict):
+        return spaces.Dict({name: _space(part) for name, part in value.items()})
+    if value.dtype == np.uint8:
+        return spaces.Box(0, 255, value.shape, np.uint8)
+    return spaces.Box(-_FAR, _FAR, value.shape, np.float64)
+
+
+def register() -> None:
+    """Make all tasks known to ``gymnasium.make``."""
+    for name, task in TASKS.items():
+        gymnasium.register("gym_baxter/%s-v0" % name, entry_point="gym_baxter.env:BaxterEnv", kwargs={"task": name},
+                           max_episode_steps=task.STEPS)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The environments without Gymnasium; `test_gym_env.py` has what needs it."""
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from baxter_lab import Options, pose
+from gym_baxter.controls import CONTROLS, action_size
+from gym_baxter.core import Choices, Core
+from gym_baxter.tasks import TABLE_TOP_M, TASKS
+
+PLAIN = Options(with_meshes=False)
+EPISODE = """
+import hashlib, numpy as np
+from baxter_lab import Options
+from gym_baxter.core import Choices, Core
+core = Core("PickPlace", Choices("osc_pose", options=Options(with_meshes=False)))
+found = [core.reset(np.random.default_rng(7))["state"]]
+for action in np.random.default_rng(8).uniform(-1.0, 1.0, (5, core.action_size)):
+    found.append(core.step(action).observation["state"])
+print(hashlib.sha256(np.array(found).tobytes()).hexdigest())
+"""
+
+
+@pytest.fixture(scope="module")
+def made():
+    """{task: its Core}, made when they are asked for."""
+    found = {}
+
+    def of(task):
+        if task not in found:
+            found[task] = Core(task, Choices("osc_pose", options=PLAIN))
+        return found[task]
+
+    yield of
+    for core in found.values():
+        core.close()
+
+
+def played(core, seed, count=4):
+    found = [core.reset(np.random.default_rng(seed))["state"]]
+    for action in np.random.default_rng(seed + 1).uniform(-1.0, 1.0, (count, core.action_size)):
+        stepped = core.step(action)
+        found.append(np.append(stepped.observation["state"], stepped.reward))
+        assert 0.0 <= stepped.reward <= 1.0 and np.isfinite(found[-1]).all()
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_equal_seeds_give_equal_episodes_whatever_was_before(made, task):
+    core = made(task)
+    first = played(core, 1)
+    other = played(core, 2)
+    np.testing.assert_array_equal(first, played(core, 1))
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_saved_state_goes_on_to_the_bit(made, task):
+    core = made(task)
+    core.reset(np.random.default_rng(3))
+    actions = np.random.default_rng(4).uniform(-1.0, 1.0, (4, core.action_size))
+    core.step(actions[0])
+    state, found = core.save(), []
+    for _ in range(2):
+        found.append([core.step(action).observation["state"] for action in actions])
+        core.restore(state)
+    np.testing.assert_array_equal(*found)
+
+
+def test_processes_agree_to_the_bit():
+    told = {subprocess.run([sys.executable, "-c", EPISODE], capture_output=True, text=True, check=True).stdout
+            for _ in range(2)}
+    assert len(told) == 1 and len(told.pop()) > 60
+
+
+def test_a_deviation_in_space_moves_the_hand_by_it(made):
+    core = made("Reach")
+    core.reset(np.random.default_rng(0))
+    arm = core.lab.robot.left
+    before, action = arm.pose, np.zeros(core.action_size)
+    action[:6] = (0.4, 0.0, 0.4, 0.0, 0.0, 0.2)  # 2 cm ahead and up, 0.1 rad about z
+    core.step(action)
+    for _ in range(8):
+        core.step(np.zeros(core.action_size))
+    np.testing.assert_allclose(arm.pose[:3, 3] - before[:3, 3], (0.02, 0.0, 0.02), atol=4e-3)
+    turn = arm.pose[:3, :3] @ before[:3, :3].T
+    assert np.arctan2(turn[1, 0], turn[0, 0]) == pytest.approx(0.1, abs=0.02)
+
+
+def test_success_is_told(made):
+    core = made("Reach")
+    core.reset(np.random.default_rng(0))
+    core.task.goal = core.lab.robot.left.pose[:3, 3].copy()
+    stepped = core.step(np.zeros(core.action_size))
+    assert stepped.succeeded and stepped.reward > 0.8
+    core = made("PickPlace")
+    core.reset(np.random.default_rng(0))
+    core.task.block.put(core.task.goal)
+    assert core.step(np.zeros(core.action_size)).succeeded
+    core = made("TwoArmLift")
+    core.reset(np.random.default_rng(0))
+    assert not core.task.succeeded()
+    core.task.pot.put((0.66, 0.0, TABLE_TOP_M + core.task.HALF_M + 0.12))
+    assert core.task.succeeded() and core.task.reward() == 1.0
+    tilted = pose((0.66, 0.0, TABLE_TOP_M + core.task.HALF_M + 0.12), (1.0, 0.0, 0.0))
+    core.task.pot.put(tilted)
+    assert core.task.succeeded() and core.task.reward() < 0.5
+
+
+@pytest.mark.parametrize(("task", "choices", "named"), [
+    ("Juggle", Choices(), "PickPlace"), ("Reach", Choices(control="torque"), "osc_pose"),
+    ("Reach", Choices(control_freq=30), "500"), ("Reach", Choices(obs_type="smell"), "pixels")])
+def test_unknown_names_are_refused_with_the_choices(task, choices, named):
+    with pytest.raises(ValueError, match=named):
+        Core(task, choices)
+
+
+def test_an_action_of_another_size_is_refused(made):
+    core = made("Reach")
+    core.reset(np.random.default_rng(0))
+    for action in ([0.0] * 3, [float("nan")] * core.action_size):
+        with pytest.raises(ValueError, match=str(core.action_size)):
+            core.step(action)
+    assert {control: action_size(control) for control in CONTROLS} == {
+        "joint_delta": 16, "joint_pos": 16, "osc_pose": 14}
