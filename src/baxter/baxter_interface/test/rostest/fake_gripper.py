@@ -104,7 +104,7 @@ class FakeGripper:
     def run(self):
         for _ in beats(RATE_HZ, rospy.is_shutdown):
             with self._lock:
-                self._topics.update(None)
+                self._hand.update(None)
                 self._publish()
 
     def _publish(self):

@@ -24,6 +24,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerResponse
 
 from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.head import PanDrive
 from baxter_sim_hardware.robot_state import RobotState, State
 from baxter_sim_hardware.topics.head import HeadTopics
 from baxter_sim_hardware.topics.panel import PanelTopics
@@ -73,7 +74,8 @@ class FakeParts:
         panel.attach(RANGE, lambda: RANGE_MM)
         self._joint = PanJoint()
         # The robot is enabled here.
-        self._head = HeadTopics(self._joint, RobotState(State.ENABLED), 1.0 / RATE_HZ)
+        self._pan = PanDrive(self._joint, 1.0 / RATE_HZ)
+        self._head = HeadTopics(self._pan, RobotState(State.ENABLED), 1.0 / RATE_HZ)
         self._publishers = {**panel.publishers, **self._head.publishers}
         self._handlers = {**panel.handlers, **self._head.handlers}
         self._nods_on = False
@@ -109,7 +111,7 @@ class FakeParts:
     def run(self):
         for _ in beats(RATE_HZ, rospy.is_shutdown):
             with self._lock:
-                self._head.update()
+                self._pan.update()
                 now = time.monotonic()
                 for key, part, publisher in self._published:
                     message = self._publishers[key](now, part, self._joint)

@@ -4,15 +4,16 @@ import os
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
-import rospkg
 import yaml
 
 from urdf_model import XmlRefused, parse_xml
 
+from .packages import NOT_FOUND, find_packages
+
 
 def model_folders(packages=None, environ=os.environ):
     """Search path of ``model://NAME``: the user's folders first, ours last. ``packages``: RosPack."""
-    packages = packages or rospkg.RosPack()
+    packages = packages or find_packages()
     ours = Path(packages.get_path("model_files")) / "models"
     return [*_listed(environ, "GAZEBO_MODEL_PATH"), *exported_folders("gazebo_model_path", packages),
             Path.home() / ".gazebo" / "models", ours]
@@ -42,7 +43,7 @@ def exported_folders(attribute, packages=None):
 
     ``attribute``: gazebo_model_path, gazebo_media_path or plugin_path. An unreadable manifest is skipped.
     """
-    packages = packages or rospkg.RosPack()
+    packages = packages or find_packages()
     found = []
     for name in sorted(packages.list()):
         folder = Path(packages.get_path(name))
@@ -68,7 +69,7 @@ class ResourceFinder:
 
     def __init__(self, packages=None):
         """``packages``: a ``rospkg.RosPack`` that has crawled already, which saves a second crawl."""
-        self._packages = packages or rospkg.RosPack()
+        self._packages = packages or find_packages()
         self._model_folders = model_folders(self._packages)
         self._resource_folders = resource_folders(self._packages)
         self._found = {}
@@ -106,12 +107,12 @@ class ResourceFinder:
     def _package_folder(self, name):
         try:
             return Path(self._packages.get_path(name))
-        except rospkg.ResourceNotFound:
+        except NOT_FOUND:
             if not self._may_look_again:
                 return None
         # A RosPack caches its first crawl. A crawl is slow, so a missing package causes one, and not one per mesh.
         self._may_look_again = False
-        self._packages = rospkg.RosPack()
+        self._packages = find_packages()
         return self._package_folder(name)
 
 

@@ -8,6 +8,7 @@ from .errors import ModelError, ModelMismatch, PoseError
 from .grippers import CUSTOM, ELECTRIC, SUCTION, GripperKind
 from .names import (
     BASE_FRAME,
+    BASE_HEIGHT_M,
     HEAD_JOINT,
     JOINTS,
     MIRROR_SIGNS,
@@ -24,7 +25,7 @@ from .names import (
 from .poses import Poses, clamp_to_limits, null_space_postures, poses
 
 __all__ = [
-    "BASE_FRAME", "CUSTOM", "ELECTRIC", "HEAD_JOINT", "JOINTS", "MIRROR_SIGNS", "SIDES", "SUCTION",
+    "BASE_FRAME", "BASE_HEIGHT_M", "CUSTOM", "ELECTRIC", "HEAD_JOINT", "JOINTS", "MIRROR_SIGNS", "SIDES", "SUCTION",
     "GripperKind", "ModelError", "ModelMismatch", "PoseError", "Poses", "arm_angles", "clamp_to_limits",
     "finger_prefix", "is_part_of_arm", "joint_names", "mirrored", "named", "null_space_postures",
     "other_side", "poses", "tip_of",

@@ -16,6 +16,7 @@ HEAD_JOINT = "head_pan"
 
 # The reference frame of poses; also the fixed link of the torso.
 BASE_FRAME = "base"
+BASE_HEIGHT_M = 0.93  # of it above the floor, on the pedestal
 
 
 def joint_names(side):

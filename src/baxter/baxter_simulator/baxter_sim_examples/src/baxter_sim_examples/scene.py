@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from baxter_model import BASE_HEIGHT_M
+
 from .pick_and_place import Spot, start_angles
 
-BASE_HEIGHT_M = 0.93  # of the robot's frame `base` above the floor
 TABLE_XY_M = (1.0, 0.1)  # middle of the table, in `base`
 TABLE_TOP_M = 0.775  # above the floor
 TABLE_SIZE_M = 0.913  # of its square top

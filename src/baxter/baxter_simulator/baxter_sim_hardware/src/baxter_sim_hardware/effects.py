@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a physical robot does that ideal drives do not: which of it is switched on, and its numbers.
+"""Effects of a physical robot beyond ideal drives: which are switched on, and their numbers.
 
 The numbers stand in config/physical_robot.yaml, each with its source.
 """
 from pathlib import Path
 
 import numpy as np
-import rospkg
 import yaml
 
+from model_files.packages import find_packages
 from urdf_model import bounds, read_text
 
 from .errors import HardwareError
@@ -22,7 +22,7 @@ ALL, NONE = "all", "none"
 
 def physical_robot():
     """Path of the numbers."""
-    return Path(rospkg.RosPack().get_path("baxter_sim_hardware")) / "config" / "physical_robot.yaml"
+    return Path(find_packages().get_path("baxter_sim_hardware")) / "config" / "physical_robot.yaml"
 
 
 def chosen(words):

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from baxter_model import HEAD_JOINT
+
 from .arms.setpoint import approach
 from .errors import CommandRefused
 
@@ -72,6 +74,11 @@ class Head:
         """Where the set-point is now [rad]."""
         return float(self._position[0])
 
+    @property
+    def commanded(self):
+        """(position (1,) [rad], velocity (1,) [rad/s]) of the set-point now."""
+        return self._position, self._rate
+
     def update(self):
         """One tick: the set-point's (position (1,) [rad], velocity (1,) [rad/s]); None once it rests."""
         if self._resting:
@@ -81,3 +88,39 @@ class Head:
         # The tick after the arrival still sends the zero velocity to the joint.
         self._resting = self._position[0] == self._target[0] and self._rate[0] == 0.0
         return self._position, self._rate
+
+
+class PanDrive:
+    """The head's joint in the physics world. model: of bullet_sim; dt, dead_band: as of `Head`.
+
+    Attributes: `head`, its `Head`; `joint`, the number of the joint in the model.
+    """
+
+    def __init__(self, model, dt: float, dead_band: float = 0.0):
+        self._model, self._index = model, model.index([HEAD_JOINT])
+        self.joint = self._index[0]
+        self.head = Head(model.lower[self.joint], model.upper[self.joint], self._pan(), dt, dead_band)
+
+    def _pan(self):
+        return self._model.read_joints()[0][self.joint]
+
+    def stop(self) -> None:
+        """The robot was disabled: hold still."""
+        self.head.stop(self._pan())
+
+    def reset(self) -> None:
+        """The joint was put elsewhere, or the world was reset."""
+        self.head.reset(self._pan())
+
+    def update(self) -> None:
+        """One tick."""
+        setpoint = self.head.update()
+        if setpoint is not None:
+            self._drive(*setpoint)
+
+    def drive_again(self) -> None:
+        """Send the joint where it was sent last."""
+        self._drive(*self.head.commanded)
+
+    def _drive(self, position, velocity):
+        self._model.drive_position(self._index, position, self._model.max_effort[self._index], velocity=velocity)

@@ -71,7 +71,7 @@ def ramp(lab, joint, rate, seconds, said=False):
 
 def test_ideal_drives_are_what_one_gets_unasked(make_lab):
     lab = make_lab(parameters={"enable": True}, angles=STRETCHED)
-    assert lab.plugin._baxter.actuators is None and lab.plugin._sensors is None
+    assert lab.plugin._baxter.actuators is None and lab.plugin._simulated._sensors is None
     assert ramp(lab, S0, 0.5, 0.5) < 0.02
 
 

@@ -8,7 +8,7 @@ from baxter_model import JOINTS, SIDES, poses, tip_of
 from baxter_model.description import arm_radius, avoided_balls, head_guards
 from baxter_model.self_collision import HEAD, HEAD_GUARDS
 from baxter_sim_hardware.arms import avoidance, collision
-from baxter_sim_hardware.topics.collision import guards_of
+from baxter_sim_hardware.arms.guarding import guards_of
 from baxter_sim_kinematics import Chain, OwnBody
 
 HEARD = ("state", "limb/*/collision_avoidance_state")

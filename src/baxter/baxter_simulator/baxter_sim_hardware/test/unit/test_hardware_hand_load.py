@@ -84,7 +84,7 @@ def test_a_weight_that_is_told_of_and_not_there_lifts_the_arm_until_it_is_taken_
 def test_what_a_robot_knows_of_an_unknown_tool_is_the_bare_hand(make_lab, with_anvil, bare):
     labs = [make_lab(model=model, parameters={"effects": "lag"}, angles=REACHING)
             for model in (with_anvil, parse_urdf(bare))]
-    known, without = (lab.plugin._snapshot().gravity[lab.arm] for lab in labs)
+    known, without = (lab.plugin._simulated.snapshot().gravity[lab.arm] for lab in labs)
     np.testing.assert_allclose(known, without, atol=0.01)
     assert np.abs(labs[0].model.gravity_efforts()[labs[0].arm] - without).max() > 5.0
 
@@ -114,4 +114,5 @@ def test_a_refused_weight_leaves_the_one_before(make_lab):
     configure(lab, '{"urdf": {"link": 3}}')
     lab.run(0.01)
     assert "urdf has no weight" in lab.log.lines[-1]
-    assert lab.plugin._grippers.told_load("left").mass == 1.0 and lab.plugin._grippers.told_load("right") is None
+    hands = lab.plugin._simulated.hands
+    assert hands["left"].gripper.load.mass == 1.0 and hands["right"].gripper.load is None

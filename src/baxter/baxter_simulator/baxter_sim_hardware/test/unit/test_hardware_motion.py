@@ -210,7 +210,7 @@ def test_a_stop_uses_the_torque_that_there_is_and_no_more(lab, joint):
     wanted[[joint, joint + 7]] = lab.model.max_velocity[lab.arm][joint]
     lab.run(0.25, before=lambda lab: lab.command(VELOCITY, wanted))
     speed, where = lab.velocity[joint], lab.position
-    inertia, bias = lab.plugin._dynamics(lab.velocity)
+    inertia, bias = lab.plugin._simulated._dynamics(lab.velocity)
     limits, arm = lab.effort_limit[:7], np.ix_(range(7), range(7))
     column = inertia[arm][:, joint]
     # The joint with the least spare torque decides: the moving one, or one that must hold against it.

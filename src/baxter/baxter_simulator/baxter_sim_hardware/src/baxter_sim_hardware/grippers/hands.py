@@ -6,7 +6,7 @@ from baxter_model import tip_of
 from baxter_model.description import cup_of, openings_of
 
 from .commands import CustomGripper
-from .electric import ElectricGripper
+from .electric import OPEN, ElectricGripper
 from .suction import SuctionGripper
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle
@@ -38,6 +38,7 @@ class FingersHand:
             model.grip_firmly(link)
         self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt, calibrated)
         self._unseen_ticks = 0
+        self._driven = OPEN, 100.0  # to which share of the travel, how hard [%], as they begin
 
     def readings(self, positions):
         """(opening, force) [%] for the state message; positions: of all joints of the model."""
@@ -65,7 +66,12 @@ class FingersHand:
             # opening.
             for link in self._links:
                 self._model.renew_contacts(link)
-        setpoint, force = drive
+        self._driven = drive
+        self.drive_again()
+
+    def drive_again(self) -> None:
+        """Send the fingers where they were sent last."""
+        setpoint, force = self._driven
         self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
 
     def stop(self):

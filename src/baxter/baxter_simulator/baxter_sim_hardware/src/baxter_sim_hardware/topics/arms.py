@@ -47,13 +47,6 @@ class ArmTopics(Part):
         self._reference_message = convert.JointStates(names[self._order].tolist())
         self.command_observers = []
 
-    def feel(self, side, snapshot):
-        """External (torques (7,) [Nm], wrench (6,) [N, Nm]) on one arm's joints and on its tip."""
-        index = self._limb_index[side]
-        jacobian = self._chains[side].jacobian(snapshot.position[index])
-        return (snapshot.own_effort[index] - snapshot.effort[index],
-                endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
-
     # -- out
 
     def _endpoint_state(self, time_s, side, snapshot):

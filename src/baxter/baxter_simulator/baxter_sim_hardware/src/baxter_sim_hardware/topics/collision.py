@@ -1,20 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS interface of the arms' safety: collision states, and the messages that suppress safety functions."""
-import numpy as np
 from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionState
 from std_msgs.msg import Header
 
-from baxter_model import BASE_FRAME, SIDES
-from baxter_model.description import avoided_balls
-from baxter_model.readiness import UNFOLD
-from baxter_model.self_collision import BODY
-from baxter_sim_hardware.arms import avoidance, collision, safety
-from sim_time.pace import Schedule
+from baxter_model import BASE_FRAME
+from baxter_sim_hardware.arms import collision
 from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
-
-CHECK_RATE_HZ = 100.0  # rate of the checks of contacts and suppressions
 
 
 def _suppress(kind):
@@ -24,138 +17,19 @@ def _suppress(kind):
     return handle
 
 
-def _near(field):
-    """Names of the links that one arm is near to; field: `avoidance.Field`."""
-    return sorted({*field.near, *field.other, *field.body})
-
-
-def guards_of(robot):
-    """`avoidance.Guards` of an urdf_model.Robot."""
-    balls = avoided_balls(robot)
-    return avoidance.Guards(tuple(name for name, _, _ in balls),
-                            np.array([centre for _, centre, _ in balls]).reshape(-1, 3),
-                            np.array([radius for _, _, radius in balls]))
-
-
 class CollisionTopics(Part):
-    """world, model: of bullet_sim; baxter: `robot.Baxter`; chains: {side: Chain}; guards: `avoidance.Guards`; feel:
-    function (side, snapshot) -> (torques (7,), wrench (6,)) from outside; is_squeezed: function(side) -> whether its
-    cuff is.
+    """guarding: `arms.guarding.Guarding`."""
 
-    Attributes: `safety`: `arms.safety.Safety`, or None where collisions are only reported; `warn`: function(time_s,
-    kind, text) for the log.
-    """
-
-    def __init__(self, world, model, baxter, chains, guards, feel, is_squeezed):
-        self._world, self._model, self._baxter, self._arms = world, model, baxter, baxter.arms
-        self._chains, self._guards = chains, guards
-        self.fields = dict.fromkeys(SIDES, avoidance.FREE)
-        self._feel, self._is_squeezed = feel, is_squeezed
-        self.suppressions = {side: collision.Suppressions() for side in SIDES}
-        self._held = {side: collision.Held() for side in SIDES}
-        self._schedule = Schedule(CHECK_RATE_HZ)
-        self.safety, self.warn = None, None
-
-    def forget(self):
-        """The joints were put elsewhere."""
-        if self.safety is not None:
-            self.safety.forget()
-
-    def reset(self):
-        for suppressions in self.suppressions.values():
-            suppressions.reset()
-
-    def update(self, time_s, enabled, joints):
-        """Before a step: let the arms yield, float, stop or fall, depending on contacts, loads, cuffs and messages.
-
-        joints: (position, velocity, effort) of the whole model.
-        """
-        if self.safety is not None:
-            self.safety.load.note(joints)
-        if not self._schedule.due(time_s):
-            return
-        self._find_frames()
-        contacts = self._contacts()
-        for side, suppressions in self.suppressions.items():
-            self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
-            self.fields[side] = self._field(side, time_s)
-            self._arms.set_slowing(side, self.fields[side].slowing)
-            if self._held[side].look(time_s, self.fields[side].slowing):
-                self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too "
-                          "near to %s. Lead it round, or suppress that by limb/%s/%s" % (
-                              side, ", ".join(_near(self.fields[side])), side, collision.AVOIDANCE))
-            self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
-            floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
-            self._arms.set_floating(side, floats)
-        felt = self.safety.felt() if self.safety is not None else None
-        if felt is not None:
-            for side in self.suppressions:
-                self._stop_if_it_collides(side, time_s, felt, enabled)
-
-    def _find_frames(self):
-        """Where the arms are, and with safety also where they are commanded to be: {side: frames of joints} each."""
-        postures = [self._baxter.measured.position]
-        if self.safety is not None:
-            postures.append(self._arms.commanded_position)
-        self._frames = [{side: chain.joint_frames(posture[self._arms.joints_of(side)])
-                         for side, chain in self._chains.items()} for posture in postures]
-
-    def _stop_if_it_collides(self, side, time_s, felt, enabled):
-        why = safety.reason(*self._feel(side, felt), lambda kind: self.suppressions[side].active(kind, time_s))
-        self.safety.collides[side] = bool(why)
-        if why and enabled and not self._arms.floats(side) and not self._baxter.halted(side):
-            self._baxter.halt(side, self.safety.hold_s)
-            self.warn(time_s, (side, "collision"), "%s limb stops, a collision: %s. It takes commands again in %g s" % (
-                side, why, self.safety.hold_s))
-
-    def _field(self, side, time_s):
-        active, rates = self.suppressions[side].active, self._arms.wanted_rates(side)
-        if active(collision.AVOIDANCE, time_s):
-            return avoidance.FREE
-        found = avoidance.FREE
-        if not active(collision.BODY_AVOIDANCE, time_s):
-            found = avoidance.field(self._guards, *self._frames[0][side], rates)
-            if self.safety is not None:
-                found = self.safety.around(found, side, self._frames, rates)
-        return found if self.safety is None else self.safety.between(found, side, self._frames, rates)
-
-    def too_near(self):
-        """Which arms are in the field around the head, so that a physical robot could not be enabled; "" for none."""
-        self._find_frames()
-        near = ["the %s arm (%s)" % (side, ", ".join(field.near)) for side in SIDES
-                if (field := self._field(side, self._world.time_s)).near]
-        if not near:
-            return ""
-        return "in the field of collision avoidance: %s; unfold the arms by %s, which suppresses it" % (
-            " and ".join(near), UNFOLD)
-
-    def _contacts(self):
-        """[(link, link)] of the robot's own contacts that overlap or press."""
-        return [(contact.link_a, contact.link_b) for contact in self._world.contacts(self._model, self._model)
-                if contact.distance <= 0.0 or contact.force > 0.0]
-
-    def _touched(self, contacts, side, time_s):
-        suppressions = self.suppressions[side]
-        if suppressions.active(collision.AVOIDANCE, time_s):
-            contacts = []
-        elif suppressions.active(collision.BODY_AVOIDANCE, time_s):
-            contacts = [pair for pair in contacts if BODY not in pair]
-        return collision.touched(contacts, side)
+    def __init__(self, guarding):
+        self._guarding, self.suppressions = guarding, guarding.suppressions
 
     def _avoidance(self, time_s, side, snapshot):
-        links, other_arm = self._touched(self._contacts(), side, time_s)
-        field = self.fields[side]
-        near = sorted({*links, *_near(field)})
-        return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME),
-                                       other_arm or bool(field.other), near)
+        links, other_arm = self._guarding.near(side, time_s)
+        return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), other_arm, links)
 
     def _detection(self, time_s, side, snapshot):
-        if self.safety is not None:
-            collides = self.safety.collides[side] or self._baxter.halted(side)
-        else:
-            active = self.suppressions[side].active
-            collides = bool(safety.reason(*self._feel(side, snapshot), lambda kind: active(kind, time_s)))
-        return CollisionDetectionState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), collides)
+        return CollisionDetectionState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME),
+                                       self._guarding.collides(side, time_s, snapshot))
 
     TOPICS = (
         Topic("collision_avoidance_state", "limb/{limb}/collision_avoidance_state",

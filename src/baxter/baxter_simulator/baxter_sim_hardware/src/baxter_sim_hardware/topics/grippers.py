@@ -44,25 +44,6 @@ class GripperTopics(Part):
         self._properties = {side: _PROPERTIES[type(hand.gripper)] for side, hand in self._hands.items()}
         self._custom_states = {}  # {side: EndEffectorState of a tool that only a client knows}
 
-    def update(self, joints):
-        """One tick; joints: (position, velocity, effort) of the whole model."""
-        for hand in self._hands.values():
-            hand.update(joints)
-
-    def stop(self):
-        """The robot was disabled."""
-        for hand in self._hands.values():
-            hand.stop()
-
-    def reset(self):
-        """The world went back to its start, or the joints were put elsewhere."""
-        for hand in self._hands.values():
-            hand.reset()
-
-    def told_load(self, side):
-        """The `arms.hand_load.HandLoad` that a client has told of, or None."""
-        return self._hands[side].gripper.load
-
     def attach_sensors(self, panel):
         """Attach the vacuum sensors, 0 to 255, and the valves of suction grippers to the panel's channels."""
         for side, hand in self._hands.items():

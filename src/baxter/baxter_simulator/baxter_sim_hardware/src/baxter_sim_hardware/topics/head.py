@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The head's ROS side: messages from and to `head.Head`, and the drive of its joint."""
+"""The head's ROS side: messages from and to `head.Head`."""
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 
-from baxter_model import HEAD_JOINT
-from baxter_sim_hardware.head import TURNING_SPEED, Head
+from baxter_sim_hardware.head import TURNING_SPEED
 
 from . import convert
 from .row import STATE_RATE_HZ, Part, Topic
@@ -12,30 +11,10 @@ _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN
 
 
 class HeadTopics(Part):
-    """model: of bullet_sim; state: the robot's RobotState; dead_band: as of `Head`."""
+    """drive: `head.PanDrive`; state: the robot's RobotState; dt: length of a tick [s]."""
 
-    def __init__(self, model, state, dt, dead_band=0.0):
-        self._model, self._state, self._dt = model, state, dt
-        self._index = model.index([HEAD_JOINT])
-        joint = self._index[0]
-        self._head = Head(model.lower[joint], model.upper[joint], self._pan(), dt, dead_band)
-
-    def _pan(self):
-        return self._model.read_joints()[0][self._index[0]]
-
-    def stop(self):
-        """The robot was disabled: hold still."""
-        self._head.stop(self._pan())
-
-    def reset(self):
-        """The joint was moved by a service, or the world was reset."""
-        self._head.reset(self._pan())
-
-    def update(self):
-        setpoint = self._head.update()
-        if setpoint is not None:
-            self._model.drive_position(self._index, setpoint[0], self._model.max_effort[self._index],
-                                       velocity=setpoint[1])
+    def __init__(self, drive, state, dt):
+        self._head, self._joint, self._state, self._dt = drive.head, drive.joint, state, dt
 
     def _command_pan(self, component, msg, time_s):
         self._state.require_enabled()
@@ -54,12 +33,12 @@ class HeadTopics(Part):
             self._head.nod(time_s)
 
     def _head_state(self, time_s, component, snapshot):
-        joint = self._index[0]
+        joint = self._joint
         return HeadState(snapshot.position[joint], bool(abs(snapshot.velocity[joint]) > TURNING_SPEED),
                          self._head.is_nodding(time_s), self._head.pan_enabled)
 
     def _controller_state(self, time_s, component, snapshot):
-        joint = self._index[0]
+        joint = self._joint
         return convert.joint_controller_state(
             time_s, self._head.commanded_position, snapshot.position[joint], snapshot.effort[joint], self._dt)
 

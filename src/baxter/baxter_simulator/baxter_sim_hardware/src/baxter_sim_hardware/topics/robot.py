@@ -18,36 +18,23 @@ _resets = itertools.count(1)
 
 
 class RobotTopics(Part):
-    """baxter: `robot.Baxter`; joint_names: of the whole model; measure: function that renews baxter.measured;
-    set_joint_state_rate: function(Hz); as_robot: whether joint states come as the physical robot sends them: arms, head
-    and torso in one message, grippers in another.
+    """simulated: `simulated.SimulatedBaxter`; set_joint_state_rate: function(Hz); as_robot: whether joint states come
+    as the physical robot sends them: arms, head and torso in one message, grippers in another."""
 
-    Attributes. `on_disabled`: functions that are called when the robot was disabled. `what_keeps_disabled`: function
-    that returns why the robot may not be enabled with its arms where they are, or "".
-    """
-
-    def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings, as_robot=False):
-        self._baxter, self._measure, self._set_rate = baxter, measure, set_joint_state_rate
+    def __init__(self, simulated, set_joint_state_rate, context, warnings, as_robot=False):
+        self._simulated, self._baxter, self._set_rate = simulated, simulated.baxter, set_joint_state_rate
         self._world, self._log, self._warnings = context.world, context.log, warnings
-        self._joints = self._messages_of_joints(list(joint_names), as_robot)
-        self.on_disabled = []
-        self.what_keeps_disabled = str
+        self._joints = self._messages_of_joints(list(simulated.model.joint_names), as_robot)
 
     def apply(self, event):
         """Take an `Event`; a request that the robot's state refuses is logged."""
-        self._measure()
         before = self._baxter.state.state
         try:
-            if event is Event.ENABLE and not self._baxter.state.enabled and self.what_keeps_disabled():
-                raise CommandRefused(self.what_keeps_disabled())
-            self._baxter.apply(event)
+            self._simulated.apply(event)
         except CommandRefused as refusal:
             self._warnings.warn(self._world.time_s, event, "%s ignored: %s" % (event.value, refusal))
             return
         if self._baxter.state.state is not before:
-            if not self._baxter.state.enabled:
-                for disabled in self.on_disabled:
-                    disabled()
             self._log.info("Baxter is %s" % self._baxter.state.state.value)
 
     def press_estop(self, pressed):
