@@ -21,6 +21,10 @@ HONOURED = {
     "world/frame": "pose",
     "world/include": "uri name pose static plugin",
     "world/road": "width point",
+    "actor": "pose plugin",
+    "actor/skin": "filename scale",
+    "actor/script": "loop delay_start auto_start",
+    "actor/script/trajectory/waypoint": "time pose",
     "world/state/model": "pose",
     "light": "cast_shadows diffuse specular direction pose",
     "light/attenuation": "range linear constant quadratic",
@@ -117,6 +121,9 @@ WITHOUT_EFFECT = (
     ("world/scene/fog", {"color": "1 1 1 1", "type": "none", "start": "1", "end": "100", "density": "1"},
      "there is no fog"),
     ("world/scene", {"grid": "true", "origin_visual": "true"}, _OWN_VIEW),
+    ("actor", {"animation": None}, "actors glide: their limbs do not move"),
+    ("actor", {"link": None, "joint": None}, "an actor is its skin alone"),
+    ("actor/script/trajectory", {"tension": None}, "actors go straight between waypoints"),
     ("world", {"population": None}, "models of a <population> are left out"),
     ("world/road", {"material": None}, "roads are grey"),
     ("world/state", {"insertions": None, "deletions": None}, "of a <state>, only the models' poses count"),
@@ -179,5 +186,5 @@ WITHOUT_EFFECT = (
 )
 #: Where a path begins.
 SCOPES = ("world", "model", "link", "joint", "collision", "visual", "sensor", "light", "geometry", "surface",
-          "material", "axis")
+          "material", "axis", "actor")
 TABLE = ElementTable((HONOURED, HARMLESS), WITHOUT_EFFECT, SCOPES)

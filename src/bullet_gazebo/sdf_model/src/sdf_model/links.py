@@ -84,10 +84,10 @@ def _shape(document, element, link):
         scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
         submesh = kind.find("submesh")
         part = () if submesh is None else (document.text(submesh, "name"), document.flag(submesh, "center"))
-        found = Mesh(_file(document, document.text(kind, "uri")), scale, *part)
+        found = Mesh(file_of(document, document.text(kind, "uri")), scale, *part)
     elif kind.tag == "heightmap":
         size = document.vector(kind, "size", (1.0, 1.0, 1.0))
-        found = Mesh(_file(document, document.text(kind, "uri")), tuple(size))
+        found = Mesh(file_of(document, document.text(kind, "uri")), tuple(size))
         origin = origin @ pose_matrix(document.vector(kind, "pos", (0.0, 0.0, 0.0)))
     else:
         return None  # <empty>, or one that the table of elements has noted
@@ -104,7 +104,7 @@ def _turned_to(document, plane):
     return pose_matrix(rpy=(0.0, float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))))
 
 
-def _file(document, uri):
+def file_of(document, uri):
     """Return a mesh's name in a form that does not depend on the file that names it."""
     if "://" in uri or document.folder is None:
         return uri

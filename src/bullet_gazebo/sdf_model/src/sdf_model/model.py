@@ -11,6 +11,7 @@ from lxml import etree
 
 from urdf_model import Limit, OutOfBounds, Robot, bounds, check_robot, read_file
 
+from .actors import actor_robot
 from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
@@ -83,6 +84,9 @@ class ModelReader:
         inner, model = self._open(document, element, depth)
         if model is None:
             return Included([read_light(inner, light, np.eye(4)) for light in inner.root.iterchildren("light")])
+        if model.tag == "actor":
+            return actor(inner, model, document.text(element, "name", ""),
+                         document.pose(element) if element.find("pose") is not None else None)
         parts = self._parts(inner, model, "", np.eye(4), depth + 1)
         parts.gazebo += _plugins(document, element)
         pose = document.pose(element) if element.find("pose") is not None else inner.pose(model)
@@ -130,7 +134,7 @@ class ModelReader:
         except OSError as error:
             raise document.error(element, "%s (%s) cannot be read: %s" % (uri, path, error.strerror)) from None
         inner = Document(content, path, Path(path).parent, document.notes)
-        models = inner.root.findall("model")
+        models = inner.root.findall("model") or inner.root.findall("actor")
         if len(models) > 1 or not (models or inner.root.findall("light")):
             raise inner.error(inner.root, "it holds %d <model>, expected one" % len(models))
         return inner, models[0] if models else None
@@ -204,8 +208,8 @@ class ModelReader:
                 frames.add(name, child)
             else:
                 inner, model = self._open(document, child, depth)
-                if model is None:
-                    document.note(child, "lights inside of a model")
+                if model is None or model.tag == "actor":
+                    document.note(child, "%s inside of a model" % ("lights" if model is None else "an actor"))
                     continue
                 name = document.text(child, "name", "") or unused(inner.name(model), names)
                 names.add(name)
@@ -226,6 +230,13 @@ class ModelReader:
             parts.joints += below.joints
             parts.gazebo += below.gazebo
         return held
+
+
+def actor(document, element, name="", pose=None):
+    """Return the SdfModel of an <actor>; ``name`` and ``pose`` (4x4) in place of its own."""
+    name = name or document.name(element)
+    robot = actor_robot(document, element, name)
+    return SdfModel(name, robot, document.pose(element) if pose is None else pose, True)
 
 
 def _say_static(parts, static):

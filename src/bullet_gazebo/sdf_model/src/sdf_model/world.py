@@ -14,10 +14,10 @@ from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
 from .lights import Light, Scene, read_light, read_scene
-from .model import ModelReader, SdfModel, unused
+from .model import ModelReader, SdfModel, actor, unused
 
 # Left out, with a note.
-_NAMED = ("actor", "plugin")
+_NAMED = ("plugin",)
 _ROAD_HEIGHT_M = 0.002
 _AT_REST = 0.01  # m/s and rad/s: what Gazebo saves of bodies that stand
 _ASPHALT = (0.25, 0.25, 0.25, 1.0)
@@ -79,7 +79,7 @@ class _WorldReader:
         for child in element.iterchildren("frame"):
             self._frames.add(document.name(child), child, child.get("attached_to", ""))
         for child in document.children(element):
-            if child.tag in ("include", "model", "light", "road"):
+            if child.tag in ("include", "model", "light", "road", "actor"):
                 try:
                     self._entity(child)
                 except SdfError as error:
@@ -120,6 +120,8 @@ class _WorldReader:
             model = _road(document, element)
         elif element.tag == "model":
             model = self._models.model(document, element)
+        elif element.tag == "actor":
+            model = actor(document, element)
         else:
             model = self._models.included(document, element, 0)
             if isinstance(model, SdfModel) and not document.text(element, "name", ""):

@@ -141,9 +141,8 @@ def test_a_road_is_seen_and_touches_nothing(tmp_path):
     assert broken.models == [] and "two points and more" in broken.problems[0]
 
 
-def test_actors_and_plugins_of_the_world_are_named(tmp_path):
-    found = read_world(tmp_path, '<actor name="walker"/><plugin name="p" filename="libwind.so"/>')
-    assert "actor 'walker'" in found.warning and "plugin 'libwind.so'" in found.warning
+def test_plugins_of_the_world_are_named(tmp_path):
+    assert "plugin 'libwind.so'" in read_world(tmp_path, '<plugin name="p" filename="libwind.so"/>').warning
 
 
 def test_gravity_as_an_attribute(tmp_path):

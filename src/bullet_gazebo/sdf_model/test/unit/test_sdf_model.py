@@ -330,12 +330,33 @@ def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
 def test_what_is_not_understood_is_one_warning_with_file_and_lines(tmp_path, shelf):
     can = shelf.find("model://can")
     can.write_text(sdf('<link name="l">\n<audio_sink name="s" type="ray"/></link>', name="can"))
-    found = world(tmp_path, "<population/>\n<actor name='walker'/>\n<population/>\n<include><uri>model://can</uri></include>\n"
+    found = world(tmp_path, "<population/>\n<plugin filename='walker'/>\n<population/>\n<include><uri>model://can</uri></include>\n"
                             "<scene/><gui/>", shelf)
     assert found.warning.count("not understood") == found.warning.count("without an effect") == 1
     assert "population (%s line 3, 5)" % (tmp_path / "a.world") in found.warning
-    assert "actor 'walker' (" in found.warning
+    assert "plugin 'walker' (" in found.warning
     assert "audio_sink (%s line 4)" % can in found.warning and "scene" not in found.warning
+
+
+def test_an_actor_is_a_static_figure_with_a_plugin_that_moves_it(tmp_path, shelf):
+    walker = """<actor name="walker"><pose>0 0 1 0 0 0</pose><skin><filename>walk.dae</filename><scale>1.5</scale>
+</skin>
+<animation name="walking"><filename>walk.dae</filename></animation><script><loop>false</loop>
+<trajectory id="0" type="walking"><waypoint><time>0</time><pose>0 0 1 0 0 0</pose></waypoint>
+<waypoint><time>%s</time><pose>4 0 1 0 0 0</pose></waypoint></trajectory></script></actor>"""
+    shelf.find("model://can").write_text('<sdf version="1.6">%s</sdf>' % walker % 2)
+    found = world(tmp_path, walker % 4 + "<include><uri>model://can</uri><name>second</name></include>", shelf)
+    assert found.problems == [] and "animation" in found.warning
+    assert [(model.name, model.static, model.pose[2, 3]) for model in found.models] == [
+        ("walker", True, 1.0), ("second", True, 1.0)]
+    robot = found.models[0].robot
+    (shape,) = robot.links["link"].visuals
+    assert shape.geometry == Mesh(str(tmp_path / "walk.dae"), (1.5,) * 3) and robot.links["link"].collisions == []
+    (plugin,) = robot.gazebo[0].findall("plugin")
+    assert plugin.get("filename") == "libactor_trajectory.so" and plugin.findtext("loop") == "false"
+    assert [point.findtext("time") for point in plugin.iterfind("trajectory/waypoint")] == ["0", "4"]
+    found = world(tmp_path, walker % "soon", shelf)
+    assert found.models == [] and "<time> is 'soon'" in found.problems[0]
 
 
 def test_an_include_in_a_circle_ends(tmp_path, shelf):
