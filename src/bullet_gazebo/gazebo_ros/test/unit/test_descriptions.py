@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is read in URDF and world files."""
+import math
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from gazebo_msgs.srv import SpawnModelRequest
 
+from bullet_sim import World
 from gazebo_ros import urdf_extras, world_file
 from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.model_plugin import ModelPlugin
@@ -16,7 +19,7 @@ from gazebo_ros.spawning import Spawner, is_floor
 from gazebo_ros.urdf_extras import ExtrasError
 from loop_ros.testing import FakeLog
 from model_files.resources import model_folders
-from sdf_model import ModelFolders
+from sdf_model import ModelFolders, parse_sdf_model
 from urdf_model import parse_urdf
 
 WORLDS = Path(__file__).resolve().parents[2] / "worlds"
@@ -213,3 +216,17 @@ def test_the_core_loads_without_ros():
              "spawning")
     imports = "; ".join("import gazebo_ros.%s" % name for name in names)
     subprocess.run([sys.executable, "-c", block + imports], check=True)
+
+
+def test_a_pendulum_on_a_ball_joint_swings_in_all_directions():
+    world = World(time_step_s=0.001, gravity=(0.0, 0.0, -9.81))
+    robot = parse_sdf_model("""<sdf version="1.6"><model name="m"><link name="rod"><inertial><pose>0 0 -1 0 0 0</pose>
+        <mass>1</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link><joint name="j"
+        type="ball"><parent>world</parent><child>rod</child></joint></model></sdf>""", "m.sdf").robot
+    rod = world.spawn(robot, "rod")
+    rod.set_joint_positions(np.arange(3), np.array([0.1, 0.2, 0.0]))
+    x, y, z = rod.link_pose("rod").matrix()[:3, :3] @ (0, 0, -1)
+    for _ in range(round(1e3 * math.pi * math.sqrt(1.02 / 9.81))):  # half a period
+        world.step()
+    assert rod.link_pose("rod").matrix()[:3, :3] @ (0, 0, -1) == pytest.approx((-x, -y, z), abs=0.01)
+    world.close()

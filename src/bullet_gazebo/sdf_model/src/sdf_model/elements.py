@@ -52,10 +52,13 @@ HONOURED = {
     "material/script": "uri name",
     "material/pbr/metal": "albedo_map",
     "material/pbr/specular": "albedo_map",
-    "joint": "parent child pose axis sensor",
+    "joint": "parent child pose axis axis2 sensor",
     "joint/physics/ode": "implicit_spring_damper cfm_damping",
     "axis": "xyz use_parent_model_frame",
     "axis/limit": "lower upper effort velocity",
+    "axis2": "xyz use_parent_model_frame",
+    "axis2/limit": "lower upper effort velocity",
+    "axis2/dynamics": "damping friction spring_stiffness spring_reference",
     "axis/dynamics": "damping friction spring_stiffness spring_reference",
     # What a <sensor> measures is its plugin's business; these are read by the plugins here.
     "sensor": "update_rate pose plugin camera ray lidar",
@@ -161,14 +164,14 @@ WITHOUT_EFFECT = (
     ("material/pbr/specular", dict.fromkeys((
         "specular_map", "glossiness_map", "glossiness", "environment_map", "ambient_occlusion_map", "normal_map",
         "emissive_map", "light_map")), "the renderer has one shader"),
-    ("joint", {"axis2": None, "gearbox_ratio": "1", "gearbox_reference_body": None, "thread_pitch": "1"},
-     "joints have one axis"),
+    ("joint", {"gearbox_ratio": "1", "gearbox_reference_body": None, "thread_pitch": "1"},
+     "a joint of this type is held fixed"),
     ("joint/physics/ode", {"fudge_factor": "0", "cfm": "0", "erp": "0.2", "bounce": "0", "max_force": "0",
                            "velocity": "0"}, _SOLVER),
     ("joint/physics/ode/limit", {"cfm": "0", "erp": "0.2"}, _HARD_STOPS),
     ("joint/physics/ode/suspension", {"cfm": "0", "erp": "0.2"}, _SOLVER),
     ("axis", {"initial_position": "0"}, "joints start at 0"),
-    ("axis/limit", {"stiffness": "1e8", "dissipation": "1"}, _HARD_STOPS),
+    *((axis + "/limit", {"stiffness": "1e8", "dissipation": "1"}, _HARD_STOPS) for axis in ("axis", "axis2")),
     ("sensor/camera", {"save": None, "depth_camera": None, "camera_info_topic": None, "visibility_mask": "4294967295"},
      "the plugin's own elements say what is published"),
     ("sensor/camera", {"lens": None}, "lenses are those of <distortion>"),
@@ -186,5 +189,5 @@ WITHOUT_EFFECT = (
 )
 #: Where a path begins.
 SCOPES = ("world", "model", "link", "joint", "collision", "visual", "sensor", "light", "geometry", "surface",
-          "material", "axis", "actor")
+          "material", "axis", "axis2", "actor")
 TABLE = ElementTable((HONOURED, HARMLESS), WITHOUT_EFFECT, SCOPES)

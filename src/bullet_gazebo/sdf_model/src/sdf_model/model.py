@@ -18,9 +18,10 @@ from .frames import Frames
 from .lights import Light, read_light
 from .links import read_link
 from .materials import MaterialScripts
-from .tree import Dynamics, Parts, SdfJoint, build_robot
+from .tree import Dynamics, Parts, SdfJoint, build_robot, crosses
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
+_TWO_AXES = ("universal", "revolute2")
 _DEEPEST_INCLUDE = 8
 
 
@@ -169,12 +170,13 @@ class ModelReader:
         names = {joint.name for joint in parts.joints}
         for joint in element.iterchildren("joint"):
             read = _joint(document, joint, frames, frame_of[joint])
-            read.parent, read.child = frames.plain(read.parent), frames.plain(read.child)
-            if read.name in names:
-                raise document.error(joint, "joint '%s' appears twice" % read.name)
-            names.add(read.name)
-            parts.joints.append(read)
-            parts.gazebo += _sensors_and_lights(document, joint, read.name)
+            read[0].parent, read[-1].child = frames.plain(read[0].parent), frames.plain(read[-1].child)
+            if read[0].name in names:
+                raise document.error(joint, "joint '%s' appears twice" % read[0].name)
+            names.update(part.name for part in read)
+            parts.joints += read
+            parts.links.update(crosses(read, parts.links))
+            parts.gazebo += _sensors_and_lights(document, joint, read[0].name)
         self._hold_kinematic(document, element, parts)
         parts.gazebo += _plugins(document, element)
         parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
@@ -308,25 +310,39 @@ def _end(document, joint, role):
 
 
 def _joint(document, element, frames, own_frame):
+    """Return the SdfJoint of a <joint>, in a list: one for each of its axes, with a link named after the joint between
+    two of them."""
     name, kind = document.name(element), element.get("type", "")
-    axis, limit, dynamics = np.array([0.0, 0.0, 1.0]), Limit(), Dynamics()
     frame = frames.where(own_frame, element)
     if kind in _MOVABLE:
-        given = element.find("axis")
-        if given is None:
-            document.mend(element, "%s joint '%s' without <axis>, which is 0 0 1" % (kind, name))
-            given = etree.Element("axis")
-        axis = _axis(document, given, name, frame, frames)
-        kind, limit = _limit(document, given, name, kind)
-        dynamics = _dynamics(document, given)
-    elif kind != "fixed":
+        rows = [_turn(document, element, "axis", kind, frame, frames)]
+    elif kind in _TWO_AXES:
+        rows = [_turn(document, element, tag, "revolute", frame, frames) for tag in ("axis", "axis2")]
+    elif kind == "ball":
+        rows = [("continuous", Limit(), axis, Dynamics()) for axis in np.eye(3)]
+    else:
         if not kind:
-            raise document.error(element, "joint '%s' has no type; known: %s, fixed" % (name, ", ".join(_MOVABLE)))
-        document.note(element, "joint '%s' of type %s, which is held fixed" % (name, kind))
-        kind = "fixed"
-    ends = (_end(document, element, role) for role in ("parent", "child"))
+            raise document.error(element, "joint '%s' has no type; known: %s, fixed, ball, %s"
+                                 % (name, ", ".join(_MOVABLE), ", ".join(_TWO_AXES)))
+        if kind != "fixed":
+            document.note(element, "joint '%s' of type %s, which is held fixed" % (name, kind))
+        rows = [("fixed", Limit(), np.array([0.0, 0.0, 1.0]), Dynamics())]
     implicit = any(document.flag(element, "physics/ode/" + tag) for tag in ("implicit_spring_damper", "cfm_damping"))
-    return SdfJoint(name, kind, *ends, frame, axis, limit, dynamics, implicit, element)
+    ends = [_end(document, element, "parent"), *("%s_cross%d" % (name, number) for number in range(1, len(rows))),
+            _end(document, element, "child")]
+    return [SdfJoint(name if number == 0 else "%s_axis%d" % (name, number + 1), kind, *ends[number:number + 2], frame,
+                     axis, limit, dynamics, implicit, element)
+            for number, (kind, limit, axis, dynamics) in enumerate(rows)]
+
+
+def _turn(document, joint, tag, kind, frame, frames):
+    """Return (type, Limit, axis (3,), Dynamics) of the <axis> or <axis2> ``tag`` of a joint."""
+    name, given = document.name(joint), joint.find(tag)
+    if given is None:
+        document.mend(joint, "%s joint '%s' without <%s>, which is 0 0 1" % (kind, name, tag))
+        given = etree.Element(tag)
+    return (*_limit(document, given, name, kind), _axis(document, given, name, frame, frames),
+            _dynamics(document, given))
 
 
 def _dynamics(document, axis):

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from urdf_model import Joint, Limit, Link, Loop, Robot
+from urdf_model import Inertial, Joint, Limit, Link, Loop, Robot
 from urdf_model.transforms import inverse
 
 WORLD = "world"
+# Mass and moments of a link between the axes of a joint, as a part of the lighter link's.
+_CROSS_PART = 1e-3
 
 
 @dataclass
@@ -48,6 +50,22 @@ class Parts:
     gazebo: list = field(default_factory=list)  # <gazebo> elements, as urdf_model.Robot has them
     static: bool = False
     static_is_said: bool = False  # whether an element says so
+
+
+def crosses(joints, links):
+    """Return the links between the ``joints`` of one <joint>, as Parts has them: so light that they change little."""
+    masses = [links[end][0].inertial for end in (joints[0].parent, joints[-1].child)
+              if end in links and links[end][0].inertial is not None]
+    if not masses:
+        masses = [Inertial(1.0, np.zeros(3), np.eye(3))]
+    lightest = min(masses, key=lambda inertial: inertial.mass)
+    moment = _CROSS_PART * np.linalg.eigvalsh(lightest.inertia).max()
+    found = {}
+    for joint in joints[:-1]:
+        link = Link(joint.child, Inertial(_CROSS_PART * lightest.mass, np.zeros(3), moment * np.eye(3)),
+                    line=joint.element.sourceline, helper=True)
+        found[joint.child] = link, joint.frame
+    return found
 
 
 def build_robot(document, name, parts):
@@ -157,7 +175,7 @@ def _joint(links, joint, parent, child):
 
 def _loop(document, links, joint):
     """[the Loop of a joint beside the tree], or [] for one of a kind that is held fixed elsewhere; it is noted."""
-    kind = "ball" if joint.element.get("type") == "ball" else joint.type
+    kind = joint.type
     if kind == "fixed" and joint.element.get("type") != "fixed":
         document.note(joint.element, "joint '%s', which closes a loop" % joint.name)
         return []

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdf_model import ModelFolders, SdfError, add_loops, description_file, parse_sdf_model, parse_sdf_world
-from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, drawing_urdf, merge_fixed, parse_urdf
+from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, drawing_urdf, gazebo_links, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, pose_matrix, rigid
 
 LINK = '<link name="%s"><pose>%s</pose></link>'
@@ -234,8 +234,24 @@ def test_what_a_tree_cannot_have_is_said():
     assert "link 'b', which no joint connects: it is held by 'a' (m.sdf line 3)" in loose.warning
     assert where(loose.robot)["b"][0, 3] == 1.0
     assert parse_sdf_model(sdf("<static>1</static>" + content), "m.sdf").warning == ""
-    ball = parse_sdf_model(sdf(content + joint("j", "a", "b", "ball")), "m.sdf")
-    assert "joint 'j' of type ball, which is held fixed" in ball.warning
+    screw = parse_sdf_model(sdf(content + joint("j", "a", "b", "screw")), "m.sdf")
+    assert "joint 'j' of type screw, which is held fixed" in screw.warning
+
+
+def test_a_joint_of_several_axes_is_a_chain_of_hinges():
+    content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "1 0 0 0 0 0")
+    second = ("<axis><xyz>0 0 1</xyz><limit><lower>-0.5</lower><upper>0.5</upper></limit></axis><axis2><xyz>0 1 0</xyz>"
+              "<dynamics><damping>0.2</damping></dynamics></axis2>")
+    found = parse_sdf_model(sdf(content + joint("j", "a", "b", "revolute2", axis=second)), "m.sdf")
+    steering, rolling = found.robot.joints.values()
+    assert (steering.name, steering.type, steering.parent, steering.child) == ("j", "revolute", "a", "j_cross1")
+    assert (rolling.name, rolling.type, rolling.parent, rolling.child) == ("j_axis2", "continuous", "j_cross1", "b")
+    assert (steering.axis.tolist(), steering.limit.upper) == ([0, 0, 1], 0.5)
+    assert (rolling.axis.tolist(), rolling.damping) == ([0, 1, 0], 0.2)
+    assert list(gazebo_links(found.robot)) == ["a", "b"] and found.warning == ""
+    ball = parse_sdf_model(sdf(content + joint("j", "world", "b", "ball")), "m.sdf").robot
+    assert [each.axis.tolist() for each in ball.joints.values()][:3] == np.eye(3).tolist()
+    assert where(ball)["b"][0, 3] == 1.0
 
 
 # -- what a viewer is given ------------------------------------------------------------------------

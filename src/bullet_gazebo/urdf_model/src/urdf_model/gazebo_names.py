@@ -30,7 +30,7 @@ def gazebo_links(robot: Robot) -> dict[str, str]:
     stack = [(robot.root, robot.root)]
     while stack:
         link, part_of = stack.pop()
-        if link != WORLD or part_of != WORLD:
+        if (link != WORLD or part_of != WORLD) and not robot.links[link].helper:
             found[link] = part_of
         for joint in reversed(children[link]):
             stays = joint.type != "fixed" or joint.preserved or robot.keeps_links or part_of == WORLD

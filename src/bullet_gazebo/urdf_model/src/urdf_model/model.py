@@ -130,6 +130,7 @@ class Link:
     surface: Surface | None = None
     gravity: bool = True  # False: it has no weight
     self_collide: bool = False  # whether it collides with links of its model that do so, too
+    helper: bool = False  # between the axes of a joint; Gazebo has no such link
 
 
 @dataclass
