@@ -31,11 +31,33 @@ def compiler(name: str, sources: Iterable[str | Path], **options: Any) -> Callab
         config: Any = settings  # its entries are made at run time
         before, config.CACHE_DIR = config.CACHE_DIR, place
         try:
-            return numba.njit(cache=True, **options)(function)
+            return _loaded_alone(numba.njit(cache=True, **options)(function))
         finally:
             config.CACHE_DIR = before
 
     return compiled
+
+
+def _loaded_alone(function: Any) -> Any:
+    """A compiled function, which comes from the cache without the compiler's tables.
+
+    numba makes them, of all functions of Python and numpy that it knows, before it looks into the cache; for them it
+    imports scipy.linalg. That takes two thirds of the time of loading and 25 MB; only what compiles needs them, and
+    makes them itself. Where numba has changed inside, functions are loaded as it does.
+    """
+    cache = getattr(function, "_cache", None)
+    if not (hasattr(cache, "_load_overload") and hasattr(cache, "_guard_against_spurious_io_errors")):
+        return function
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        from numba.core.runtime import rtsys
+
+        rtsys.initialize(target)  # what allocates the arrays of compiled code
+        with cache._guard_against_spurious_io_errors():
+            return cache._load_overload(signature, target)
+
+    cache.load_overload = load_overload
+    return function
 
 
 def folder(name: str, sources: Iterable[str | Path], environment: Mapping[str, str] = os.environ) -> str:

@@ -2,6 +2,7 @@
 """Where compiled code is kept: by the text of its sources, in the first place that can be written."""
 import os
 import stat
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -89,3 +90,33 @@ def test_without_numba_it_says_so_when_something_is_to_be_compiled(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     with pytest.raises(ImportError):
         compiler("some", [__file__])
+
+
+PROGRAM = """
+import sys
+import numba
+import numpy as np
+from numba_cache import compiler
+
+@compiler("program", [__file__])
+def total(values):
+    found = 0.0
+    for value in values * values:
+        found += value
+    return found
+
+print(total(np.arange(3.0)), sum(total.stats.cache_hits.values()), "numba.np.arraymath" in sys.modules)
+one_more = numba.njit(lambda values: total(values) + 1.0)
+print(one_more(np.arange(3.0)), total(np.arange(3)))
+"""
+
+
+def test_what_comes_from_the_cache_needs_no_compiler_until_something_is_compiled(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    runs = [subprocess.run([sys.executable, program], capture_output=True, text=True, check=True).stdout.split()
+            for _ in range(2)]
+    (value, hits, has_tables, *further), (again, hits_again, has_tables_again, *further_again) = runs
+    assert (hits, has_tables) == ("0", "True")
+    assert (hits_again, has_tables_again) == ("1", "False")
+    assert value == again and further == further_again
