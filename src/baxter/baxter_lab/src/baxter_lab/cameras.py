@@ -8,18 +8,18 @@ import numpy as np
 
 from sensor_renderer.best import best_renderer
 from sensor_renderer.mirror import Mirror
-from sensor_renderer.pinhole import OPTICAL, Pinhole
+from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import looking_at
+from urdf_model import parse_xml
 from urdf_model.writer import drawing_urdf
 from world_picture.drawing import DrawingCache
 
 from .errors import LabError
+from .planning import FLOOR
 
-#: {camera: the link that it looks out of, along its x axis}
+#: {camera: the link that is its optical frame}
 LINKS = {"head": "head_camera", "left_hand": "left_hand_camera", "right_hand": "right_hand_camera"}
-#: Baxter's cameras at their start: width [pixels], height, horizontal field of view [rad]; nearest, furthest [m].
-ROBOTS_FIELD_RAD, NEAR_M, FAR_M = 1.3962634, 0.02, 100.0
-OUTSIDE_FIELD_RAD = 0.75
+OUTSIDE_FIELD_RAD, NEAR_M, FAR_M = 0.75, 0.05, 100.0
 
 
 class Picture(NamedTuple):
@@ -37,6 +37,7 @@ class Cameras:
 
     def __init__(self, lab):
         self._lab, self._mirror, self._renderer, self._shown = lab, None, None, None
+        self._lenses = {}
 
     def close(self) -> None:
         """Free what it draws with."""
@@ -48,8 +49,11 @@ class Cameras:
         """A picture by one of the robot's cameras: head, left_hand, right_hand. Raises LabError for another name."""
         if camera not in LINKS:
             raise LabError("there is no camera '%s'; there are %s" % (camera, ", ".join(LINKS)))
-        frame = self._lab.robot.simulated.model.link_pose(LINKS[camera]).matrix() @ OPTICAL
-        return self._draw(Pinhole.from_field_of_view(width, height, ROBOTS_FIELD_RAD, NEAR_M, FAR_M), frame, depth)
+        link = LINKS[camera]
+        if not self._lenses:
+            self._lenses = _lenses(self._lab.robot_urdf)
+        frame = self._lab.robot.simulated.model.link_pose(link).matrix()
+        return self._draw(Pinhole.from_field_of_view(width, height, *self._lenses[link]), frame, depth)
 
     def look(self, eye, target, width: int = 640, height: int = 480, depth: bool = False) -> Picture:
         """A picture from `eye` (3,) towards `target` (3,) [m]."""
@@ -81,7 +85,14 @@ class Cameras:
         self._mirror.set_state(np.array(values))
 
 
+def _lenses(urdf):
+    """{link: (horizontal field of view [rad], nearest, furthest [m])} of the cameras in a description."""
+    return {block.get("reference"): tuple(float(block.findtext("sensor/camera/" + path))
+                                          for path in ("horizontal_fov", "clip/near", "clip/far"))
+            for block in parse_xml(urdf).findall("gazebo") if block.find("sensor/camera") is not None}
+
+
 def _entry(name, model):
-    """What the renderer has to know of a model."""
-    return {"name": name, "urdf": drawing_urdf(model.merged), "joints": list(model.joint_names),
-            "static": model.static}
+    """What the renderer has to know of a model. It has a floor of its own, without a description."""
+    return {"name": name, "urdf": None if name == FLOOR else drawing_urdf(model.merged),
+            "joints": list(model.joint_names), "static": model.static}

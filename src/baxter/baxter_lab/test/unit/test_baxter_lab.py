@@ -37,6 +37,19 @@ def test_a_place_out_of_reach_has_a_reason(lab):
         lab.robot.left.move([0.1, 0.2])
 
 
+def test_the_hands_camera_sees_what_is_under_the_hand(lab):
+    arm, ahead = lab.robot.left, np.array((0.0, 0.0, 1.0))
+    lab.robot.put({"left": arm.ik(pose((0.7, 0.3, 0.2)), np.zeros(7))})
+    lab.add_box("carpet", (0.4, 0.4, 0.02), (0.7, 0.3, -0.4), colour=(0.0, 0.0, 1.0, 1.0))
+    taken = lab.cameras.take("left_hand", 64, 64, depth=True)
+    lab.remove("carpet")
+    assert taken.camera[2, :3] @ ahead < -0.9  # it looks down
+    red, _, blue = np.moveaxis(taken.pixels.astype(float), 2, 0)
+    assert (blue > 1.5 * red + 20.0).mean() > 0.05  # the carpet
+    with pytest.raises(LabError, match="right_hand"):
+        lab.cameras.take("third_hand")
+
+
 def test_streamed_commands_expire_and_waiting_ends(lab):
     lab.robot.enable()
     lab.robot.left.command(Mode.VELOCITY, [0.2] * 7)
