@@ -14,11 +14,14 @@ from typing import Any, Protocol
 class Publisher(Protocol):
     """One topic that is published."""
 
-    #: Whether a subscriber is connected. Callers check it before they make a message.
-    has_listeners: bool
     #: Function without arguments -> messages, or None. While the world is paused, when nothing else is published, who
     #: connects gets these: the state that the world is in.
     present: Callable[[], list[Any]] | None
+
+    @property
+    def has_listeners(self) -> bool:
+        """Whether a subscriber is connected. Callers check it before they make a message."""
+        ...
 
     def publish(self, message: Any) -> None:
         """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` if it cannot be serialized."""
@@ -112,7 +115,10 @@ class LoopRos(Protocol):
     """Makes publishers, subscriptions and services from absolute names; for a name that is none in ROS, each raises
     ``loop_ros.names.IllegalName``."""
 
-    faults: Faults
+    @property
+    def faults(self) -> Faults:
+        """Errors that the loop survives."""
+        ...
 
     def publisher(self, topic: str, msg_class: type, latch: bool = False, greet: bool = False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, but without the

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that are loaded as long as the process that spawned them runs."""
+from __future__ import annotations
+
 import os
 import queue
 import signal
 import threading
 import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import rosgraph
 import rosparam
@@ -34,7 +38,7 @@ class NotThere(Exception):
     """A wait has failed; the text says what was missing and how to provide it."""
 
 
-def run_until_ended(node_name, work, clean_up):
+def run_until_ended(node_name: str, work: Callable[[], int | None], clean_up: Callable[[], object]) -> int:
     """Run ``work()`` in a thread until a signal or a shutdown request comes, then ``clean_up()``.
 
     If ``work`` returns None, the node goes on until its end. Returns the exit code, 1 if it raised. rospy would clean
@@ -48,7 +52,7 @@ def run_until_ended(node_name, work, clean_up):
         return 0
     events, over = queue.SimpleQueue(), threading.Event()
 
-    def run():
+    def run() -> None:
         code = 1
         try:
             code = work()
@@ -63,7 +67,7 @@ def run_until_ended(node_name, work, clean_up):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: events.put(0))
 
-    def asked_to_shut_down():
+    def asked_to_shut_down() -> None:
         events.put(0)
         over.wait(_END_S)
 
@@ -79,7 +83,7 @@ def run_until_ended(node_name, work, clean_up):
     return code
 
 
-def _first(events):
+def _first(events: queue.SimpleQueue[int]) -> int:
     """Wait for an event of a queue.SimpleQueue. A signal that comes while this thread falls asleep does not wake it,
     and is handled when it wakes up for another reason: so it does now and then.
     """
@@ -93,20 +97,20 @@ def _first(events):
 class ControllerLifetime:
     """Loads and starts controllers through the services of one controller manager, and unloads them at the end."""
 
-    def __init__(self, namespace="", timeout_s=0.0):
+    def __init__(self, namespace: str = "", timeout_s: float = 0.0) -> None:
         """Wait for the controller manager below ``namespace`` (relative to the node's own), at most ``timeout_s`` wall
         seconds (0 or less: for ever). Raises :class:`NotThere`."""
         self._prefix = (namespace.rstrip("/") + "/" if namespace else "") + "controller_manager/"
         self._deadline = time.monotonic() + timeout_s if timeout_s > 0.0 else None
         self._timeout_s = timeout_s
-        self._loaded = []
+        self._loaded: list[str] = []
         self._ending = False
         self._load = self._proxy("load_controller", LoadController)
         self._switch = self._proxy("switch_controller", SwitchController)
         self._list = self._proxy("list_controllers", ListControllers)
         self._unload = self._proxy("unload_controller", UnloadController)
 
-    def _proxy(self, name, srv_class):
+    def _proxy(self, name: str, srv_class: type) -> rospy.ServiceProxy:
         service = rospy.resolve_name(self._prefix + name)
         told = False
         while True:
@@ -128,14 +132,15 @@ class ControllerLifetime:
                 told = True
 
     @staticmethod
-    def wait_for_true(topic):
+    def wait_for_true(topic: str) -> None:
         """Wait until the std_msgs/Bool topic ``topic`` says true."""
         rospy.loginfo("waiting for %s to say true", rospy.resolve_name(topic))
-        while not rospy.wait_for_message(topic, Bool).data:
-            pass
+        message: Any = None
+        while message is None or not message.data:
+            message = rospy.wait_for_message(topic, Bool)
 
     @staticmethod
-    def names_from(arguments):
+    def names_from(arguments: Iterable[str]) -> list[str]:
         """Names of controllers; an argument that is an existing file is loaded to the parameter server, and its keys
         are names. Raises :class:`NotThere` for a file that does not exist or has none."""
         names = []
@@ -155,7 +160,7 @@ class ControllerLifetime:
             names.extend(content)
         return names
 
-    def bring_up(self, names, start=True):
+    def bring_up(self, names: Sequence[str], start: bool = True) -> None:
         """Load each of ``names``; start those that could be loaded, all or none."""
         for name in names:
             if self._ending or rospy.is_shutdown():
@@ -177,7 +182,7 @@ class ControllerLifetime:
             rospy.logerr("controllers could not be started: %s; see the log of the node that holds the controller "
                          "manager (/gazebo) for the reason", ", ".join(self._loaded))
 
-    def take_down(self):
+    def take_down(self) -> None:
         """Any thread: stop and unload the controllers that were brought up, the last one first. Missing ones are
         skipped."""
         self._ending = True
@@ -197,7 +202,7 @@ class ControllerLifetime:
             rospy.logdebug("the controller manager is gone; nothing to take down")
 
     @staticmethod
-    def _asked(proxy, *arguments):
+    def _asked(proxy: Any, *arguments: Any) -> bool:
         try:
             return proxy(*arguments).ok
         except rospy.ServiceException as error:
@@ -205,7 +210,7 @@ class ControllerLifetime:
             return False
 
 
-def loaded_controllers():
+def loaded_controllers() -> dict[str, str]:
     """{name: state} of the controllers of this namespace's controller manager."""
     listing = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)()
     return {controller.name: controller.state for controller in listing.controller}

@@ -4,6 +4,11 @@
 Each function returns True if the request succeeded, prints the result in one line, and raises ``rospy.ROSException``
 when there is no controller manager.
 """
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
 import rospy
 from controller_manager_msgs.srv import (
     ListControllers,
@@ -19,14 +24,14 @@ from controller_manager_msgs.srv import (
 WAIT_S = 10.0
 
 
-def list_controller_types():
+def list_controller_types() -> bool:
     """Print the types that can be loaded, one a line."""
     for kind in _call("list_controller_types", ListControllerTypes).types:
         print(kind)
     return True
 
 
-def list_controllers():
+def list_controllers() -> bool:
     """Print name, hardware interfaces and state of each controller."""
     controllers = _call("list_controllers", ListControllers).controller
     if not controllers:
@@ -37,37 +42,37 @@ def list_controllers():
     return True
 
 
-def load_controller(name):
+def load_controller(name: str) -> bool:
     """Load one controller."""
     return _report(_call("load_controller", LoadController, name).ok, "Loaded", "Error when loading", name)
 
 
-def unload_controller(name):
+def unload_controller(name: str) -> bool:
     """Unload one controller that does not run."""
     return _report(_call("unload_controller", UnloadController, name).ok, "Unloaded", "Error when unloading", name)
 
 
-def start_controller(name):
+def start_controller(name: str) -> bool:
     """Start one controller."""
     return start_controllers([name])
 
 
-def start_controllers(names):
+def start_controllers(names: Iterable[str]) -> bool:
     """Start controllers, all or none."""
     return start_stop_controllers(names, [])
 
 
-def stop_controller(name):
+def stop_controller(name: str) -> bool:
     """Stop one controller."""
     return stop_controllers([name])
 
 
-def stop_controllers(names):
+def stop_controllers(names: Iterable[str]) -> bool:
     """Stop controllers, all or none."""
     return start_stop_controllers([], names)
 
 
-def start_stop_controllers(start_controllers, stop_controllers):
+def start_stop_controllers(start_controllers: Iterable[str], stop_controllers: Iterable[str]) -> bool:
     """Start and stop controllers in one change, all or none."""
     ok = _call("switch_controller", SwitchController, list(start_controllers), list(stop_controllers),
                SwitchControllerRequest.STRICT, False, 0.0).ok
@@ -78,7 +83,7 @@ def start_stop_controllers(start_controllers, stop_controllers):
     return ok
 
 
-def reload_libraries(force_kill, restore=False):
+def reload_libraries(force_kill: bool, restore: bool = False) -> bool:
     """Import the controllers' source again; ``force_kill`` unloads those that are loaded, ``restore`` loads and starts
     them again."""
     before = _call("list_controllers", ListControllers).controller if restore else []
@@ -93,13 +98,13 @@ def reload_libraries(force_kill, restore=False):
     return ok
 
 
-def _call(name, srv_class, *arguments):
+def _call(name: str, srv_class: type, *arguments: Any) -> Any:
     service = "controller_manager/" + name
     rospy.wait_for_service(service, WAIT_S)
     return rospy.ServiceProxy(service, srv_class)(*arguments)
 
 
-def _report(ok, done, failed, name):
+def _report(ok: bool, done: str, failed: str, name: str) -> bool:
     print("%s '%s' successfully" % (done, name) if ok else
           "%s '%s': see the log of the node that holds the controller manager" % (failed, name))
     return ok

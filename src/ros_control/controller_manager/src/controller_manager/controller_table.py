@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maps the ``type`` of a controller to its Python class. ROS-free."""
+from __future__ import annotations
+
 import importlib
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
 
 from .controller import Controller
 from .errors import ControllerError
@@ -9,17 +14,17 @@ from .errors import ControllerError
 class ControllerTable:
     """Type string, such as ``position_controllers/JointPositionController`` -> ``"module:Class"``."""
 
-    def __init__(self, entries):
+    def __init__(self, entries: Mapping[str, Any]) -> None:
         """``entries``: mapping; a wrong entry raises only when it is used."""
         self._entries = dict(entries)
-        self._modules = {}
+        self._modules: dict[str, ModuleType] = {}
 
     @property
-    def types(self):
+    def types(self) -> list[str]:
         """Sorted type strings."""
         return sorted(self._entries)
 
-    def find(self, kind):
+    def find(self, kind: str) -> type[Controller]:
         """The class for a type; raises :class:`ControllerError` for unknown types and entries that do not load."""
         if kind not in self._entries:
             raise ControllerError("controller type '%s' is not known; known types: %s" % (kind, ", ".join(self.types)))
@@ -39,7 +44,7 @@ class ControllerTable:
         self._modules[module_name] = module
         return found
 
-    def reload(self):
+    def reload(self) -> None:
         """Reload all modules used so far, so that changed source takes effect."""
         for name, module in list(self._modules.items()):
             self._modules[name] = importlib.reload(module)

@@ -3,13 +3,20 @@
 
 The rules are joint_limits_interface's: saturation, or soft limits for joints whose URDF has a <safety_controller>.
 """
+from __future__ import annotations
+
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import HardwareError
+
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,11 +42,11 @@ class JointLimits:
     soft: SoftLimits | None = None
 
 
-def limits_from_urdf(joint, soft=None):
+def limits_from_urdf(joint: Any, soft: SoftLimits | None = None) -> JointLimits:
     """The limits of a ``urdf_model.Joint``; a continuous joint has no position limits."""
     limit = joint.limit
 
-    def value(number, absent=math.inf):
+    def value(number: float | None, absent: float = math.inf) -> float:
         return absent if number is None else number
 
     if joint.type == "continuous":
@@ -48,14 +55,14 @@ def limits_from_urdf(joint, soft=None):
                        value(limit.effort), soft)
 
 
-def without_idle_soft_limits(limits):
+def without_idle_soft_limits(limits: JointLimits) -> JointLimits:
     """``limits`` without soft limits if the velocity limit is missing, since they need it."""
     if limits.soft is not None and math.isinf(limits.velocity):
         return dataclasses.replace(limits, soft=None)
     return limits
 
 
-def with_parameters(limits, values, source):
+def with_parameters(limits: JointLimits, values: Any, source: str) -> JointLimits:
     """``limits``, with those in the mapping ``values`` (a joint's entry under ``joint_limits``) replaced.
 
     ``has_position_limits``, ``has_velocity_limits``, ``has_acceleration_limits``, ``has_effort_limits``: true needs the
@@ -86,7 +93,7 @@ def with_parameters(limits, values, source):
     return changed
 
 
-def _number(values, key, source):
+def _number(values: dict[str, Any], key: str, source: str) -> float:
     number = values.get(key)
     if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
         raise HardwareError("parameter %s/%s is %r, expected a number" % (source, key, number))
@@ -98,7 +105,7 @@ def _number(values, key, source):
 class _Columns:
     """The limits of k joints as arrays (k,), and which joints have soft ones."""
 
-    def __init__(self, limits):
+    def __init__(self, limits: Sequence[JointLimits]) -> None:
         self.lower, self.upper, self.velocity, self.acceleration, self.effort = (
             np.array([getattr(limit, field) for limit in limits], dtype=float)
             for field in ("lower", "upper", "velocity", "acceleration", "effort"))
@@ -110,7 +117,7 @@ class _Columns:
             for field in ("lower", "upper", "k_position", "k_velocity"))
         self.soft_velocity = self.velocity[self.soft]
 
-    def soft_velocity_range(self, position):
+    def soft_velocity_range(self, position: Floats) -> tuple[Floats, Floats]:
         """Lowest and highest velocity of the soft joints at ``position`` (of the soft joints)."""
         fastest = self.soft_velocity
         low = np.minimum(np.maximum(-self.k_position * (position - self.soft_lower), -fastest), fastest)
@@ -124,16 +131,16 @@ class PositionLimiter:
     Open loop: relative to its own last command, not to the measured position.
     """
 
-    def __init__(self, limits):
+    def __init__(self, limits: Sequence[JointLimits]) -> None:
         """``limits``: list of :class:`JointLimits`."""
         self._columns = _Columns(limits)
-        self._last = None
+        self._last: Floats | None = None
 
-    def reset(self):
+    def reset(self) -> None:
         """Start from the measured position at the next call."""
         self._last = None
 
-    def enforce(self, command, dt, position, velocity):
+    def enforce(self, command: Floats, dt: float, position: Floats, velocity: Floats) -> Floats:
         """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         last = position if self._last is None else self._last
@@ -155,16 +162,16 @@ class PositionLimiter:
 class VelocityLimiter:
     """Velocity commands: within the velocity limit, and the acceleration limit where there is one."""
 
-    def __init__(self, limits):
+    def __init__(self, limits: Sequence[JointLimits]) -> None:
         self._columns = _Columns(limits)
         self._accelerates = bool(np.isfinite(self._columns.acceleration).any())
         self._last = np.zeros(len(limits))
 
-    def reset(self):
+    def reset(self) -> None:
         """Start from velocity zero at the next call."""
         self._last = np.zeros(len(self._last))
 
-    def enforce(self, command, dt, position, velocity):
+    def enforce(self, command: Floats, dt: float, position: Floats, velocity: Floats) -> Floats:
         """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         low, high = -columns.velocity, columns.velocity
@@ -190,13 +197,13 @@ class VelocityLimiter:
 class EffortLimiter:
     """Effort commands: within the effort limit, and never driving a joint further beyond its other limits."""
 
-    def __init__(self, limits):
+    def __init__(self, limits: Sequence[JointLimits]) -> None:
         self._columns = _Columns(limits)
 
-    def reset(self):
+    def reset(self) -> None:
         """Has no state to reset."""
 
-    def enforce(self, command, dt, position, velocity):
+    def enforce(self, command: Floats, dt: float, position: Floats, velocity: Floats) -> Floats:
         """The part (k,) that may be commanded of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
         columns = self._columns
         low = np.where((position < columns.lower) | (velocity < -columns.velocity), 0.0, -columns.effort)

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loads, starts and stops controllers, and keeps their states. ROS-free; one thread only."""
+from __future__ import annotations
+
 import contextlib
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, InvalidStateError
+
+from controller_manager.controller import ControllerContext
+from controller_manager.hardware import RobotHardware
+from loop_ros.protocol import Log
 
 from .controller import Controller
 from .errors import ControllerError, Refused
@@ -26,19 +33,19 @@ class Loaded:
 
     __slots__ = ("name", "kind", "controller", "state")
 
-    def __init__(self, name, kind, controller):
+    def __init__(self, name: str, kind: str, controller: Controller) -> None:
         self.name = name
         self.kind = kind
         self.controller = controller
         self.state = INITIALIZED
 
     @property
-    def claimed_resources(self):
+    def claimed_resources(self) -> list[tuple[str, list[str]]]:
         """List of (hardware interface, sorted joint names)."""
         return [(interface, sorted(joints)) for interface, joints in self.controller.claims.items()]
 
     @property
-    def commanded_joints(self):
+    def commanded_joints(self) -> set[str]:
         """Set of the joints that this controller commands, through whichever interface."""
         claims = self.controller.claims
         return {joint for interface in COMMAND for joint in claims.get(interface, ())}
@@ -47,14 +54,15 @@ class Loaded:
 class _Switch:
     """An accepted change that waits for the next update."""
 
-    def __init__(self, start, stop, new, start_asap, timeout_s):
+    def __init__(self, start: list[Loaded], stop: list[Loaded], new: list[Loaded], start_asap: bool,
+                 timeout_s: float) -> None:
         self.start = start  # every controller whose starting() is due
         self.stop = stop
         self.new = new  # those of ``start`` that did not run before
         self.start_asap = start_asap
         self.timeout_s = timeout_s
-        self.began_s = None
-        self.future = Future()
+        self.began_s: float | None = None
+        self.future: Future[None] = Future()
 
 
 class ControllerManager:
@@ -63,22 +71,24 @@ class ControllerManager:
     A switch takes place inside :meth:`update`, so it takes as long as updates do not come.
     """
 
-    def __init__(self, hardware, log):
+    def __init__(self, hardware: RobotHardware, log: Log) -> None:
         """``hardware``: :class:`RobotHardware`; ``log``: ``info``, ``warn``, ``error`` of one text."""
         self.hardware = hardware
         self._log = log
-        self._loaded = {}
-        self._running = []
-        self._idle = []  # loaded, not running, but with work in each tick
-        self._switch = None
+        self._loaded: dict[str, Loaded] = {}
+        self._running: list[Loaded] = []
+        self._idle: list[Loaded] = []  # loaded, not running, but with work in each tick
+        self._switch: _Switch | None = None
         self._closed = False
 
     @property
-    def loaded(self):
+    def loaded(self) -> list[Loaded]:
         """List of :class:`Loaded`, in the order of loading."""
         return list(self._loaded.values())
 
-    def load(self, name, kind, controller_class, context):
+    def load(self, name: str, kind: str,
+             controller_class: Callable[[str, RobotHardware, ControllerContext], Controller],
+             context: ControllerContext) -> None:
         """Make a controller; it does not run yet. Raises :class:`Refused` when the name is taken or its constructor
         refuses; the context is closed then."""
         try:
@@ -97,7 +107,7 @@ class ControllerManager:
         self._loaded[name] = Loaded(name, kind, controller)
         self._sort()
 
-    def check_free(self, name):
+    def check_free(self, name: str) -> None:
         """Raise :class:`Refused` when a controller of this name is loaded."""
         if self._closed:
             raise Refused("the controller manager has ended")
@@ -105,7 +115,7 @@ class ControllerManager:
             raise Refused("cannot load controller '%s': a controller of this name is already loaded (type %s); unload "
                           "it first" % (name, self._loaded[name].kind))
 
-    def unload(self, name):
+    def unload(self, name: str) -> None:
         """Remove a controller. Raises :class:`Refused` when it runs, or when there is none of that name."""
         loaded = self._loaded.get(name)
         if loaded is None:
@@ -116,7 +126,8 @@ class ControllerManager:
         self._sort()
         self._close(loaded)
 
-    def switch(self, start, stop, strictness=STRICT, start_asap=False, timeout_s=0.0):
+    def switch(self, start: Iterable[str], stop: Iterable[str], strictness: int = STRICT, start_asap: bool = False,
+               timeout_s: float = 0.0) -> Future[None]:
         """Accept a request to stop and start controllers (lists of names) within the next updates.
 
         Returns a ``Future`` that is set when this is done (also when a start has failed, see state ``aborted``). Raises
@@ -147,7 +158,7 @@ class ControllerManager:
         self._switch = _Switch(starting, stopping, new, start_asap, timeout_s)
         return self._switch.future
 
-    def abandon_switch(self, future):
+    def abandon_switch(self, future: Future[None]) -> None:
         """Drop a change whose caller has given up; without effect when it is done."""
         if self._switch is not None and self._switch.future is future:
             for loaded in self._switch.start:
@@ -155,7 +166,7 @@ class ControllerManager:
                     loaded.state = ABORTED
             self._switch = None
 
-    def restart(self, time_s):
+    def restart(self, time_s: float) -> None:
         """Stop and start every running controller at control time ``time_s`` [s]: their goals and commands end."""
         for loaded in self._running:
             try:
@@ -164,7 +175,7 @@ class ControllerManager:
             except _SURVIVED as error:  # a controller is foreign code; the others continue
                 self._fail(loaded, "restart", error)
 
-    def update(self, time_s, dt, reset_controllers=False):
+    def update(self, time_s: float, dt: float, reset_controllers: bool = False) -> None:
         """One tick. ``time_s``: control time [s], ``dt``: since the last update [s].
 
         ``reset_controllers``: :meth:`restart` first. A controller that raises is logged and stopped (state
@@ -189,11 +200,11 @@ class ControllerManager:
                                 % (loaded.name, type(error).__name__, error))
         if self._switch is not None:
             try:
-                self._go_on_switching(time_s)
+                self._go_on_switching(self._switch, time_s)
             except _SURVIVED as error:  # a driver is user code, too
-                self._give_up_switch(error)
+                self._give_up_switch(self._switch, error)
 
-    def close(self):
+    def close(self) -> None:
         """Close all controllers and wake all waiting callers of a switch (the future is cancelled)."""
         self._closed = True
         if self._switch is not None:
@@ -204,7 +215,7 @@ class ControllerManager:
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _named(self, names, strict, purpose):
+    def _named(self, names: Iterable[str], strict: bool, purpose: str) -> list[Loaded]:
         found = []
         for name in names:
             loaded = self._loaded.get(name)
@@ -214,12 +225,12 @@ class ControllerManager:
                 found.append(loaded)
         return found
 
-    def _unknown(self):
+    def _unknown(self) -> str:
         return "no controller of this name is loaded; loaded are: %s" % (", ".join(self._loaded) or "none")
 
     @staticmethod
-    def _check_conflicts(would_run):
-        users = {}
+    def _check_conflicts(would_run: Iterable[Loaded]) -> None:
+        users: dict[str, list[str]] = {}
         for loaded in would_run:
             for joint in loaded.commanded_joints:
                 users.setdefault(joint, []).append(loaded.name)
@@ -229,8 +240,8 @@ class ControllerManager:
                 "joint '%s' is claimed by %s" % (joint, " and ".join(names))
                 for joint, names in sorted(shared.items())))
 
-    def _go_on_switching(self, time_s):
-        switch, hardware = self._switch, self.hardware
+    def _go_on_switching(self, switch: _Switch, time_s: float) -> None:
+        hardware = self.hardware
         if switch.began_s is None:
             switch.began_s = time_s
             hardware.do_switch(_claims(switch.new), _claims(switch.stop))
@@ -256,8 +267,8 @@ class ControllerManager:
             self._switch = None
             _finish(switch.future)
 
-    def _give_up_switch(self, error):
-        switch, self._switch = self._switch, None
+    def _give_up_switch(self, switch: _Switch, error: BaseException) -> None:
+        self._switch = None
         text = "the hardware failed in changing controllers with %s: %s" % (type(error).__name__, error)
         self._log.error(text)
         for loaded in switch.start:
@@ -266,7 +277,7 @@ class ControllerManager:
         with contextlib.suppress(InvalidStateError):
             switch.future.set_exception(Refused(text))
 
-    def _start(self, loaded, time_s):
+    def _start(self, loaded: Loaded, time_s: float) -> None:
         try:
             self.hardware.let_go(loaded.controller.claims)
             loaded.controller.starting(time_s)
@@ -275,7 +286,7 @@ class ControllerManager:
         else:
             self._set_state(loaded, RUNNING)
 
-    def _stop(self, loaded, time_s):
+    def _stop(self, loaded: Loaded, time_s: float) -> None:
         try:
             loaded.controller.stopping(time_s)
         except _SURVIVED as error:
@@ -283,7 +294,7 @@ class ControllerManager:
         else:
             self._set_state(loaded, STOPPED)
 
-    def _fail(self, loaded, where, error):
+    def _fail(self, loaded: Loaded, where: str, error: BaseException) -> None:
         self._log.error("controller '%s' failed in %s() with %s: %s; it is stopped and its joints are held, the others "
                         "continue. It can be started again: rosservice call .../controller_manager/switch_controller"
                         % (loaded.name, where, type(error).__name__, error))
@@ -294,17 +305,17 @@ class ControllerManager:
             self._log.error("the joints of controller '%s' cannot be held: %s: %s"
                             % (loaded.name, type(held).__name__, held))
 
-    def _set_state(self, loaded, state):
+    def _set_state(self, loaded: Loaded, state: str) -> None:
         loaded.state = state
         self._sort()
 
-    def _sort(self):
+    def _sort(self) -> None:
         # Updates run in the order of loading.
         self._running = [loaded for loaded in self._loaded.values() if loaded.state == RUNNING]
         self._idle = [loaded for loaded in self._loaded.values()
                       if loaded.state != RUNNING and type(loaded.controller).idle is not Controller.idle]
 
-    def _close(self, loaded):
+    def _close(self, loaded: Loaded) -> None:
         try:
             loaded.controller.close()
         except _SURVIVED as error:
@@ -313,15 +324,15 @@ class ControllerManager:
         loaded.controller.context.close()
 
 
-def _claims(controllers):
+def _claims(controllers: Sequence[Loaded]) -> list[dict[str, list[str]]]:
     return [loaded.controller.claims for loaded in controllers]
 
 
-def _names(controllers):
+def _names(controllers: Sequence[Loaded]) -> str:
     return ", ".join(loaded.name for loaded in controllers)
 
 
-def _finish(future):
+def _finish(future: Future[None]) -> None:
     # The caller may have cancelled it.
     with contextlib.suppress(InvalidStateError):
         future.set_result(None)

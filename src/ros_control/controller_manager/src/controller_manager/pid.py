@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PID for k joints at once, with control_toolbox's meaning of the parameters. ROS-free; time is an argument."""
+from __future__ import annotations
+
 import math
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+
+from controller_manager.limits import Floats
 
 from .errors import ControllerError
 
@@ -10,13 +17,14 @@ from .errors import ControllerError
 class Gains:
     """Arrays (k,): ``p``, ``i``, ``d``, ``i_min``, ``i_max``, and ``antiwindup`` (bool)."""
 
-    def __init__(self, p, i, d, i_min, i_max, antiwindup):
+    def __init__(self, p: npt.ArrayLike, i: npt.ArrayLike, d: npt.ArrayLike, i_min: npt.ArrayLike, i_max: npt.ArrayLike,
+                 antiwindup: npt.ArrayLike) -> None:
         self.p, self.i, self.d = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (p, i, d))
         self.i_min, self.i_max = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (i_min, i_max))
         self.antiwindup = np.atleast_1d(np.asarray(antiwindup, dtype=bool))
 
     @classmethod
-    def from_params(cls, read, names):
+    def from_params(cls, read: Callable[[str], tuple[Any, str]], names: Iterable[str]) -> Gains:
         """The gains under ``names`` (k parameter names, e.g. ``"gains/joint_1"``).
 
         ``read(name)`` -> (value or None, absolute name), e.g. ``ControllerContext.entry``. ``p`` is required.
@@ -27,14 +35,14 @@ class Gains:
         return cls(*zip(*rows, strict=True)) if rows else cls([], [], [], [], [], [])
 
     @classmethod
-    def joined(cls, parts):
+    def joined(cls, parts: Iterable[Gains]) -> Gains:
         """The gains of several :class:`Gains`, one after the other."""
         return cls(*(np.concatenate([getattr(part, field) for part in parts])
                      for field in ("p", "i", "d", "i_min", "i_max", "antiwindup")))
 
     @staticmethod
-    def _row(read, name):
-        def number(key, default):
+    def _row(read: Callable[[str], tuple[Any, str]], name: str) -> tuple[float, float, float, float, float, bool]:
+        def number(key: str, default: float | None) -> float:
             value, full_name = read("%s/%s" % (name, key))
             if value is None:
                 value = default
@@ -64,14 +72,14 @@ class Pid:
     Without antiwindup the i-term i * (integral of e) is clamped to [i_min, i_max]; with it, the integral itself is.
     """
 
-    def __init__(self, gains):
+    def __init__(self, gains: Gains) -> None:
         """``gains``: :class:`Gains` of k joints."""
         self.integral = np.zeros(len(gains.p))
         self.last_error = np.zeros(len(gains.p))
         self.last_error_dot = np.zeros(len(gains.p))
         self._take(gains)
 
-    def change(self, k, p, i, d, i_min, i_max, antiwindup):
+    def change(self, k: int, p: float, i: float, d: float, i_min: float, i_max: float, antiwindup: bool) -> None:
         """Set other gains for joint ``k``; its integral and last error stay. Raises :class:`ControllerError`."""
         if i_min > i_max:
             raise ControllerError("the lower end of the integral term, %g, is above its upper end, %g" % (i_min, i_max))
@@ -80,14 +88,14 @@ class Pid:
         gains.antiwindup[k] = antiwindup
         self._take(gains)
 
-    def terms(self, k):
+    def terms(self, k: int) -> tuple[float, float, float]:
         """(proportional, integral, derivative) parts of the last output of joint ``k``, before it was set to 0 for
         an error that is not finite."""
         gains = self.gains
         integral = min(max(gains.i[k] * self.integral[k], gains.i_min[k]), gains.i_max[k])
         return gains.p[k] * self.last_error[k], integral, gains.d[k] * self.last_error_dot[k]
 
-    def _take(self, gains):
+    def _take(self, gains: Gains) -> None:
         self.gains = gains
         self._bounded = gains.antiwindup & (gains.i != 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,13 +105,13 @@ class Pid:
         self._low[~self._bounded], self._high[~self._bounded] = -np.inf, np.inf
         self._any_integral = bool(gains.i.any())
 
-    def reset(self, index=slice(None)):
+    def reset(self, index: Any = slice(None)) -> None:
         """Reset the state of all joints or of those in ``index``. The error before the first update counts as 0."""
         self.integral[index] = 0.0
         self.last_error[index] = 0.0
         self.last_error_dot[index] = 0.0
 
-    def update(self, error, dt, error_dot=None):
+    def update(self, error: Floats, dt: float, error_dot: Any = None) -> Floats:
         """Output (k,) for ``error`` (k,); ``error_dot`` (k,) is differentiated from the errors when not given.
 
         0 when ``dt`` is not positive, and for joints whose error is not finite; these keep their state.

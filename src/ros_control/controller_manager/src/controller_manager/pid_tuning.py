@@ -1,9 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PIDs that users watch and tune at run time: dynamic_reconfigure for the gains, control_msgs/PidState."""
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
 import genpy
 from control_msgs.msg import PidState
 
+from controller_manager.controller import ControllerContext
 from controller_manager.errors import ControllerError
+from controller_manager.limits import Floats
+from controller_manager.pid import Pid
+from loop_ros.protocol import Topics
 from loop_ros.reconfigure import Setting, SettingsServer
 from sim_time.stamps import stamp
 
@@ -14,7 +23,7 @@ _GAIN, _CLAMP = 1e5, 1e6
 class TunablePids:
     """The joints of a :class:`controller_manager.pid.Pid` in the ROS graph, each under the name of its gains."""
 
-    def __init__(self, topics, pid, names, publishing=()):
+    def __init__(self, topics: Topics, pid: Pid, names: Sequence[str], publishing: Collection[str] = ()) -> None:
         """``topics``: ``loop_ros.protocol.Topics``; ``names``: one of each joint's gains, such as
         ``"pid"`` or ``"gains/joint_1"``; ``publishing``: those of them that have a topic ``state``."""
         self._pid = pid
@@ -32,12 +41,12 @@ class TunablePids:
                         for k, name in enumerate(names) if name in publishing]
 
     @classmethod
-    def of_controller(cls, context, pid, names):
+    def of_controller(cls, context: ControllerContext, pid: Pid, names: Sequence[str]) -> TunablePids:
         """For a controller with gains under ``names``; the parameter ``publish_state`` beside the gains (false) selects
         the topics."""
         return cls(context, pid, names, [name for name in names if context.flag(name + "/publish_state", False)])
 
-    def publish(self, time_s, dt, output):
+    def publish(self, time_s: float, dt: float, output: Floats) -> None:
         """After an update of the PID: publish its state. ``output`` (k,): its result."""
         for k, publisher in self._states:
             if publisher.has_listeners:
@@ -45,14 +54,14 @@ class TunablePids:
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _change(self, k, values):
+    def _change(self, k: int, values: dict[str, Any]) -> None:
         try:
             self._pid.change(k, values["p"], values["i"], values["d"], values["i_clamp_min"], values["i_clamp_max"],
                              values["antiwindup"])
         except ControllerError as error:
             raise ValueError(str(error)) from error
 
-    def _state(self, k, time_s, dt, output):
+    def _state(self, k: int, time_s: float, dt: float, output: Floats) -> PidState:
         pid = self._pid
         error, error_dot = float(pid.last_error[k]), float(pid.last_error_dot[k])
         message = PidState()

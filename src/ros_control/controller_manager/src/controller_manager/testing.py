@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers without a master and without physics: topics as lists, a robot whose joints follow commands."""
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
 from loop_ros.node_handle import NodeHandle
+from loop_ros.protocol import Log
 from loop_ros.testing import FakeLog, FakeRos
 
 from .controller import ControllerContext
@@ -8,7 +14,8 @@ from .hardware import RobotHardware
 from .interfaces import EFFORT, POSITION, VELOCITY
 
 
-def fake_context(name="controller", parameters=None, root_namespace="/robot", robot=None, log=None):
+def fake_context(name: str = "controller", parameters: dict[str, Any] | None = None, root_namespace: str = "/robot",
+                 robot: Any = None, log: Log | None = None) -> tuple[ControllerContext, FakeRos]:
     """A :class:`ControllerContext` of ``name``; ``parameters``: the controller's own. Returns (context,
     ``loop_ros.testing.FakeRos``)."""
     ros = FakeRos()
@@ -24,13 +31,14 @@ class FakeHardware(RobotHardware):
     with 1 kg m2 or 1 kg.
     """
 
-    def __init__(self, joint_interfaces, lag=0.0, clip=float("inf")):
+    def __init__(self, joint_interfaces: Mapping[str, Collection[str]], lag: float = 0.0,
+                 clip: float = float("inf")) -> None:
         super().__init__(joint_interfaces)
         self.lag = lag
         self.clip = clip
         self.frozen = False
 
-    def step(self, dt):
+    def step(self, dt: float) -> None:
         """Let ``dt`` seconds pass."""
         before = self.position.copy()
         for interface, joints in self.interface_joints.items():

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads which joints of a description can be controlled and how: <transmission> and <safety_controller>. ROS-free."""
-import math
-from dataclasses import dataclass
+from __future__ import annotations
 
-from lxml import etree
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
 
 from .errors import HardwareError
 from .interfaces import EFFORT, POSITION, VELOCITY
@@ -31,14 +35,15 @@ class ControlledJoint:
     offset: float = 0.0
 
 
-def read_transmissions(urdf_xml, known_joints):
+def read_transmissions(urdf_xml: str | bytes, known_joints: Collection[str]) -> tuple[list[ControlledJoint], list[str]]:
     """Return (list of :class:`ControlledJoint`, list of warnings), in the order of the document.
 
     A transmission is left out with a warning if it lacks a part, if its hardware interface is not known, if its joint
     is not in ``known_joints``, or if its joint already has one; the others count. Several may share a name. Raises
     :class:`HardwareError` for a description that is not XML.
     """
-    joints, warnings = {}, _Warnings()
+    joints: dict[str, ControlledJoint] = {}
+    warnings = _Warnings()
     for element in _root(urdf_xml).iterchildren("transmission"):
         where = _where(element)
         for found in _transmission(element, where, warnings):
@@ -56,17 +61,17 @@ def read_transmissions(urdf_xml, known_joints):
 class _Warnings:
     """Warnings, one line for all transmissions with the same one: a robot may have three for each of its joints."""
 
-    def __init__(self):
-        self._places = {}  # text -> where
+    def __init__(self) -> None:
+        self._places: dict[str, list[str]] = {}  # text -> where
 
-    def add(self, where, text):
+    def add(self, where: str, text: str) -> None:
         self._places.setdefault(text, []).append(where)
 
-    def lines(self):
+    def lines(self) -> list[str]:
         return ["%s: %s" % (", ".join(places), text) for text, places in self._places.items()]
 
 
-def read_soft_limits(urdf_xml):
+def read_soft_limits(urdf_xml: str | bytes) -> dict[str, SoftLimits]:
     """{joint name: :class:`SoftLimits`} of the joints with a <safety_controller>. Raises :class:`HardwareError`.
 
     ``soft_lower_limit``, ``soft_upper_limit`` and ``k_position`` default to 0 as in the URDF specification;
@@ -90,7 +95,7 @@ def read_soft_limits(urdf_xml):
     return found
 
 
-def _root(urdf_xml):
+def _root(urdf_xml: str | bytes) -> Any:
     data = urdf_xml.encode() if isinstance(urdf_xml, str) else urdf_xml
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False)
     try:
@@ -99,11 +104,11 @@ def _root(urdf_xml):
         raise HardwareError("the description is not well-formed XML: %s" % error) from error
 
 
-def _where(element):
+def _where(element: Any) -> str:
     return "transmission '%s' (line %s)" % (element.get("name", ""), element.sourceline)
 
 
-def _transmission(element, where, warnings):
+def _transmission(element: Any, where: str, warnings: _Warnings) -> list[ControlledJoint]:
     """The ControlledJoints of a transmission; none if it is left out."""
     kind = (element.findtext("type") or element.get("type") or "").strip()
     joints, actuators = element.findall("joint"), element.findall("actuator")
@@ -130,7 +135,7 @@ def _transmission(element, where, warnings):
     return controlled
 
 
-def _controlled(joint, actuator, where, warnings):
+def _controlled(joint: Any, actuator: Any, where: str, warnings: _Warnings) -> ControlledJoint | None:
     interface = _interface(joint, actuator, where, warnings)
     if interface is None:
         return None
@@ -140,7 +145,7 @@ def _controlled(joint, actuator, where, warnings):
     return ControlledJoint(joint.get("name"), interface, reduction, _figure(joint, "offset", 0.0, where, warnings))
 
 
-def _interface(joint, actuator, where, warnings):
+def _interface(joint: Any, actuator: Any, where: str, warnings: _Warnings) -> str | None:
     names = [(found.text or "").strip() for found in joint.findall("hardwareInterface")]
     if not names:
         names = [(found.text or "").strip() for found in actuator.findall("hardwareInterface")]
@@ -162,7 +167,7 @@ def _interface(joint, actuator, where, warnings):
     return _INTERFACES[name]
 
 
-def _figure(element, tag, default, where, warnings):
+def _figure(element: Any, tag: str, default: float, where: str, warnings: _Warnings) -> float:
     text = element.findtext(tag)
     if text is None:
         return default
@@ -173,7 +178,7 @@ def _figure(element, tag, default, where, warnings):
     return number
 
 
-def _number(text):
+def _number(text: str) -> float | None:
     try:
         number = float(text)
     except ValueError:
