@@ -23,7 +23,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "actionlib.action_client": "lab_environment.lost_goals",
            "moveit_msgs.msg._PositionIKRequest": "lab_environment.former_fields",
            "rosgraph.xmlrpc": "lab_environment.ended_servers",
-           "rosgraph.roslogging": "lab_environment.full_disk",
+           "rosgraph.roslogging": "lab_environment.full_disk lab_environment.quick_imports",
            "roslaunch.config": "lab_environment.hidden_tokens lab_environment.quick_imports "
                              "lab_environment.rosout_clock",
            "catkin": "lab_environment.quick_imports",

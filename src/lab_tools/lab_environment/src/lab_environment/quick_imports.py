@@ -2,26 +2,31 @@
 """Nodes and roslaunch start without what they do not use.
 
 roslib imports catkin's search for packages, and with it a library for grammars, though few programs search; by way of
-rosclean, which looks for the program ``du``, roslaunch imports setuptools, as much as all the rest of it. And a launch
-searches the workspace three times.
+rosclean, which looks for the program ``du``, roslaunch imports setuptools, as much as all the rest of it. A launch
+searches the workspace three times, and each node once, for the last place that settings of its log may be in.
 """
 import functools
 import importlib
+import os
 import shutil
 import sys
 import time
 import types
 
 _SEARCH = "catkin.find_in_workspaces"
+_LOG_SETTINGS = "ROS_PYTHON_LOG_CONFIG_FILE"
 # How long a search for packages counts [s]: as long as a launch reads its files and starts its nodes. A user makes a
 # package while a notebook goes on.
 _REMEMBERED_S = 5.0
 
 
 def amend(module):
-    """Called when catkin or roslaunch.config has been loaded; the modules in question are imported after these."""
+    """Called when catkin, rosgraph.roslogging or roslaunch.config has been loaded; the modules in question are imported
+    after these."""
     if module.__name__ == "catkin":
         _search_later(module)
+    elif module.__name__ == "rosgraph.roslogging":
+        module.configure_logging = with_settings_found(module.configure_logging, module.rospkg)
     else:
         _import_rosclean()
 
@@ -66,6 +71,26 @@ def remembering(find, clock=time.monotonic):
         return found[path][1]
 
     return find_packages
+
+
+def with_settings_found(configure, rospkg):
+    """rosgraph's ``configure``, without a search for the package rosgraph where the user or the system has settings."""
+    @functools.wraps(configure)
+    def configure_logging(*args, **kwargs):
+        if not os.environ.get(_LOG_SETTINGS):
+            folders = os.path.join(rospkg.get_ros_home(), "config"), rospkg.get_etc_ros_dir()
+            files = (os.path.join(folder, name) for folder in folders
+                     for name in ("python_logging.conf", "python_logging.yaml"))
+            found = next(filter(os.path.isfile, files), None)
+            if found:
+                os.environ[_LOG_SETTINGS] = found
+                try:
+                    return configure(*args, **kwargs)
+                finally:
+                    os.environ.pop(_LOG_SETTINGS, None)  # children look for themselves
+        return configure(*args, **kwargs)
+
+    return configure_logging
 
 
 def _import_rosclean():

@@ -22,7 +22,7 @@ def logged(tmp_path):
     """Run a program that logs three messages into a file: (its output, its errors)."""
     (tmp_path / "rosgraph").mkdir()
     for name in ("__init__", "roslogging"):
-        (tmp_path / "rosgraph" / (name + ".py")).touch()
+        (tmp_path / "rosgraph" / (name + ".py")).write_text("rospkg = configure_logging = None")
 
     def run(file, text):
         done = subprocess.run([sys.executable, "-c", PROGRAM % (file, text)], capture_output=True, text=True,

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What nodes and roslaunch no longer import, and that it is there when it is used."""
+import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
-from lab_environment.quick_imports import remembering
+from lab_environment.quick_imports import remembering, with_settings_found
 
 PROGRAM = """
 import sys
@@ -34,3 +36,21 @@ def test_a_search_for_packages_counts_for_some_seconds():
         assert find(path).keys() == {path}
     assert find("a", "only") == {"a": 4}
     assert asked == [("a",), ("b",), ("a",), ("a", "only")]
+
+
+def test_settings_of_the_log_are_found_in_the_order_of_ros(tmp_path, monkeypatch):
+    monkeypatch.delenv("ROS_PYTHON_LOG_CONFIG_FILE", raising=False)
+    home, system = tmp_path / "home", tmp_path / "etc"
+    for folder in (home / "config", system):
+        folder.mkdir(parents=True)
+    rospkg = SimpleNamespace(get_ros_home=lambda: str(home), get_etc_ros_dir=lambda: str(system))
+    configure = with_settings_found(lambda name: (name, os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")), rospkg)
+    expected = [None]
+    for file in (system / "python_logging.yaml", system / "python_logging.conf", home / "config/python_logging.yaml"):
+        assert configure("node") == ("node", expected[-1])
+        file.touch()
+        expected.append(str(file))
+    assert configure("node") == ("node", expected[-1])
+    monkeypatch.setenv("ROS_PYTHON_LOG_CONFIG_FILE", "mine")
+    assert configure("node") == ("node", "mine")
+    assert os.environ["ROS_PYTHON_LOG_CONFIG_FILE"] == "mine"
