@@ -14,6 +14,7 @@ from .pose import Pose
 from .quiet_pybullet import pybullet
 
 BASE = -1  # PyBullet's index of the root link
+_SLOW = 0.01  # slower links keep their velocity, as in ODE [m/s, rad/s]
 
 
 class Body:
@@ -49,6 +50,9 @@ class Body:
         self._pairs = ()
         self._firm = set()  # indices of links with friction that does not creep
         self.set_self_collision_pairs(())
+        #: {body's name: parts of its speed and turn rate that each step takes}
+        self.decaying = {link.name: link.decay for link in merged.links.values()
+                         if any(link.decay) and not (self.static and link.name == merged.root)}
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
             if not link.gravity:
@@ -310,6 +314,21 @@ class Body:
         gravity = np.array(self._world.gravity)
         for body, mass in self._weightless.items():
             self._push(self._link_index[body], -mass * gravity)
+
+    def slow_down(self):
+        """For World: take away what the velocities of links lose in the next step (SDF's <velocity_decay>, as ODE)."""
+        dt = self._world.time_step_s
+        for body, (linear_part, angular_part) in self.decaying.items():
+            index, inertial = self._link_index[body], self.merged.links[body].inertial
+            frame = self._body_matrix(index)
+            axes = frame[:3, :3]
+            linear, angular = self._twist(index, frame[:3, 3] + axes @ inertial.centre)
+            force, torque = np.zeros(3), np.zeros(3)
+            if np.linalg.norm(linear) > _SLOW:
+                force = -linear_part * inertial.mass / dt * linear
+            if np.linalg.norm(angular) > _SLOW:
+                torque = -angular_part / dt * (axes @ inertial.inertia @ axes.T @ angular)
+            self._push(index, force, torque)
 
     # -- collisions ---------------------------------------------------------------------------------------------
 

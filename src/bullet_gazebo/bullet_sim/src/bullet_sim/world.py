@@ -98,7 +98,7 @@ class World:
         self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
         self._sliding = {}  # model -> its SlidingWheels
-        self._springs = {}  # model -> its JointSprings
+        self._acting = {}  # model -> functions that act on it before each step
         self._watch = StateWatch(self, error)
         self._touched = []  # models that were touched since the last step, perhaps asleep
         self._placed = []  # free models that were put somewhere since the last step
@@ -202,8 +202,10 @@ class World:
         wheels = [] if static else fixed_wheels(merged.joints.values())
         if wheels:
             self._sliding[model] = SlidingWheels(self._client, model, wheels)
+        if model.decaying:
+            self._acting[model] = [model.slow_down]
         if model.springs is not None:
-            self._springs[model] = model.springs
+            self._acting.setdefault(model, []).append(model.springs.push)
             for joint, stiffness in model.springs.bounded().items():
                 self._warn("model '%s': the spring of joint '%s' has a stiffness of %g; %g is used, which is stable at "
                            "a step of %g s" % (name, joint, *stiffness, self.time_step_s))
@@ -242,7 +244,7 @@ class World:
         model.remove()
         del self.models[name]
         self._sliding.pop(model, None)
-        self._springs.pop(model, None)
+        self._acting.pop(model, None)
         self._models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
@@ -292,8 +294,9 @@ class World:
             model.cancel_weight()
         for wheels in self._sliding.values():
             wheels.correct()
-        for springs in self._springs.values():
-            springs.push()
+        for functions in self._acting.values():
+            for act in functions:
+                act()
         pybullet.stepSimulation(physicsClientId=self._client)
         self.tick += 1
         self.steps += 1

@@ -230,6 +230,19 @@ def test_a_parallelogram_of_bars_is_closed_by_a_joint(world, kind):
     world.step()
 
 
+def test_velocities_decay_by_a_part_in_each_step(world):
+    robot = parse_urdf(SOLID % {"name": "it", "shape": '<box size="1 1 1"/>', "mass": 2.0, "mu": 1.0, "ixx": 0.1,
+                                "iyy": 0.2, "izz": 0.3})
+    robot.links["it"].decay = (0.01, 0.002)
+    it = world.spawn(robot, "it")
+    world.set_gravity((0.0, 0.0, 0.0))
+    it.set_base_twist((1.0, 0, 0), (0, 0, 2.0))
+    for _ in range(100):
+        world.step()
+    linear, angular = it.base_twist()
+    assert (linear[0], angular[2]) == pytest.approx((0.99 ** 100, 2.0 * 0.998 ** 100), rel=0.01)
+
+
 def test_a_spring_in_a_joint_swings(world):
     robot = parse_urdf(SLIDER % 0.0)
     robot.joints["rail"].spring_stiffness, robot.joints["rail"].spring_reference = 50.0, 0.2

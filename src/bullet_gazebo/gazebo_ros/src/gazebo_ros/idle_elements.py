@@ -13,7 +13,8 @@ _ONE_MU = "friction is the same in all directions"
 #: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
 KNOWN = {
     "model": "static self_collide joint plugin start_configuration",
-    "link": "mu mu1 kp kd selfCollide self_collide turnGravityOff gravity material sensor light plugin canonicalBody "
+    "link": "mu mu1 kp kd selfCollide self_collide dampingFactor "
+            "turnGravityOff gravity material sensor light plugin canonicalBody "
             "maxContacts",
     "link/collision": "max_contacts",
     "link/collision/surface/friction/ode": "mu",
@@ -26,7 +27,6 @@ KNOWN = {
 WITHOUT_EFFECT = (
     ("link", {"mu2": "@mu1=1", "fdir1": "0 0 0|?mu1=mu2"}, _ONE_MU),
     ("link", {"maxVel": "0.01", "minDepth": "0"}, "the solver is Bullet's, not ODE's"),
-    ("link", {"dampingFactor": "0"}, "bodies have no drag"),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
     ("link", {"visual": None}, _NOT_IN_A_URDF),

@@ -22,6 +22,12 @@ def read_link(document, element, name, materials):
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame. ``materials``: MaterialScripts."""
     link = Link(name, _inertial(document, element), line=element.sourceline)
     link.gravity = document.flag(element, "gravity", True)
+    decay = element.find("velocity_decay")
+    if decay is not None:
+        said = tuple(document.number(decay, tag, 0.0) for tag in ("linear", "angular"))
+        link.decay = tuple(min(max(part, 0.0), 1.0) for part in said)
+        if link.decay != said:
+            document.mend(decay, "<velocity_decay> of %g and %g, of which parts from 0 to 1 are used" % said)
     surfaces = []
     for child in element.iterchildren("collision"):
         shape = _shape(document, child, name)

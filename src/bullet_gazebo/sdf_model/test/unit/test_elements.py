@@ -93,9 +93,10 @@ def test_a_world_says_it_once_for_all_its_models(tmp_path):
 <model name="a"><link name="l">%s<enable_wind>0</enable_wind></link></model>
 <model name="b"><link name="l">%s<self_collide>0</self_collide></link></model>
 <state world_name="w"><sim_time>1 0</sim_time><insertions/></state></world></sdf>"""
-                    % (2 * ("<velocity_decay><linear>0.1</linear></velocity_decay>",)))
+                    % (2 * ("<battery/>",)))
     warning = parse_sdf_world(path).warning
     assert warning.count("without an effect") == 1
-    for words in ("linear_velocity (%s line 1)", "iters (%s line 3)", "linear (%s line 4, 5)", "insertions (%s line 6"):
+    for words in ("linear_velocity (%s line 1)", "iters (%s line 3)", "battery (%s line 4, 5)",
+                  "insertions (%s line 6"):
         assert words % path in warning
     assert warning.count("(") == 4

@@ -436,6 +436,11 @@ def test_a_joint_may_have_a_sensor():
     assert block.get("reference") == "j" and block.find("sensor").get("name") == "ft"
 
 
+def test_velocities_of_a_link_may_decay():
+    found = parse_sdf_model(sdf('<link name="a"><velocity_decay><linear>0.1</linear></velocity_decay></link>'), "m.sdf")
+    assert found.robot.links["a"].decay == (0.1, 0.0) and found.warning == ""
+
+
 def test_links_may_collide_with_their_model():
     found = parse_sdf_model(sdf('<self_collide>1</self_collide><link name="a"/><link name="b"><self_collide>0'
                                 "</self_collide></link>" + joint("j", "a", "b")), "m.sdf")

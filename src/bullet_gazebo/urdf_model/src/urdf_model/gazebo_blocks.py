@@ -37,6 +37,10 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
                  % (link.name, part.text))
     if found:
         link.surface = replace(link.surface or Surface(), **found)
+    for part in element.iterchildren("dampingFactor"):
+        value = _number(part, "link '%s'" % link.name, False, warn)
+        if value is not None:
+            link.decay = (_within(part, "link '%s'" % link.name, value, 1.0, warn),) * 2
     for part in element.iterchildren("selfCollide", "self_collide"):
         link.self_collide = is_true(part.text)
     for part in element.iterchildren("turnGravityOff", "gravity"):

@@ -38,6 +38,7 @@ class MergedLink:
     surface: Surface | None = None
     gravity: bool = True
     self_collide: bool = False
+    decay: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass
@@ -108,6 +109,7 @@ def _merge_group(robot, body, members, frames):
     surfaces = [robot.links[name].surface for name in members if robot.links[name].surface is not None]
     merged.surface = surfaces[0] if surfaces else None
     merged.gravity = robot.links[body].gravity
+    merged.decay = robot.links[body].decay
     merged.self_collide = any(robot.links[name].self_collide for name in members)
     return merged
 

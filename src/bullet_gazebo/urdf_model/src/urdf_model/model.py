@@ -130,6 +130,7 @@ class Link:
     surface: Surface | None = None
     gravity: bool = True  # False: it has no weight
     self_collide: bool = False  # whether it collides with links of its model that do so, too
+    decay: tuple[float, float] = (0.0, 0.0)  # the parts of its speed and turn rate that each step takes
     helper: bool = False  # between the axes of a joint; Gazebo has no such link
 
 

@@ -238,6 +238,12 @@ def test_damping_may_be_implicit(flag, implicit):
     assert merge_fixed(robot).joints["j"].implicit_damping is implicit
 
 
+def test_a_damping_factor_is_a_decay_of_both_velocities():
+    robot = parse_urdf('<robot name="r"><link name="a"/><gazebo reference="a"><dampingFactor>0.1</dampingFactor>'
+                       "</gazebo></robot>")
+    assert merge_fixed(robot).links["a"].decay == (0.1, 0.1)
+
+
 def test_a_link_may_have_a_bitmask():
     robot = parse_urdf("""<robot name="r"><link name="a"/><gazebo reference="a"><collision><surface><contact>
     <collide_bitmask>0x02</collide_bitmask></contact></surface></collision></gazebo></robot>""")
