@@ -45,12 +45,12 @@ def _loaded_alone(function: Any) -> Any:
     imports scipy.linalg. That takes two thirds of the time of loading and 25 MB; only what compiles needs them, and
     makes them itself. Where numba has changed inside, functions are loaded as it does.
     """
-    cache = getattr(function, "_cache", None)
+    cache: Any = getattr(function, "_cache", None)
     if not (hasattr(cache, "_load_overload") and hasattr(cache, "_guard_against_spurious_io_errors")):
         return function
 
     def load_overload(signature: Any, target: Any) -> Any:
-        from numba.core.runtime import rtsys
+        from numba.core.runtime.nrt import rtsys
 
         rtsys.initialize(target)  # what allocates the arrays of compiled code
         with cache._guard_against_spurious_io_errors():
