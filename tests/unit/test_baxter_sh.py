@@ -173,7 +173,8 @@ def test_version_is_that_of_all_packages():
     version = baxter("--version").stdout.split()[-1]
     manifests = subprocess.run(["grep", "-rhoP", "--include=package.xml", "(?<=<version>).*(?=</version>)",
                                 *sorted(map(str, (ROOT / "src").glob("*/")))], capture_output=True, text=True).stdout
-    assert set(manifests.split()) == {version}
+    of_pip = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    assert {*manifests.split(), of_pip} == {version}
 
 
 def test_unknown_option_and_unknown_host_are_refused():
