@@ -93,6 +93,6 @@ def _lenses(urdf):
 
 
 def _entry(name, model):
-    """What the renderer has to know of a model. It has a floor of its own, without a description."""
+    """A model as the renderer needs it. It has a floor of its own, without a description."""
     return {"name": name, "urdf": None if name == FLOOR else drawing_urdf(model.merged),
             "joints": list(model.joint_names), "static": model.static}

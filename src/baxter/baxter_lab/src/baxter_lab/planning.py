@@ -22,7 +22,7 @@ def _lowered(pose):
 
 
 class Planning:
-    """What a Lab plans with; made at the first plan, which takes seconds. lab: `lab.Lab`."""
+    """The planner of a Lab; made at the first plan, which takes seconds. lab: `lab.Lab`."""
 
     def __init__(self, lab):
         self._lab, self._exact, self._limits = lab, None, None

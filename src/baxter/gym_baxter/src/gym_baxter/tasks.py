@@ -48,7 +48,7 @@ class Task:
         raise NotImplementedError
 
     def reward(self) -> float:
-        """What the present state is worth, 0 to 1."""
+        """The worth of the present state, 0 to 1."""
         raise NotImplementedError
 
     def succeeded(self) -> bool:

@@ -40,7 +40,7 @@ class LibraryPackages:
 
 
 def find_packages():
-    """What answers ``list()`` and ``get_path(name)``; names that it does not know raise one of ``NOT_FOUND``.
+    """Object that answers ``list()`` and ``get_path(name)``; names that it does not know raise one of ``NOT_FOUND``.
 
     Where pip has installed this library, its own packages, whatever ROS may be on this machine; in a workspace
     ``rospkg.RosPack``, or, without rospkg, the packages of the workspace.

@@ -234,7 +234,7 @@ class SimulatedBaxter:
         return to_base @ np.array(self.world.gravity)
 
     def _sense(self, position, velocity, effort):
-        """What the robot says of its joints, (n,) each, where they are as given."""
+        """The robot's readings of its joints, (n,) each, where they are as given."""
         arm, actuators = self.arm_index, self.baxter.actuators
         if actuators is not None:
             effort = effort.copy()
