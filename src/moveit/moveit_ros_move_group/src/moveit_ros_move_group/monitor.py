@@ -38,8 +38,9 @@ class SceneMonitor:
     and of the robot alone, are published, at most ``hz`` times per second. All methods may be called from any thread.
     """
 
-    def __init__(self, model, say_failure):
-        """say_failure(request, text): told what could not be applied."""
+    def __init__(self, model, say_failure, topics=None):
+        """say_failure(request, text): told what could not be applied. topics: {key of _NAMES: topic} of the node's own
+        parameters."""
         self.model = model
         self.continuous = {name for name, turns in zip(model.variables, model.continuous, strict=True) if turns}
         self._say_failure = say_failure
@@ -53,7 +54,7 @@ class SceneMonitor:
         self._buffer, self._patient_from = None, 0.0
         self.reader = SceneReader(self.tf_frame)
         options = rospy.get_param("~planning_scene_monitor_options", {})
-        topics = {key: options.get(key, usual) for key, usual in _NAMES.items()}
+        topics = {key: options.get(key, usual) for key, usual in {**_NAMES, **(topics or {})}.items()}
         if model.virtual_joint is not None:
             self._listen_to_tf()
         self._bounds_error = float(np.finfo(float).eps)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands that have come, and which of them is in force. Time is an argument; free of ROS, and of threads."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from moveit_servo.settings import UNITLESS
+
+if TYPE_CHECKING:
+    from moveit_servo.settings import ServoSettings
+
+
+class CommandIgnored(ValueError):
+    """A command that is not carried out, with the reason."""
+
+
+@dataclass
+class _Newest:
+    """The newest command of one kind. since [s]: when it was sent; value None: no motion is wanted."""
+
+    since: float = -np.inf
+    value: Any = None
+    frame: str = ""
+
+
+@dataclass
+class Commands:
+    """Of twists, joint velocities and poses the newest one each. As in MoveIt, twists go before joint velocities; both
+    go before poses.
+
+    control, drift (6,) bool: the components of twists that count, and the directions of the planning frame that do not
+    matter.
+    """
+
+    joints: tuple[str, ...]
+    control: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
+    drift: np.ndarray = field(default_factory=lambda: np.zeros(6, dtype=bool))
+
+    def __post_init__(self) -> None:
+        self._twist, self._jog, self._pose = _Newest(), _Newest(), _Newest()
+
+    def take_twist(self, values: Any, frame: str, since: float, settings: ServoSettings) -> None:
+        """A twist (6,), of ``frame``; empty: of the command frame. Raises CommandIgnored; then nothing moves."""
+        self._twist = _Newest(since)
+        twist = np.array(values, dtype=float)
+        if not np.isfinite(twist).all():
+            raise CommandIgnored("a twist is not finite: %s" % twist.tolist())
+        if settings.command_in_type == UNITLESS:
+            if np.abs(twist).max() > 1.0:
+                raise CommandIgnored("a twist has a component beyond -1 to 1: %s; command_in_type is %s"
+                                     % (twist.tolist(), UNITLESS))
+            twist *= np.repeat((settings.linear_scale, settings.rotational_scale), 3)
+        twist = np.where(self.control, twist, 0.0)
+        self._twist = _Newest(since, twist if twist.any() else None, frame)
+
+    def take_jog(self, names: Any, velocities: Any, since: float, settings: ServoSettings) -> list[str]:
+        """Velocities of joints; return names that are not the arm's. Raises CommandIgnored; then nothing moves."""
+        self._jog = _Newest(since)
+        names, values = list(names), np.array(velocities, dtype=float)
+        if not np.isfinite(values).all():
+            raise CommandIgnored("joint velocities are not finite: %s" % values.tolist())
+        if len(values) < len(names):
+            raise CommandIgnored("a joint command has %d names but %d velocities" % (len(names), len(values)))
+        scale = settings.joint_scale if settings.command_in_type == UNITLESS else 1.0
+        wanted, foreign = np.zeros(len(self.joints)), []
+        for name, value in zip(names, values, strict=False):
+            if name in self.joints:
+                wanted[self.joints.index(name)] = scale * value
+            else:
+                foreign.append(name)
+        # A command without a known joint is one, too: MoveIt publishes set-points for it.
+        self._jog = _Newest(since, wanted if values.any() else None)
+        return foreign
+
+    def take_pose(self, pose: np.ndarray, frame: str, since: float) -> None:
+        """A pose (4, 4) of the tip in ``frame``."""
+        self._pose = _Newest(since, pose, frame)
+
+    def newest(self, now: float, settings: ServoSettings) -> tuple[str, Any, str]:
+        """Return (kind, value, frame) of the command in force at ``now`` [s]: "twist", "joints" or "pose"; "" if there
+        is none."""
+        for kind, newest, timeout in (("twist", self._twist, settings.incoming_command_timeout),
+                                      ("joints", self._jog, settings.incoming_command_timeout),
+                                      ("pose", self._pose, settings.target_pose_timeout or np.inf)):
+            if newest.value is not None and now - newest.since < timeout:
+                if kind != "pose":
+                    self._pose = _Newest()  # a hand on the stick ends a pursuit
+                return kind, newest.value, newest.frame
+        return "", None, ""
+
+    def reached(self) -> None:
+        """A pose that need not be sent again has been reached."""
+        self._pose = _Newest()
+
+    def clear(self) -> None:
+        """Forget all: time has gone back."""
+        self._twist, self._jog, self._pose = _Newest(), _Newest(), _Newest()
+
+
+def sent_at(stamp: float, arrived: float) -> float:
+    """The time [s] from which a command counts, by its ``stamp`` (0: none) and when it ``arrived``: a stamp in the
+    future, of a clock that is ahead, must not keep an arm moving."""
+    return min(stamp, arrived) if stamp > 0.0 else arrived

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where steering goes: twists to servos, commands to grippers, marks to whoever records. Used by the devices' nodes."""
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import TwistStamped
+from std_msgs.msg import Int8, String
+
+from baxter_interface import Gripper
+from moveit_servo.settings import UNITLESS
+
+if TYPE_CHECKING:
+    from moveit_servo.steering import Steering
+
+# Twists of zero that end a motion.
+_MAX_STOPS = 5
+
+
+class Hand:
+    """One servo and its gripper. name: of the servo's node; reason: why it holds back, "" if it does not."""
+
+    def __init__(self, name: str, gripper: str) -> None:
+        self.name, self.reason, self.status = name, "", 0
+        # A device may be started before the servo whose parameters these are.
+        self._linear = rospy.get_param("~linear_speed", 0.2)
+        self._angular = rospy.get_param("~angular_speed", 0.6)
+        self._stops, self._gripper_name, self._gripper, self._gripping = _MAX_STOPS, gripper, None, threading.Lock()
+        self._twists = rospy.Publisher(name + "/delta_twist_cmds", TwistStamped, queue_size=1, tcp_nodelay=True)
+        self._kept = [rospy.Subscriber(name + "/status", Int8, self._on_status, queue_size=1),
+                      rospy.Subscriber(name + "/status_reason", String, self._on_reason, queue_size=1)]
+
+    def _on_status(self, message: Int8) -> None:
+        self.status = message.data
+
+    def _on_reason(self, message: String) -> None:
+        self.reason = message.data
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the servo listens."""
+        return self._twists.get_num_connections() > 0
+
+    def steer(self, twist: np.ndarray, in_tool: bool) -> None:
+        """Send ``twist`` (6,), -1 to 1; after a motion a few zeros, then nothing."""
+        if twist.any():
+            self._stops = 0
+        elif self._stops >= _MAX_STOPS:
+            return
+        else:
+            self._stops += 1
+        speeds = (1.0, 1.0) if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS else (
+            self._linear, self._angular)
+        message = TwistStamped()
+        message.header.stamp = rospy.Time.now()
+        message.header.frame_id = rospy.get_param_cached(self.name + "/ee_frame_name", "") if in_tool else ""
+        values = (twist * np.repeat(speeds, 3)).tolist()
+        (message.twist.linear.x, message.twist.linear.y, message.twist.linear.z, message.twist.angular.x,
+         message.twist.angular.y, message.twist.angular.z) = values
+        self._twists.publish(message)
+
+    def grip(self, how: str) -> None:
+        """"open" or "close" Baxter's gripper of this side, if the node has one."""
+        if not self._gripper_name:
+            rospy.logwarn_throttle(5.0, "%s has no gripper; set ~grippers to left, right or both" % self.name)
+            return
+        # A gripper that is not there is waited for; the hand must stop at once meanwhile.
+        threading.Thread(target=self._grip, args=(how,), daemon=True).start()
+
+    def _grip(self, how: str) -> None:
+        with self._gripping:
+            try:
+                self._gripper = self._gripper or Gripper(self._gripper_name)
+                (self._gripper.open if how == "open" else self._gripper.close)(block=False)
+            except OSError as error:
+                rospy.logwarn("%s: %s", self.name, error)
+
+
+class Hands:
+    """All hands of a device. Parameters: ~servos, names of servos' nodes; ~grippers, of each Baxter's side or ""."""
+
+    def __init__(self) -> None:
+        names = rospy.get_param("~servos", ["servo_server"])
+        names = names.split() if isinstance(names, str) else list(names)
+        grippers = rospy.get_param("~grippers", [])
+        grippers = grippers.split() if isinstance(grippers, str) else list(grippers)
+        grippers += [""] * (len(names) - len(grippers))
+        self.hands = [Hand(rospy.resolve_name(name), gripper) for name, gripper in zip(names, grippers, strict=False)]
+        self._marks = rospy.Publisher("~mark", String, queue_size=10)
+
+    def __len__(self) -> int:
+        return len(self.hands)
+
+    def send(self, steering: Steering) -> None:
+        """Carry out a Steering; hands that it is not about come to rest."""
+        for number, hand in enumerate(self.hands):
+            hand.steer(steering.twist if number == steering.hand else np.zeros(6), steering.in_tool)
+        if steering.gripper:
+            self.hands[steering.hand].grip(steering.gripper)
+        if steering.mark:
+            self._marks.publish(String(steering.mark))

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node: keeps the scene and the robot's state, lets the servo make a step each period, publishes its set-points."""
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import rospy
+from control_msgs.msg import JointJog
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from moveit_msgs.msg import PlanningScene, PlanningSceneComponents
+from moveit_msgs.srv import (
+    ChangeControlDimensions,
+    ChangeControlDimensionsResponse,
+    ChangeDriftDimensions,
+    ChangeDriftDimensionsResponse,
+    GetPlanningScene,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int8, String
+from std_srvs.srv import Empty, EmptyResponse
+
+from model_files.resources import ResourceFinder
+from motion_planning.errors import PlanningError
+from motion_planning.exact import ExactChecker
+from motion_planning.model import MeshReader, PlanningModel
+from motion_planning.planners.planning import sphere_model_of
+from moveit_ros_move_group.convert.geometry import matrix_of
+from moveit_ros_move_group.monitor import SceneMonitor
+from moveit_servo.commands import CommandIgnored, Commands, sent_at
+from moveit_servo.outputs import MESSAGE_TYPES, message_of
+from moveit_servo.servo import Command, Servo, Status
+from moveit_servo.settings import ServoSettings, SettingsError
+from moveit_servo.surroundings import Surroundings
+from moveit_servo.warming import warm_up
+from numba_cache import compiler_pages
+from rospy_limits.node import limit_ports
+from rospy_start import MissingParameter, end_on_signals, wait_for_param
+
+# Wall time to wait for the robot's model, and for all of the arm's joint states until that is complained of [s].
+_DESCRIPTION_TIMEOUT_S, _JOINTS_TIMEOUT_S = 60.0, 10.0
+# Wall time between two looks at the parameters, at the scene, and at the reason of a status [s].
+_PARAMETERS_EVERY_S, _SCENE_EVERY_S, _REASON_EVERY_S = 1.0, 0.1, 0.25
+# A step covers at most this many periods: after a pause the motion goes on where it was.
+_MAX_PERIODS = 3.0
+_TOLD_EVERY_S = 5.0
+_AXES = ("x_translation", "y_translation", "z_translation", "x_rotation", "y_rotation", "z_rotation")
+# Private parameters that are no settings of the servo.
+_OTHER_PARAMETERS = {"robot_description", "monitored_planning_scene_topic", "planning_scene_monitor_options",
+                     "planning_scene_monitor"}
+
+_DESCRIPTION = """Steer an arm, as MoveIt Servo does.
+
+Subscribes: ~delta_twist_cmds, ~delta_joint_cmds, ~target_pose, joint_states, and the planning scene's topics.
+Publishes: the controller's command, ~status, ~status_reason.
+Services: ~change_drift_dimensions, ~change_control_dimensions, ~reset_servo_status.
+Parameters: those of MoveIt Servo's YAML files, read again once a second; ~robot_description,
+~monitored_planning_scene_topic.
+"""
+
+
+class ServoNode:
+    """Callbacks put commands and states in, ``run`` takes them out."""
+
+    def __init__(self, model: PlanningModel, exact: ExactChecker, settings: ServoSettings) -> None:
+        self.model, self.exact = model, exact
+        self.servo = Servo(model, settings)
+        self.commands = Commands(self.servo.joints)
+        self._lock, self._news = threading.Lock(), threading.Event()
+        self._q, self._velocity = model.default_state().q.copy(), np.zeros(len(model.variables))
+        self._heard: set[str] = set()
+        self._indices = [model.index[name] for name in self.servo.joints]
+        self._frames: dict[str, np.ndarray] = {}
+        self._sent, self._halts, self._new_settings = False, 0, settings
+        self._said, self._contact = (Status.NO_WARNING, ""), ""
+        self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
+                                    {"joint_state_topic": settings.joint_topic})
+        self._put_surroundings(self.monitor.scene())
+        kind = MESSAGE_TYPES[settings.command_out_type]
+        self._out = rospy.Publisher(_private(settings.command_out_topic), kind, queue_size=2, tcp_nodelay=True)
+        self._status = rospy.Publisher(_private(settings.status_topic), Int8, queue_size=2)
+        self._reason = rospy.Publisher("~status_reason", String, queue_size=2, latch=True)
+        take = {"queue_size": 2, "tcp_nodelay": True}
+        self._kept = [
+            rospy.Subscriber(settings.joint_topic, JointState, self._on_joints, queue_size=2),
+            rospy.Subscriber(_private(settings.cartesian_command_in_topic), TwistStamped, self._on_twist, **take),
+            rospy.Subscriber(_private(settings.joint_command_in_topic), JointJog, self._on_jog, **take),
+            rospy.Subscriber("~target_pose", PoseStamped, self._on_pose, **take),
+            rospy.Subscriber(rospy.get_param("~monitored_planning_scene_topic", "move_group/monitored_planning_scene"),
+                             PlanningScene, lambda message: self.monitor.apply(message, "the planning scene"),
+                             queue_size=100),
+            rospy.Service("~change_drift_dimensions", ChangeDriftDimensions, self._on_drift),
+            rospy.Service("~change_control_dimensions", ChangeControlDimensions, self._on_control),
+            rospy.Service("~reset_servo_status", Empty, self._on_reset)]
+        for work in (self._watch_scene, self._watch_parameters, self._tell_reasons):
+            threading.Thread(target=work, daemon=True).start()
+
+    # -- what comes in -------------------------------------------------------------------------------------------
+
+    def _on_joints(self, message: JointState) -> None:
+        if len(message.name) != len(message.position):
+            return  # the scene's monitor says so
+        moves = len(message.velocity) == len(message.name)
+        with self._lock:
+            for number, name in enumerate(message.name):
+                index = self.model.index.get(name)
+                if index is None or not math.isfinite(message.position[number]):
+                    continue
+                self._q[index] = message.position[number]
+                self._velocity[index] = message.velocity[number] if moves else 0.0
+                self._heard.add(name)
+
+    def _on_twist(self, message: TwistStamped) -> None:
+        part = message.twist
+        values = [getattr(vector, axis) for vector in (part.linear, part.angular) for axis in "xyz"]
+        self._take(message.header, lambda frame, since: self.commands.take_twist(
+            values, frame, since, self.servo.settings))
+
+    def _on_jog(self, message: JointJog) -> None:
+        def take(_, since):
+            foreign = self.commands.take_jog(message.joint_names, message.velocities, since, self.servo.settings)
+            if foreign:
+                rospy.logwarn_throttle(_TOLD_EVERY_S, "joint commands name %s; the arm's joints are %s" % (
+                    ", ".join(foreign), ", ".join(self.servo.joints)))
+        self._take(message.header, take)
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        self._take(message.header, lambda frame, since: self.commands.take_pose(
+            matrix_of(message.pose, "target_pose"), frame, since))
+
+    def _take(self, header: Any, take: Any) -> None:
+        """Give a command to ``commands``; log why one is ignored."""
+        arrived = rospy.get_time()
+        since = sent_at(header.stamp.to_sec(), arrived)
+        if arrived - since >= self.servo.settings.incoming_command_timeout:
+            rospy.logwarn_throttle(_TOLD_EVERY_S, "a command has come %.2f s after its stamp, later than "
+                                   "incoming_command_timeout, %g s; do the clocks agree?" % (
+                                       arrived - since, self.servo.settings.incoming_command_timeout))
+        frame = header.frame_id.lstrip("/")
+        try:
+            if frame and frame not in self.model.link_index and frame != self.model.frame:
+                self._frames[frame] = self.monitor.tf_frame(frame)
+            with self._lock:
+                take(frame, since)
+        except (CommandIgnored, PlanningError) as error:
+            rospy.logwarn_throttle(_TOLD_EVERY_S, "%s; it is ignored" % error)
+        self._news.set()
+
+    def _on_drift(self, request: Any) -> ChangeDriftDimensionsResponse:
+        self.commands.drift = np.array([getattr(request, "drift_" + axis) for axis in _AXES], dtype=bool)
+        return ChangeDriftDimensionsResponse(success=True)
+
+    def _on_control(self, request: Any) -> ChangeControlDimensionsResponse:
+        self.commands.control = np.array([getattr(request, "control_" + axis) for axis in _AXES], dtype=bool)
+        return ChangeControlDimensionsResponse(success=True)
+
+    def _on_reset(self, _: Any) -> EmptyResponse:
+        self._said = (Status.NO_WARNING, "")  # nothing is ever latched here
+        return EmptyResponse()
+
+    # -- steps ---------------------------------------------------------------------------------------------------
+
+    def wait_for_joints(self) -> bool:
+        """Wait for a state of each of the arm's joints; False: the node ends."""
+        begin, told = time.monotonic(), False
+        while not rospy.is_shutdown():
+            missing = [name for name in self.servo.joints if name not in self._heard]
+            if not missing:
+                return True
+            if not told and time.monotonic() - begin > _JOINTS_TIMEOUT_S:
+                told = True
+                rospy.logwarn("no joint state has come for %s; is %s the right joint_topic?", ", ".join(missing),
+                              rospy.resolve_name(self.servo.settings.joint_topic))
+            time.sleep(0.02)
+        return False
+
+    def run(self) -> None:
+        """Make a step each period of ROS time until the node ends."""
+        last = rospy.get_time()
+        due = last
+        while not rospy.is_shutdown():
+            settings = self.servo.settings
+            due = max(due + settings.publish_period, rospy.get_time() - settings.publish_period)
+            self._wait_until(due, settings)
+            now = rospy.get_time()
+            if now < last:
+                with self._lock:
+                    self.commands.clear()
+                self.servo.reset()
+                last = due = now
+                continue
+            seconds = min(now - last, _MAX_PERIODS * settings.publish_period)
+            last = now
+            if seconds > 0.0:
+                self._step(now, seconds)
+
+    def _wait_until(self, due: float, settings: ServoSettings) -> None:
+        self._news.clear()
+        while not rospy.is_shutdown():
+            left = due - rospy.get_time()
+            if left <= 0.0 or left > 10.0 * settings.publish_period:
+                return
+            if settings.low_latency_mode:
+                if self._news.wait(min(left, 0.001)):
+                    return
+            else:
+                try:
+                    rospy.sleep(left)
+                except rospy.ROSException:  # time has gone back, or the node ends
+                    return
+
+    def _step(self, now: float, seconds: float) -> None:
+        servo = self.servo
+        if self._new_settings is not servo.settings:
+            try:
+                servo.settings = self._new_settings
+            except SettingsError as error:
+                rospy.logwarn("the parameters stay as they were: %s", error)
+            self._new_settings = servo.settings
+        settings = servo.settings
+        with self._lock:
+            q, velocity = self._q.copy(), self._velocity.copy()
+            kind, value, frame = self.commands.newest(now, settings)
+        step = servo.step(q, velocity, self._command(kind, value, frame, q, settings), seconds)
+        if step.reached and not settings.target_pose_timeout:
+            with self._lock:
+                self.commands.reached()
+        if self._status.get_num_connections():
+            self._status.publish(Int8(int(step.status)))
+        if step.status is not self._said[0] or step.reason != self._said[1]:
+            self._said = (step.status, step.reason)
+        self._halts = self._halts + 1 if step.rests and not kind else 0
+        self._sent |= bool(kind)
+        if self._sent and (not settings.num_outgoing_halt_msgs_to_publish
+                           or self._halts <= settings.num_outgoing_halt_msgs_to_publish):
+            self._out.publish(message_of(step, q[self._indices], servo.joints, settings))
+
+    def _command(self, kind: str, value: Any, frame: str, q: np.ndarray, settings: ServoSettings) -> Command:
+        if not kind:
+            return Command()
+        if kind == "joints":
+            return Command(joints=value)
+        axes = self._axes(settings.planning_frame, q)[:3, :3]
+        if kind == "pose":
+            return Command(pose=self._axes(frame or settings.planning_frame, q) @ value, axes=axes,
+                           drift=self.commands.drift)
+        turn = axes.T @ self._axes(frame or settings.robot_link_command_frame or settings.planning_frame, q)[:3, :3]
+        return Command(twist=np.concatenate([turn @ value[:3], turn @ value[3:]]), drift=self.commands.drift, axes=axes)
+
+    def _axes(self, frame: str, q: np.ndarray) -> np.ndarray:
+        """The pose (4, 4) of a frame in the model's frame; that of a link moves with the arm."""
+        frame = frame.lstrip("/")
+        if frame in self.model.link_index:
+            return self.servo.pose(q, frame)
+        return self._frames.get(frame, np.eye(4))
+
+    # -- beside the steps ----------------------------------------------------------------------------------------
+
+    def _watch_scene(self) -> None:
+        """Prepare the scene again whenever it has changed: the steps use the one before until then."""
+        prepared, fetched = _of_scene(self.monitor.scene()), False
+        while not rospy.is_shutdown():
+            time.sleep(_SCENE_EVERY_S)
+            if not fetched:
+                fetched = self._fetch_scene()
+            scene = self.monitor.scene()
+            if _of_scene(scene) != prepared:
+                prepared = _of_scene(scene)
+                self._put_surroundings(scene)
+
+    def _fetch_scene(self) -> bool:
+        """Take over what move_group knew before; whether that needs no other try."""
+        name = rospy.resolve_name("get_planning_scene")
+        try:
+            rospy.wait_for_service(name, timeout=_SCENE_EVERY_S)
+            every = PlanningSceneComponents(components=1023)
+            scene = rospy.ServiceProxy(name, GetPlanningScene)(every).scene
+        except (rospy.ROSException, rospy.ServiceException):
+            return False
+        scene.robot_state.joint_state = JointState()
+        self.monitor.apply(scene, "the scene of move_group")
+        return True
+
+    def _put_surroundings(self, scene: Any) -> None:
+        try:
+            made = Surroundings(sphere_model_of(self.exact), self.servo.group, scene)
+        except PlanningError as error:
+            rospy.logerr("the scene cannot be prepared, the one before stays in force: %s", error)
+            return
+        for text in made.remarks:
+            rospy.logwarn("%s", text)
+        self.servo.base, self.servo.surroundings, self._kept_scene = np.array(scene.state.base), made, scene
+
+    def _watch_parameters(self) -> None:
+        """Take changed parameters over; those that need new connections need a restart, too."""
+        before = None
+        while not rospy.is_shutdown():
+            time.sleep(_PARAMETERS_EVERY_S)
+            try:
+                values = rospy.get_param("~", {})
+                if values == before:
+                    continue
+                before = values
+                self._new_settings = settings_of(values, self.model)
+            except SettingsError as error:
+                rospy.logwarn("the parameters stay as they were: %s", error)
+            except OSError:  # no master at the moment
+                continue
+
+    def _tell_reasons(self) -> None:
+        """Publish each new status with its reason, and which bodies are near."""
+        told = (None, "")
+        while not rospy.is_shutdown():
+            time.sleep(_REASON_EVERY_S)
+            status, reason = self._said
+            if (status, reason) == told:
+                continue
+            changed = status is not told[0]
+            told = status, reason
+            if status in (Status.DECELERATE_FOR_COLLISION, Status.HALT_FOR_COLLISION):
+                reason += self._between()
+            self._reason.publish(String(reason))
+            if changed and reason:
+                rospy.logwarn_throttle(_TOLD_EVERY_S, "%s: %s" % (status.name.lower().replace("_", " "), reason))
+
+    def _between(self) -> str:
+        scene = self.monitor.scene()
+        nearest = self.exact.nearest(scene, scene.state, self.servo.group.name)
+        return "" if nearest is None else " between '%s' and '%s'" % (nearest.a, nearest.b)
+
+
+def settings_of(values: dict, model: PlanningModel) -> ServoSettings:
+    """Return the ServoSettings of a node's parameters, with the model's frame where they name none. Raises
+    SettingsError."""
+    values = {name: value for name, value in values.items() if name not in _OTHER_PARAMETERS}
+    values["planning_frame"] = values.get("planning_frame") or model.frame
+    settings = ServoSettings.from_mapping(values)
+    for name in ("planning_frame", "robot_link_command_frame", "ee_frame_name"):
+        frame = getattr(settings, name)
+        if frame and frame not in model.link_index and frame != model.frame:
+            raise SettingsError("%s is '%s', which is no link of robot '%s'; its frame is '%s'"
+                                % (name, frame, model.name, model.frame))
+    return settings
+
+
+def _of_scene(scene: Any) -> tuple:
+    """What of a scene a Surroundings depends on; equal as long as nothing but joints has changed."""
+    held = tuple((name, body.link, id(body)) for name, body in scene.state.attached.items())
+    return (tuple(map(id, scene.objects.values())), id(scene.octomap), id(scene.allowed), held,
+            tuple(scene.link_padding.items()), tuple(scene.link_scale.items()), scene.state.base.tobytes())
+
+
+def _private(topic: str) -> str:
+    """A topic as MoveIt Servo's node names it: relative ones are private."""
+    return topic if topic.startswith(("/", "~")) else "~" + topic
+
+
+def build() -> ServoNode:
+    """Raises SettingsError, PlanningError, MissingParameter."""
+    name = rospy.get_param("~robot_description", "robot_description")
+    urdf, srdf = (wait_for_param(name + end, _DESCRIPTION_TIMEOUT_S) for end in ("", "_semantic"))
+    limits = (rospy.get_param(name + "_planning", None) or {}).get("joint_limits")
+    model = PlanningModel.from_xml(urdf, srdf, {"joint_limits": limits} if limits else None)
+    settings = settings_of(rospy.get_param("~", {}), model)
+    if settings.unknown:
+        rospy.logwarn("parameters without a meaning here: %s", ", ".join(settings.unknown))
+    exact = ExactChecker(model, MeshReader(ResourceFinder()))
+    for text in (*model.warnings, *exact.warnings):
+        rospy.logwarn("%s", text)
+    warm_up()
+    return ServoNode(model, exact, settings)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.parse_args(rospy.myargv()[1:])
+    end_on_signals()
+    try:
+        limit_ports()
+        rospy.init_node("servo_server", disable_signals=True)
+        node = build()
+    except (SettingsError, PlanningError, MissingParameter, rospy.ROSInitException) as error:
+        if not rospy.is_shutdown():
+            sys.exit("servo_server: %s" % error)
+        return
+    compiler_pages.release()
+    if node.wait_for_joints():
+        servo = node.servo
+        rospy.loginfo("steers %s with group '%s': %s", servo.tip, servo.group.name, ", ".join(servo.joints))
+        node.run()

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Set-points as the messages of a controller: trajectories of one point, arrays, or the commands of Baxter's limbs."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rospy
+from baxter_core_msgs.msg import JointCommand
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY
+
+if TYPE_CHECKING:
+    from moveit_servo.servo import Step
+    from moveit_servo.settings import ServoSettings
+
+MESSAGE_TYPES = {TRAJECTORY: JointTrajectory, ARRAY: Float64MultiArray, BAXTER: JointCommand}
+# Points of a trajectory for Gazebo, whose controller may drop those that are late.
+_POINTS_FOR_GAZEBO = 30
+# Velocities without positions drift; this share of the distance to the set-point is added to them [1/s].
+_RETURN_RATE = 2.0
+
+
+def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings) -> Any:
+    """Return the message of ``settings.command_out_type`` for a Step; measured (k,): where the joints are."""
+    positions, accelerations = step.position.tolist(), step.acceleration.tolist()
+    velocities = step.velocity
+    if not settings.publish_joint_positions and not step.rests:
+        velocities = velocities + _RETURN_RATE * (step.position - measured)
+    velocities = velocities.tolist()
+    if settings.command_out_type == ARRAY:
+        return Float64MultiArray(data=positions if settings.publish_joint_positions else
+                                 velocities if settings.publish_joint_velocities else [])
+    if settings.command_out_type == BAXTER:
+        by_position = settings.publish_joint_positions
+        return JointCommand(mode=JointCommand.RAW_POSITION_MODE if by_position else JointCommand.VELOCITY_MODE,
+                            names=list(joints), command=positions if by_position else velocities)
+    trajectory = JointTrajectory(joint_names=list(joints))
+    trajectory.header.frame_id = settings.planning_frame  # a stamp of 0: now
+    for number in range(_POINTS_FOR_GAZEBO if settings.use_gazebo else 1):
+        trajectory.points.append(JointTrajectoryPoint(
+            positions=positions if settings.publish_joint_positions else [],
+            velocities=velocities if settings.publish_joint_velocities else [],
+            accelerations=accelerations if settings.publish_joint_accelerations else [],
+            time_from_start=rospy.Duration((number + 1) * settings.publish_period)))
+    return trajectory

@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The servo of one arm: from the robot's state and a command to the set-points of the next step, and why they are not
+those wanted. Time and state are arguments.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from baxter_sim_kinematics import Chain, ChainError
+from moveit_servo.directions import Thresholds, velocity_for
+from moveit_servo.limits import JointLimits, Motion, speed_towards, stoppable
+from moveit_servo.pose_tracking import PoseTracker
+from moveit_servo.quadratic import nearest_within
+from moveit_servo.settings import STOP_DISTANCE, SettingsError
+
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel
+    from moveit_servo.settings import ServoSettings
+    from moveit_servo.surroundings import Surroundings
+
+# Set-points lead the joints by at most this [rad], so that a blocked arm is not pushed harder and harder; within this
+# they are kept between two motions, so that an arm that sags a little does not creep.
+_LEAD_RAD, _SAME_RAD = 0.12, 0.03
+# Speed at which a threshold of distance is the place where slowing down begins [m/s].
+_SPEED_AT_THRESHOLD = 0.4
+# Gaps are looked for up to this distance [m]; the fastest hand needs no more to stop.
+_REACH_M = 0.12
+# Spheres come no nearer than this [m].
+_CLEARANCE_M = 0.002
+# A pose counts as reached within these.
+_REACHED_M, _REACHED_RAD = 1e-4, 1e-3
+# Shares of a motion: what is lost less than the first is not worth a status; less than the second remains of a halt.
+_NOTICED, _REMAINS = 0.02, 0.05
+_AT_REST = 1e-6
+
+
+class Status(IntEnum):
+    """The codes of MoveIt Servo's status."""
+
+    INVALID = -1
+    NO_WARNING = 0
+    DECELERATE_FOR_SINGULARITY = 1
+    HALT_FOR_SINGULARITY = 2
+    DECELERATE_FOR_COLLISION = 3
+    HALT_FOR_COLLISION = 4
+    JOINT_BOUND = 5
+
+
+class Step(NamedTuple):
+    """Set-points (k,) of the arm's joints after a step, and what held them back.
+
+    reason: a sentence, empty for NO_WARNING. rests: nothing moves and nothing is wanted. reached: the pose is there.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    status: Status
+    reason: str
+    rests: bool
+    reached: bool
+
+
+@dataclass(frozen=True)
+class Command:
+    """What is wanted: one of twist (6,) [m/s, rad/s], joint velocities (k,) [per s], and a pose (4, 4) of the tip in
+    the model's frame; none of them: to stop. axes (3, 3): those of the twist, as columns in the model's frame. drift
+    (6,) bool: rows of the twist that do not matter."""
+
+    twist: np.ndarray | None = None
+    joints: np.ndarray | None = None
+    pose: np.ndarray | None = None
+    drift: np.ndarray = field(default_factory=lambda: np.zeros(6, dtype=bool))
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
+
+    def __bool__(self) -> bool:
+        return self.pose is not None or any(part is not None and part.any() for part in (self.twist, self.joints))
+
+
+class Servo:
+    """The arm of one group of a model. ``settings`` and ``surroundings`` (None: nothing is checked) may be replaced
+    between steps. joints: names of the k joints, in the order of all arrays; tip: link that is steered."""
+
+    def __init__(self, model: PlanningModel, settings: ServoSettings) -> None:
+        """Raises SettingsError for a group or link that cannot be steered."""
+        self.model = model
+        group = _group(model, settings.move_group_name)
+        self.group, self.tip = group, group.tip
+        self._chain = _chain_to(model, group)
+        self.joints = self._chain.joint_names
+        self._indices = np.array([model.index[name] for name in self.joints])
+        self._rows = np.searchsorted(group.indices, self._indices)
+        #: Pose (4, 4) of the model's root in its frame.
+        self.base = np.eye(4)
+        self.surroundings: Surroundings | None = None
+        self._motion: Motion | None = None
+        self._tracker, self._target = PoseTracker(), None
+        self.settings = settings
+
+    @property
+    def settings(self) -> ServoSettings:
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: ServoSettings) -> None:
+        self.limits = self._limits(settings)
+        self._settings = settings
+        if self._motion is not None:
+            before, self._motion = self._motion, Motion(self._motion.position, self.limits)
+            self._motion.velocity, self._motion.acceleration = before.velocity, before.acceleration
+
+    def _limits(self, settings: ServoSettings) -> JointLimits:
+        said = settings.max_acceleration
+        if isinstance(said, dict):
+            missing = [name for name in self.joints if name not in said]
+            if missing:
+                raise SettingsError("max_acceleration has no number for %s" % ", ".join(missing))
+            said = np.array([float(said[name]) for name in self.joints])
+        elif said is not None:
+            said = np.full(len(self.joints), float(said))
+        bounds, turns = self.model.bounds[self._indices], self.model.continuous[self._indices]
+        return stoppable(np.where(turns, -np.inf, bounds[:, 0]), np.where(turns, np.inf, bounds[:, 1]),
+                         self.model.velocity[self._indices], said, settings.stopping_time)
+
+    def reset(self) -> None:
+        """Forget the motion: the next step begins at the measured posture, at rest."""
+        self._motion, self._target = None, None
+
+    def pose(self, q: np.ndarray, link: str = "") -> np.ndarray:
+        """Return the pose (4, 4) of ``link``, empty: the tip, in the model's frame at ``q`` (n,)."""
+        return self.model.frame_of(q, link or self.tip, self.base)
+
+    def step(self, q: np.ndarray, velocity: np.ndarray, command: Command, seconds: float) -> Step:
+        """Return the Step that comes ``seconds`` after the last one.
+
+        q, velocity (n,): all joints of the model as measured. The command is that of now; the caller decides when one
+        is too old.
+        """
+        measured = np.asarray(q, dtype=float)[self._indices]
+        motion = self._motion
+        if motion is None:
+            motion = self._motion = Motion(measured, self.limits)
+        if self._at_rest() and np.abs(motion.position - measured).max() > _SAME_RAD:
+            motion.rest_at(measured)
+        whole = np.array(q, dtype=float)
+        whole[self._indices] = motion.position
+        reached = False
+        if command.pose is not None:
+            command, reached = self._towards(whole, command, seconds)
+        else:
+            self._target = None
+        if not command and self._at_rest():
+            motion.rest_at(motion.position)
+            return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), Status.NO_WARNING,
+                        "", True, reached)
+        wanted, status, reason, together = np.zeros(len(measured)), Status.NO_WARNING, "", True
+        if command:
+            wanted, status, reason, together = self._wanted(whole, velocity, measured, command)
+        try:
+            motion.follow(wanted, seconds, together)
+        except ArithmeticError as error:
+            motion.rest_at(motion.position)
+            status, reason = Status.INVALID, str(error)
+        return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), status, reason, False,
+                    reached)
+
+    def _at_rest(self) -> bool:
+        motion = self._motion
+        return np.abs(motion.velocity).max() < _AT_REST and np.abs(motion.acceleration).max() < 1e3 * _AT_REST
+
+    def _towards(self, whole: np.ndarray, command: Command, seconds: float) -> tuple[Command, bool]:
+        """The twist towards the command's pose, and whether that is reached."""
+        target = command.pose
+        if self._target is None:
+            self._tracker.reset()
+        self._target = target
+        pose = self.pose(whole)
+        twist = self._tracker.twist(pose, target, self.settings, seconds)
+        angle = np.arccos(np.clip(0.5 * (np.trace(target[:3, :3].T @ pose[:3, :3]) - 1.0), -1.0, 1.0))
+        if np.linalg.norm(target[:3, 3] - pose[:3, 3]) < _REACHED_M and angle < _REACHED_RAD:
+            return Command(), True
+        axes = command.axes
+        twist = np.concatenate([axes.T @ twist[:3], axes.T @ twist[3:]])
+        return Command(twist=twist, drift=command.drift, axes=axes), False
+
+    # -- the motion that is wanted and possible ------------------------------------------------------------------
+
+    def _wanted(self, whole, velocity, measured, command) -> tuple[np.ndarray, Status, str, bool]:
+        q = self._motion.position
+        lost, condition, behind = 0.0, 1.0, float(np.abs(q - measured).max())
+        if command.twist is not None and command.twist.any():
+            keep = np.flatnonzero(~command.drift)
+            turn = command.axes.T @ self.pose(whole, self._chain.base)[:3, :3]
+
+            def jacobian_at(posture):
+                jacobian = self._chain.jacobian(posture)
+                return np.vstack([turn @ jacobian[:3], turn @ jacobian[3:]])[keep]
+
+            jacobian = jacobian_at(q)
+            wanted, metric, lost, condition = velocity_for(
+                command.twist[keep], jacobian, jacobian_at, q, self.limits,
+                Thresholds(self.settings.lower_singularity_threshold, self.settings.hard_stop_singularity_threshold))
+            metric = metric + 1e-6 * np.eye(len(q))
+        else:
+            wanted, metric, jacobian = np.array(command.joints, dtype=float), np.eye(len(q)), np.eye(len(q))
+        wanted = wanted / max(1.0, float((np.abs(wanted) / self.limits.velocity).max()))
+        low, high = self._box(q, measured)
+        slope, least, distance = self._gap_bounds(whole, velocity)
+        found = np.empty(len(q))
+        wanted, metric = np.ascontiguousarray(wanted), np.ascontiguousarray(metric)
+        held = nearest_within(wanted, metric, slope, least, low, high, found)
+        if self.surroundings is not None:
+            found = self._open_cells(whole, found)
+        status, reason = self._status(jacobian, wanted, found, lost, condition, (slope, least, distance), (low, high))
+        if behind > 0.8 * _LEAD_RAD and status is Status.JOINT_BOUND:
+            reason = ("the arm does not follow: joint %s is %.2f rad behind its set-point; is the robot enabled, and "
+                      "does its controller run?" % (self.joints[int(np.abs(q - measured).argmax())], behind))
+        return found, status, reason, not held
+
+    def _box(self, q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest velocities (k,): joint limits with their margin, and the lead of set-points."""
+        limits, margin = self.limits, self.settings.joint_limit_margin
+        lag = 1.5 * self.settings.publish_period
+        lead, time = q - measured, self.settings.stopping_time
+        above, below = (np.maximum(_LEAD_RAD - side * lead, 0.0) / time for side in (1.0, -1.0))
+        high = np.minimum(speed_towards(limits.upper - margin - q, limits, lag), above)
+        low = -np.minimum(speed_towards(q - limits.lower - margin, limits, lag), below)
+        return low, high
+
+    def _gap_bounds(self, whole: np.ndarray, velocity: np.ndarray):
+        """(slope (m, k), least (m,), distance (m,)): slope @ x >= least keeps what is near from coming too near."""
+        settings = self.settings
+        if self.surroundings is None or not settings.check_collisions:
+            return np.empty((0, len(self.joints))), np.empty(0), np.empty(0)
+        near = self.surroundings.near(whole, velocity, _REACH_M)
+        threshold = np.where(near.of_robot, settings.self_collision_proximity_threshold,
+                             settings.scene_collision_proximity_threshold)
+        clearance = _CLEARANCE_M
+        if settings.collision_check_type == STOP_DISTANCE:
+            clearance, threshold = max(clearance, settings.min_allowable_collision_distance), 0.0
+        time = np.maximum(settings.stopping_time, threshold / _SPEED_AT_THRESHOLD)
+        allowed = np.maximum(near.distance - clearance, 0.0) / time
+        least = np.minimum(0.0, -allowed - np.minimum(near.drift, 0.0))
+        return np.ascontiguousarray(near.slope[:, self._rows]), least, near.distance
+
+    def _open_cells(self, whole: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """``found``, shortened where it leads into postures at which links may touch that spheres cannot tell apart."""
+        ahead = whole.copy()
+        if self.surroundings.closed(whole):
+            return found
+        for share in (1.0, 0.5, 0.25, 0.0):
+            ahead[self._indices] = whole[self._indices] + 2.0 * share * self.settings.stopping_time * found
+            if not self.surroundings.closed(ahead):
+                return share * found
+        return 0.0 * found
+
+    # -- why -----------------------------------------------------------------------------------------------------
+
+    def _status(self, jacobian, wanted, found, lost, condition, of_gaps, box) -> tuple[Status, str]:
+        """What takes most of the motion: its Status, and a sentence."""
+        slope, least, distance = of_gaps
+        low, high = box
+        before = jacobian @ wanted
+        size = float(np.linalg.norm(before))
+        taken = float(np.linalg.norm(before - jacobian @ found)) / size if size > 1e-9 else 0.0
+        if taken > _NOTICED and taken >= lost:
+            tight = np.flatnonzero(slope @ found <= least + 1e-4 + 1e-3 * np.abs(least)) if len(least) else []
+            halts = np.linalg.norm(jacobian @ found) < _REMAINS * size
+            if len(tight):
+                nearest = float(distance[tight].min())
+                return (Status.HALT_FOR_COLLISION if halts else Status.DECELERATE_FOR_COLLISION,
+                        "%.0f %% of the motion is held back %.1f cm before a contact" % (
+                            100.0 * min(taken, 1.0), 100.0 * max(nearest, 0.0)))
+            at = [name for number, name in enumerate(self.joints)
+                  if found[number] >= high[number] - 1e-6 < self.limits.velocity[number] - 1e-6
+                  or found[number] <= low[number] + 1e-6 > 1e-6 - self.limits.velocity[number]]
+            return Status.JOINT_BOUND, "%.0f %% of the motion is held back by the limits of %s" % (
+                100.0 * min(taken, 1.0), " and ".join(at) or "the joints")
+        if lost > _NOTICED:
+            return (Status.HALT_FOR_SINGULARITY if lost > 1.0 - _REMAINS else Status.DECELERATE_FOR_SINGULARITY,
+                    "%.0f %% of the motion is lost to a singularity, condition number %.0f" % (
+                        100.0 * min(lost, 1.0), condition))
+        return Status.NO_WARNING, ""
+
+
+def _group(model, name):
+    steerable = [one for one in model.groups.values() if one.chain is not None or one.tip is not None]
+    if not name and len(steerable) == 1:
+        return steerable[0]
+    if name not in model.groups:
+        raise SettingsError("move_group_name is '%s'; the groups of robot '%s' are %s"
+                            % (name, model.name, ", ".join(model.groups) or "none"))
+    group = model.groups[name]
+    if group.tip is None:
+        raise SettingsError("move_group_name is '%s', which is not one chain; expected one of %s, and a servo for each"
+                            % (name, ", ".join(one.name for one in steerable) or "none"))
+    return group
+
+
+def _chain_to(model, group):
+    if group.chain is not None:
+        return group.chain
+    try:
+        return Chain.from_robot(model.robot, group.base, group.tip)
+    except ChainError as error:
+        raise SettingsError("group '%s' cannot be steered: %s" % (group.name, error)) from None

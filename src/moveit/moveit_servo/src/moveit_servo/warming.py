@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calls every compiled function once."""
+import numpy as np
+
+from motion_planning.model import PlanningModel
+from motion_planning.scene import Scene, WorldObject
+from motion_planning.spheres import SphereModel
+from moveit_servo.servo import Command, Servo
+from moveit_servo.settings import ServoSettings
+from moveit_servo.surroundings import Surroundings
+from urdf_model import Box
+
+_URDF = """<robot name="small"><link name="base"/><link name="arm">
+<collision><geometry><box size="0.4 0.05 0.05"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+_SRDF = """<robot name="small"><group name="arm"><chain base_link="base" tip_link="arm"/></group></robot>"""
+
+
+def warm_up() -> None:
+    """Compile all, or load it from the cache."""
+    model = PlanningModel.from_xml(_URDF, _SRDF)
+    servo = Servo(model, ServoSettings(move_group_name="arm", command_out_topic="command"))
+    scene = Scene(model).with_object(WorldObject("box", np.eye(4), ((Box((0.1, 0.9, 0.1)), np.eye(4)),)))
+    servo.surroundings = Surroundings(SphereModel.of(model, None), servo.group, scene)
+    servo.step(np.zeros(1), np.zeros(1), Command(joints=np.array([0.5])), 0.01)

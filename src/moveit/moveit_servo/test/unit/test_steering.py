@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keys and gamepads: what is held moves, what is let go does not."""
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from moveit_servo.steering import MOTIONS, OTHER_KEYS, Gamepad, Keyboard, LayoutError
+
+CONFIG = Path(__file__).parents[2] / "config"
+PADS = ("xbox", "playstation")
+
+
+@pytest.mark.parametrize("key", MOTIONS)
+def test_a_key_moves_as_long_as_it_repeats(key):
+    keyboard = Keyboard()
+    _, row, sign = MOTIONS[key]
+    for tick in range(10):
+        keyboard.press(key, 0.03 * tick)
+        twist = keyboard.take(0.03 * tick).twist
+        assert twist[row] * sign > 0.0 and np.count_nonzero(twist) == 1
+    assert keyboard.take(0.6).twist[row] == 0.0
+
+
+def test_the_other_keys():
+    keyboard = Keyboard(hands=2)
+    assert set(OTHER_KEYS) & set(MOTIONS) == set()
+    keyboard.press("w", 0.0)
+    slow = keyboard.take(0.0).twist[0]
+    keyboard.press("+", 0.0)
+    assert keyboard.take(0.0).twist[0] > slow
+    keyboard.press(" ", 0.0)
+    assert not keyboard.take(0.0).twist.any()
+    for key, name, value in (("h", "hand", 1), ("h", "hand", 0), ("t", "in_tool", True), ("g", "gripper", "close"),
+                             ("g", "gripper", "open"), ("2", "mark", "failure"), ("x", "ends", True)):
+        assert keyboard.press(key, 1.0)
+        taken = keyboard.take(1.0)
+        assert getattr(taken, name) == value and not taken.twist.any()
+    assert keyboard.take(1.0).mark == "" and not keyboard.press("?", 1.0)
+
+
+def pad(kind):
+    layout = yaml.safe_load((CONFIG / ("gamepad_%s.yaml" % kind)).read_text())["layout"]
+    return Gamepad(layout, 2), layout
+
+
+def pressed(*numbers):
+    return [int(number in numbers) for number in range(13)]
+
+
+@pytest.mark.parametrize("kind", PADS)
+def test_a_gamepad_moves_only_while_it_is_held(kind):
+    gamepad, layout = pad(kind)
+    for row, source in enumerate(layout["motions"].values()):
+        axes = [0.0] * 8
+        axes[source["axis"]] = 0.5
+        assert np.count_nonzero(gamepad.take(axes, pressed(layout["hold"])).twist) == 1, row
+        assert not gamepad.take(axes, pressed()).twist.any()
+    assert not gamepad.take([float("nan")] * 8, pressed(layout["hold"])).twist.any()
+    assert not gamepad.take([], []).twist.any()
+
+
+@pytest.mark.parametrize("kind", PADS)
+def test_buttons_count_once(kind):
+    gamepad, layout = pad(kind)
+    for name, field in (("open", "gripper"), ("close", "gripper"), ("success", "mark"), ("again", "mark")):
+        assert getattr(gamepad.take([], pressed(layout[name])), field) == name
+        assert getattr(gamepad.take([], pressed(layout[name])), field) == ""
+    assert gamepad.take([], pressed(layout["hand"])).hand == 1
+    assert gamepad.take([], pressed(layout["hand"])).hand == 1
+    gamepad.take([], pressed())
+    assert gamepad.take([], pressed(layout["hand"])).hand == 0
+
+
+@pytest.mark.parametrize("layout", [None, {}, {"motions": {"x": {"axis": 1}}},
+                                    {"hold": 1, "motions": {"q": {"axis": 1}}},
+                                    {"hold": 1, "motions": {"x": {"axis": "one"}}}, {"hold": -1, "motions": {}}])
+def test_a_layout_that_cannot_be_used(layout):
+    with pytest.raises(LayoutError):
+        Gamepad(layout)
