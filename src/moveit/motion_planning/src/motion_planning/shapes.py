@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,6 +43,11 @@ class TriangleMesh:
             raise ValueError("the mesh has a vertex that is not finite")
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "triangles", triangles)
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """(k, 3): the vertices that belong to a triangle."""
+        return self.vertices[np.unique(self.triangles)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ import pybullet
 import pytest
 
 from motion_planning.exact import ExactChecker
+from motion_planning.exact.geometry import plane_overlap
 from motion_planning.model import MeshUnreadable, ModelError, PlanningModel
 from motion_planning.scene import OCTOMAP, AllowedCollisions, Cone, Octree, Scene, TriangleMesh, WorldObject
 from urdf_model import Box, Cylinder, Plane, Sphere
@@ -105,6 +106,11 @@ def test_what_is_held_meets_planes(shape, reach):
     held = scene.attach(thing(shape, z=-1.0, name="held"), "car")
     for height, free in ((-1.0 - reach - 1e-3, True), (-1.0 - reach + 1e-3, False), (-1.0 + reach + 1e-3, True)):
         assert exact.free(held.with_object(thing(Plane(), z=height))) is free
+
+
+def test_a_vertex_of_no_triangle_meets_no_plane():
+    mesh = TriangleMesh([*CUBE.vertices, (0.0, 0.0, 9.0)], CUBE.triangles)
+    assert plane_overlap(at(z=0.15), mesh, np.eye(4)) == pytest.approx(-0.05)
 
 
 def test_cubes_of_an_octomap_are_solid():

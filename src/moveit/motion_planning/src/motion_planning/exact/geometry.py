@@ -33,10 +33,9 @@ def bounds_of(shape):
         half = np.array((shape.radius, shape.radius, 0.5 * shape.length))
         return Bounds(zero, half, float(np.hypot(shape.radius, half[2])))
     if isinstance(shape, TriangleMesh):
-        used = shape.vertices[np.unique(shape.triangles)]
-        low, high = used.min(axis=0), used.max(axis=0)
+        low, high = shape.corners.min(axis=0), shape.corners.max(axis=0)
         centre = 0.5 * (low + high)
-        return Bounds(centre, 0.5 * (high - low), float(np.linalg.norm(used - centre, axis=1).max()))
+        return Bounds(centre, 0.5 * (high - low), float(np.linalg.norm(shape.corners - centre, axis=1).max()))
     if isinstance(shape, Octree):
         side = 0.5 * shape.boxes[:, 3:]
         low, high = (shape.boxes[:, :3] - side).min(axis=0), (shape.boxes[:, :3] + side).max(axis=0)
@@ -109,7 +108,7 @@ def _extent(shape, direction):
             return -round_part - abs(up), round_part + abs(up)
         return min(up, -up - round_part), max(up, -up + round_part)
     if isinstance(shape, TriangleMesh):
-        along = shape.vertices @ direction
+        along = shape.corners @ direction
     elif isinstance(shape, Octree):
         reach = 0.5 * shape.boxes[:, 3] * np.abs(direction).sum()
         middle = shape.boxes[:, :3] @ direction
