@@ -59,22 +59,24 @@ def run(
     output = work_folder / "output.txt"
     timed_out = False
     with output.open("wb") as stream:
-        # Do not trust the results of rostest --text (it exits with 0 when tests fail), but the XML files.
-        child = subprocess.Popen(
-            [*command, str(path)],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+        child = None
         try:
+            # Do not trust the results of rostest --text (it exits with 0 when tests fail), but the XML files.
+            child = subprocess.Popen(
+                [*command, str(path)],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
             child.wait(time_limit_s)
         except subprocess.TimeoutExpired:
             timed_out = True
             _stop(child)
-        except BaseException:  # Ctrl-C: end the test's processes, too
-            _stop(child)
+        except BaseException:  # Ctrl-C, perhaps while it starts: end the test's processes, too
+            if child is not None:
+                _stop(child)
             processes.kill_all(run_id)
             raise
     tally = Tally()
