@@ -8,12 +8,15 @@ anything. Then the command is started once more.
 """
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 
+from lab_environment.family import with_parent
 from lab_environment.priority import give_way
 
 #: Niceness of programs that draw. Beside programs that take all they get, a group of the lowest priority has 1.5 % of a
@@ -27,6 +30,8 @@ _PASSED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 def run(command: list[str]) -> int:
     """Run a command until it ends by itself; return its exit code, negative for a signal. Raises OSError."""
+    if shutil.which(command[0]) is None:
+        raise OSError(errno.ENOENT, os.strerror(errno.ENOENT))
     stopped = False
     child: subprocess.Popen | None = None
 
@@ -40,7 +45,7 @@ def run(command: list[str]) -> int:
         signal.signal(number, stop)
     for start in range(1, MAX_STARTS + 1):
         begin_s = time.monotonic()
-        child = subprocess.Popen(command)
+        child = subprocess.Popen(with_parent(command))
         code = child.wait()
         if code != -signal.SIGSEGV or stopped or time.monotonic() - begin_s > OPENING_S or start == MAX_STARTS:
             break

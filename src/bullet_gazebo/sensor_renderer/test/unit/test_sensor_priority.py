@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from lab_environment.family import is_running
 from lab_testing.waiting import wait_until
 
 # It counts on one processor, the first of those allowed, and says when it begins.
@@ -77,11 +78,12 @@ def test_a_window_that_dies_as_it_opens_is_opened_again(tmp_path, faults, starts
     assert done.stderr.count("segmentation fault") == starts - 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_signal_ends_the_program_that_draws(number):
-    loop = "import time; print(flush=True); time.sleep(60)"
+    loop = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-m", "sensor_renderer.priority", "1", sys.executable, "-c", loop],
                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True) as process:
-        process.stdout.readline()
+        program = int(process.stdout.readline())
         process.send_signal(number)
         assert process.wait(30) == -number
+        wait_until(lambda: not is_running(program), "the end of the program", 30.0)
