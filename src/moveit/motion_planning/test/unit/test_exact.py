@@ -113,6 +113,22 @@ def test_a_vertex_of_no_triangle_meets_no_plane():
     assert plane_overlap(at(z=0.15), mesh, np.eye(4)) == pytest.approx(-0.05)
 
 
+def test_triangles_without_area_are_the_lines_and_points_that_they_are():
+    source = np.random.default_rng(3)
+    scene, exact = slider("sphere")
+    wrong = []
+    for number in range(300):
+        a, b = source.normal(size=(2, 3)) * 0.2
+        between = a + source.uniform() * (b - a)
+        corners = ((a, a, b), (a, b, a), (a, between, b), (a, a, a))[number % 4]
+        points = a + np.linspace(0.0, 1.0, 2001)[:, None] * (np.zeros(3) if number % 4 == 3 else b - a)
+        gap = np.linalg.norm(points, axis=1).min() - 0.1
+        mesh = WorldObject("thing", at(), ((TriangleMesh(corners, [(0, 1, 2)]), np.eye(4)),))
+        if abs(gap) > 1e-4 and exact.free(scene.with_object(mesh)) != (gap > 0.0):
+            wrong.append((number, gap))
+    assert wrong == []
+
+
 def test_cubes_of_an_octomap_are_solid():
     scene, exact = slider("sphere")
     full = scene.with_octomap(Octree(0.05, [(2.4, 0.8, 0.8, 1.6), (-0.975, 0.025, 0.025, 0.05)]), at())

@@ -12,6 +12,10 @@ from urdf_model import Box, Cylinder, Plane, Sphere
 #: Half the side of a plane's box [m]: larger than any scene.
 _ENDLESS = 1e6
 
+# A triangle is flat where twice its area is less than this part of its longest side's square.
+_SLIVER = 1e-9
+_MIN_SIDE_M = 1e-9
+
 
 class Bounds(NamedTuple):
     """A box around a shape, along the shape's axes, and a ball about the same centre [m], in the shape's frame."""
@@ -59,12 +63,39 @@ def fcl_geometry(shape):
     if isinstance(shape, Cone):
         return fcl.Cone(shape.radius, shape.length)
     if isinstance(shape, TriangleMesh):
+        vertices, triangles = _with_areas(shape)
         model = fcl.BVHModel()
-        model.beginModel(len(shape.triangles), len(shape.vertices))
-        model.addSubModel(shape.vertices, shape.triangles)
+        model.beginModel(len(triangles), len(vertices))
+        model.addSubModel(vertices, triangles)
         model.endModel()
         return model
     return fcl.OcTree(shape.resolution, occupied_tree(shape))
+
+
+def _with_areas(mesh):
+    """(vertices, triangles) of a mesh with slivers in place of triangles that have no area: FCL 0.7 misses some spheres
+    that touch those, and sees others that do not."""
+    corners = mesh.vertices[mesh.triangles]
+    sides = np.roll(corners, -1, axis=1) - corners  # from each corner to the next
+    lengths = np.linalg.norm(sides, axis=2)
+    longest = lengths.max(axis=1)
+    flat = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) <= _SLIVER * longest**2
+    if not flat.any():
+        return mesh.vertices, mesh.triangles
+    at = lengths[flat].argmax(axis=1)
+    each = np.arange(len(at))
+    begin, side = corners[flat][each, at], sides[flat][each, at]
+    # Across the side: its cross product with the axis that it leans to least.
+    across = np.cross(side, np.eye(3)[np.abs(side).argmin(axis=1)])
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    across = np.where(size > 0.0, across / np.maximum(size, 1e-300), (0.0, 0.0, 1.0))
+    along = np.where(longest[flat, None] > 0.0, side, (_MIN_SIDE_M, 0.0, 0.0))
+    width = np.maximum(10.0 * _SLIVER * longest[flat, None], _MIN_SIDE_M)
+    slivers = np.stack([begin, begin + along, begin + 0.5 * along + width * across], axis=1)
+    count = len(mesh.vertices)
+    triangles = mesh.triangles.copy()
+    triangles[flat] = count + np.arange(3 * len(at)).reshape(-1, 3)
+    return np.vstack([mesh.vertices, slivers.reshape(-1, 3)]), triangles
 
 
 def grown(shape, padding, scale):
