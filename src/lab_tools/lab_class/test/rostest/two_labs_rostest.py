@@ -282,7 +282,7 @@ class TwoLabs(unittest.TestCase):
         self.assertIn(self.get(second)[0], (503, 200))
         self.supervisor = self.store.running()["pid"]
         wait_until(lambda: self.state(NAMES[0]) == "paused", "a lab that has started to wait for its visitor", _START_S)
-        self.assertGreater(sum(state_of(pid) == "T" for pid in self.family()), 4)
+        wait_until(lambda: sum(state_of(pid) == "T" for pid in self.family()) > 4, "its processes to stand")
         self.assertEqual(self.get(first)[0], 200)
         wait_until(lambda: self.get(second)[0] == 200 and self.state(NAMES[1]) == "running",
                    "a lab with a visitor to run", _START_S)

@@ -23,7 +23,7 @@ from std_msgs.msg import Int8, String
 from std_srvs.srv import Empty
 
 from baxter_interface import RobotEnable
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import stretched, wait_until
 
 SIDES = ("left", "right")
 RATE_HZ = 50.0
@@ -97,7 +97,7 @@ class ServoTest(unittest.TestCase):
             self.stream(lambda arm=arm: arm.twists.publish(twist(z=0.15)), lambda arm=arm, before=before:
                         arm.position[2] > before[2] + 0.08, "the %s hand 8 cm higher" % arm.side)
             # The stream has ended: time-out, braking, and what the busy machine adds.
-            self.assertLess(arm.wait_for_rest(), 0.1 + 0.1 + 0.15)
+            self.assertLess(arm.wait_for_rest(), 0.1 + 0.1 + stretched(0.15))
             self.assertLess(np.abs(arm.position - before)[:2].max(), 0.02)
 
     def test_2_joints_poses_and_the_tools_axes(self):
@@ -175,7 +175,8 @@ class ServoTest(unittest.TestCase):
         held = Joy(axes=axes, buttons=[0, 0, 0, 0, 0, 1, 0, 0])
         self.stream(lambda: pad.publish(held), lambda: arm.position[2] < before[2] - 0.05, "the hand 5 cm lower")
         pad.publish(Joy(axes=axes, buttons=[0] * 8))
-        self.assertLess(arm.wait_for_rest(), 0.1 + 0.15)
+        # 0.1 s of the servo's own; the rest is the way of the messages, in real time.
+        self.assertLess(arm.wait_for_rest(), 0.1 + stretched(0.15))
 
     def test_7_keys(self):
         arm = self.arms["right"]
