@@ -44,8 +44,7 @@ EXIT_SKIPPED = 77
 # Factor of all time limits. They are written for an idle machine with two fast cores; others may be half as fast, or
 # have neighbours. Only a test that hangs takes longer by it.
 STRETCH = 2.0
-# Most .test files wait for motions half of their time, and the last worker runs only those that mostly wait: plugin.py.
-WORKERS_BESIDE_CORES = 2
+WORKERS_BESIDE_CORES = 1  # plugin.py says what for
 # Fewer files run in this process itself, which is quicker, and lets pytest's --pdb work.
 MIN_FILES_FOR_WORKERS = 3
 USAGE = "./baxter.sh test [NAME…] [OPTION…] [pytest's options]"

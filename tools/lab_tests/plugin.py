@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pytest plugin of `./baxter.sh test`: .test files as tests, some at a time, and the counts.
 
-The controller of pytest-xdist gives whole files to its workers, the longest first. There are two more of them
-than cores, because most .test files wait for motions half of their time. The last worker runs only those that leave the
-processor to others.
+The controller of pytest-xdist gives whole files to its workers, the longest first. There is a worker for each
+core, and one more, which runs only the .test files that leave the processor to others: with yet another one a whole run
+is a tenth shorter, and motions are late.
 """
 
 from __future__ import annotations
