@@ -23,8 +23,11 @@ _POINTS_FOR_GAZEBO = 30
 _RETURN_RATE = 2.0
 
 
-def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings) -> Any:
-    """Return the message of ``settings.command_out_type`` for a Step; measured (k,): where the joints are."""
+def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings, seconds: float = 0.0,
+               ) -> Any:
+    """Return the message of ``settings.command_out_type`` for a Step; measured (k,): where the joints are; seconds: how
+    long the step is. A trajectory takes that time, or a period: a step that came late is a long one, and its way in
+    one period would be faster than the servo allows."""
     positions, accelerations = step.position.tolist(), step.acceleration.tolist()
     velocities = step.velocity
     if not settings.publish_joint_positions and not step.rests:
@@ -39,10 +42,11 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
                             names=list(joints), command=positions if by_position else velocities)
     trajectory = JointTrajectory(joint_names=list(joints))
     trajectory.header.frame_id = settings.planning_frame  # a stamp of 0: now
+    first = max(seconds, settings.publish_period)
     for number in range(_POINTS_FOR_GAZEBO if settings.use_gazebo else 1):
         trajectory.points.append(JointTrajectoryPoint(
             positions=positions if settings.publish_joint_positions else [],
             velocities=velocities if settings.publish_joint_velocities else [],
             accelerations=accelerations if settings.publish_joint_accelerations else [],
-            time_from_start=rospy.Duration((number + 1) * settings.publish_period)))
+            time_from_start=rospy.Duration(first + number * settings.publish_period)))
     return trajectory

@@ -24,6 +24,13 @@ def test_a_trajectory_begins_at_once_with_the_next_set_point():
     assert point.positions == [0.1, 0.2] and not point.velocities and point.time_from_start.to_sec() == 0.008
 
 
+@pytest.mark.parametrize(("seconds", "expected"), [(0.002, 0.008), (0.03, 0.03)])
+def test_the_way_of_a_long_step_takes_its_time(seconds, expected):
+    settings = ServoSettings(command_out_type=TRAJECTORY)
+    point, = message_of(STEP, MEASURED, JOINTS, settings, seconds).points
+    assert point.time_from_start.to_sec() == pytest.approx(expected)
+
+
 def test_a_trajectory_with_velocities():
     point, = sent(command_out_type=TRAJECTORY, publish_joint_velocities=True).points
     assert point.velocities == [0.5, -0.5] and point.positions == [0.1, 0.2]
