@@ -393,3 +393,5 @@ def main() -> None:
         servo = node.servo
         rospy.loginfo("steers %s with group '%s': %s", servo.tip, servo.group.name, ", ".join(servo.joints))
         node.run()
+        # Callbacks hold the node until Python has ended, and what is left of ruckig then is reported as a leak.
+        servo.reset()
