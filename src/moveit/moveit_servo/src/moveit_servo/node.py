@@ -7,6 +7,7 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,7 @@ from moveit_servo.surroundings import Surroundings
 from moveit_servo.warming import warm_up
 from numba_cache import compiler_pages
 from rospy_limits.node import limit_ports
+from rospy_limits.threads import ThreadFaults, lasting
 from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
 # Wall time to wait for the robot's model, and for all of the arm's joint states until that is complained of [s].
@@ -67,8 +69,9 @@ Parameters: those of MoveIt Servo's YAML files, read again once a second; ~robot
 class ServoNode:
     """Callbacks put commands and states in, ``run`` takes them out."""
 
-    def __init__(self, model: PlanningModel, exact: ExactChecker, settings: ServoSettings) -> None:
-        self.model, self.exact = model, exact
+    def __init__(self, model: PlanningModel, exact: ExactChecker, settings: ServoSettings,
+                 faults: ThreadFaults) -> None:
+        self.model, self.exact, self._faults = model, exact, faults
         self.servo = Servo(model, settings)
         self.commands = Commands(self.servo.joints)
         self._lock, self._news = threading.Lock(), threading.Event()
@@ -77,10 +80,10 @@ class ServoNode:
         self._indices = [model.index[name] for name in self.servo.joints]
         self._frames: dict[str, np.ndarray] = {}
         self._sent, self._halts, self._new_settings = False, 0, settings
-        self._said, self._contact = (Status.NO_WARNING, ""), ""
+        self._said = (Status.NO_WARNING, "")
         self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
                                     {"joint_state_topic": settings.joint_topic})
-        self._put_surroundings(self.monitor.scene())
+        self._prepare(self.monitor.scene())
         kind = MESSAGE_TYPES[settings.command_out_type]
         self._out = rospy.Publisher(_private(settings.command_out_topic), kind, queue_size=2, tcp_nodelay=True)
         self._status = rospy.Publisher(_private(settings.status_topic), Int8, queue_size=2)
@@ -97,8 +100,11 @@ class ServoNode:
             rospy.Service("~change_drift_dimensions", ChangeDriftDimensions, self._on_drift),
             rospy.Service("~change_control_dimensions", ChangeControlDimensions, self._on_control),
             rospy.Service("~reset_servo_status", Empty, self._on_reset)]
-        for work in (self._watch_scene, self._watch_parameters, self._tell_reasons):
-            threading.Thread(target=work, daemon=True).start()
+        for place, work in (("that follows the scene", self._watch_scene),
+                            ("that follows the parameters", self._watch_parameters),
+                            ("that publishes reasons", self._tell_reasons)):
+            threading.Thread(target=lasting(faults, place, work), args=(rospy.is_shutdown,), name=place,
+                             daemon=True).start()
 
     # -- what comes in -------------------------------------------------------------------------------------------
 
@@ -180,10 +186,17 @@ class ServoNode:
         return False
 
     def run(self) -> None:
-        """Make a step each period of ROS time until the node ends."""
+        """Make a step each period of ROS time until the node ends; after an unforeseen error without the command that
+        was given, from where the arm is."""
+        lasting(self._faults, "that makes the steps", self._steps)(rospy.is_shutdown)
+
+    def _steps(self, ends: Callable[[], bool]) -> None:
+        with self._lock:
+            self.commands.clear()
+        self.servo.reset()
         last = rospy.get_time()
         due = last
-        while not rospy.is_shutdown():
+        while not ends():
             settings = self.servo.settings
             due = max(due + settings.publish_period, rospy.get_time() - settings.publish_period)
             self._wait_until(due, settings)
@@ -261,17 +274,16 @@ class ServoNode:
 
     # -- beside the steps ----------------------------------------------------------------------------------------
 
-    def _watch_scene(self) -> None:
+    def _watch_scene(self, ends: Callable[[], bool]) -> None:
         """Prepare the scene again whenever it has changed: the steps use the one before until then."""
-        prepared, fetched = _of_scene(self.monitor.scene()), False
-        while not rospy.is_shutdown():
+        fetched = False
+        while not ends():
             time.sleep(_SCENE_EVERY_S)
             if not fetched:
                 fetched = self._fetch_scene()
             scene = self.monitor.scene()
-            if _of_scene(scene) != prepared:
-                prepared = _of_scene(scene)
-                self._put_surroundings(scene)
+            if _of_scene(scene) != self._prepared:
+                self._prepare(scene)
 
     def _fetch_scene(self) -> bool:
         """Take over what move_group knew before; whether that needs no other try."""
@@ -286,20 +298,22 @@ class ServoNode:
         self.monitor.apply(scene, "the scene of move_group")
         return True
 
-    def _put_surroundings(self, scene: Any) -> None:
+    def _prepare(self, scene: Any) -> None:
         try:
             made = Surroundings(sphere_model_of(self.exact), self.servo.group, scene)
         except PlanningError as error:
+            self._prepared = _of_scene(scene)
             rospy.logerr("the scene cannot be prepared, the one before stays in force: %s", error)
             return
+        self._prepared = _of_scene(scene)
         for text in made.remarks:
             rospy.logwarn("%s", text)
         self.servo.base, self.servo.surroundings, self._kept_scene = np.array(scene.state.base), made, scene
 
-    def _watch_parameters(self) -> None:
+    def _watch_parameters(self, ends: Callable[[], bool]) -> None:
         """Take changed parameters over; those that need new connections need a restart, too."""
         before = None
-        while not rospy.is_shutdown():
+        while not ends():
             time.sleep(_PARAMETERS_EVERY_S)
             try:
                 values = rospy.get_param("~", {})
@@ -312,10 +326,10 @@ class ServoNode:
             except OSError:  # no master at the moment
                 continue
 
-    def _tell_reasons(self) -> None:
+    def _tell_reasons(self, ends: Callable[[], bool]) -> None:
         """Publish each new status with its reason, and which bodies are near."""
         told = (None, "")
-        while not rospy.is_shutdown():
+        while not ends():
             time.sleep(_REASON_EVERY_S)
             status, reason = self._said
             if (status, reason) == told:
@@ -360,7 +374,7 @@ def _private(topic: str) -> str:
     return topic if topic.startswith(("/", "~")) else "~" + topic
 
 
-def build() -> ServoNode:
+def build(faults: ThreadFaults) -> ServoNode:
     """Raises SettingsError, PlanningError, MissingParameter."""
     name = rospy.get_param("~robot_description", "robot_description")
     urdf, srdf = (wait_for_param(name + end, _DESCRIPTION_TIMEOUT_S) for end in ("", "_semantic"))
@@ -373,7 +387,7 @@ def build() -> ServoNode:
     for text in (*model.warnings, *exact.warnings):
         rospy.logwarn("%s", text)
     warm_up()
-    return ServoNode(model, exact, settings)
+    return ServoNode(model, exact, settings, faults)
 
 
 def main() -> None:
@@ -381,9 +395,9 @@ def main() -> None:
     parser.parse_args(rospy.myargv()[1:])
     end_on_signals()
     try:
-        limit_ports()
+        faults = limit_ports()
         rospy.init_node("servo_server", disable_signals=True)
-        node = build()
+        node = build(faults)
     except (SettingsError, PlanningError, MissingParameter, rospy.ROSInitException) as error:
         if not rospy.is_shutdown():
             sys.exit("servo_server: %s" % error)
