@@ -79,7 +79,7 @@ nearest() {
 }
 
 version() {
-    sed -n 's:.*<version>\(.*\)</version>.*:Baxter lab stack \1:p' "$LAB_ROOT/src/lab_tools/lab_environment/package.xml"
+    sed -n 's:.*<version>\(.*\)</version>.*:Baxter lab stack \1:p' "$LAB_ROOT/src/base/lab_environment/package.xml"
 }
 
 # The program behind a mode; it runs in the workspace's environment, with a master on this machine.
@@ -87,7 +87,7 @@ declare -A PROGRAMS=(
     [test]="python3 $LAB_ROOT/tools/run_tests.py"
     [notebook]="python3 $LAB_ROOT/tools/notebook.py"
     [web]="rosrun lab_web lab_web"
-    [check]="python3 $LAB_ROOT/src/rf_labs/rf_checks/scripts/check"
+    [check]="python3 $LAB_ROOT/src/courses/rf_checks/scripts/check"
     # -P: no module is taken from the current folder, which may hold submissions.
     [grade]="python3 -P -m rf_grading"
     [labs]="python3 -P -m lab_class"
@@ -226,7 +226,7 @@ main() {
             ;;
         handout)
             # Needs no set-up, so it takes the system's Python: the first one in PATH may be conda's.
-            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src:$LAB_ROOT/src/lab_tools/lab_environment/src \
+            PYTHONPATH=$LAB_ROOT/src/courses/rf_checks/src:$LAB_ROOT/src/base/lab_environment/src \
                 exec /usr/bin/python3 -m rf_checks.handout "$@"
             ;;
         sim)

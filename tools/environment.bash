@@ -3,7 +3,7 @@
 
 DEFAULT_MASTER_URI=http://localhost:11311
 # The folders of src whose packages are the lab's; all others are the user's own.
-LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_testing lab_tools moveit overlay probot rf_labs ros_control web workspace_tests)
+LAB_FOLDERS=(base baxter classroom compat courses lab lab_testing overlay planning probot ros_control simulator web workspace_tests)
 
 # host_of URI: the host in http://host:port/
 host_of() {

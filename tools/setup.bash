@@ -30,7 +30,7 @@ PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_
 COMPILED=("python3 -m baxter_sim_kinematics && python3 -m baxter_sim_hardware"
     "python3 -m motion_planning && python3 -m moveit_servo && rosrun motion_planning prepare_robots $(printf '%q ' "${PLANNED_FOR[@]}")")
 # Robots whose meshes are made ready for pictures.
-PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf.xacro")
+PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/courses/cwru_baxter_sim/cwru_baxter.urdf.xacro")
 declare -A TITLES=(
     [apt]="Debian packages"
     [venv]="virtual environment"
@@ -199,8 +199,8 @@ step_pip() {
     run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" -r requirements.txt
     run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" --no-deps -r requirements-nodeps.txt
     # PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
-    if [[ -f src/compat/xacro/xacro ]]; then
-        run ln -sf ../../src/compat/xacro/xacro "$VENV/bin/xacro"
+    if [[ -f src/base/xacro/xacro ]]; then
+        run ln -sf ../../src/base/xacro/xacro "$VENV/bin/xacro"
     fi
     stamp "$key"
 }
@@ -296,9 +296,9 @@ step_build() {
 
 # The lab sheets mention these files; nothing reads them at run time.
 step_urdf() {
-    local targets=("$DESCRIPTION/urdf/baxter.urdf" src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf) target key
-    if [[ ! -f ${targets[0]}.xacro || ! -d src/compat/xacro ]]; then
-        note="skipped: no baxter.urdf.xacro or compat/xacro in src/"
+    local targets=("$DESCRIPTION/urdf/baxter.urdf" src/courses/cwru_baxter_sim/cwru_baxter.urdf) target key
+    if [[ ! -f ${targets[0]}.xacro || ! -d src/base/xacro ]]; then
+        note="skipped: no baxter.urdf.xacro or base/xacro in src/"
         return
     fi
     key=$(find src -name '*.xacro' -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
@@ -334,12 +334,12 @@ step_kernels() {
 # levels are in the user's cache.
 step_pictures() {
     local cache=${XDG_CACHE_HOME:-${HOME:-}/.cache}/bullet_gazebo key
-    if [[ ! -d src/bullet_gazebo/sensor_renderer ]]; then
-        note="skipped: no bullet_gazebo/sensor_renderer in src/"
+    if [[ ! -d src/simulator/sensor_renderer ]]; then
+        note="skipped: no simulator/sensor_renderer in src/"
         return
     fi
-    key="$cache $(find src/bullet_gazebo/{sensor_renderer,world_picture}/src "$DESCRIPTION" "$GRIPPERS" \
-        src/{probot/probot_description,cwru_baxter/cwru_baxter_sim} -type f ! -name '*.pyc' -print0 2>/dev/null |
+    key="$cache $(find src/simulator/{sensor_renderer,world_picture}/src "$DESCRIPTION" "$GRIPPERS" \
+        src/{probot/probot_description,courses/cwru_baxter_sim} -type f ! -name '*.pyc' -print0 2>/dev/null |
         LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
     if stamp_is "$key" && [[ -d $cache/results ]]; then
         note="up to date"

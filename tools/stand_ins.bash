@@ -2,13 +2,13 @@
 # Our replacements for packages that Debian's ROS lacks. Sourced by set-up.
 
 STAND_INS=(
-    src/bullet_gazebo/gazebo_msgs
+    src/simulator/gazebo_msgs
     src/ros_control/control_msgs
     src/ros_control/controller_manager_msgs
     src/ros_control/four_wheel_steering_msgs
-    src/moveit/moveit_msgs
-    src/moveit/object_recognition_msgs
-    src/moveit/octomap_msgs
+    src/planning/moveit_msgs
+    src/planning/object_recognition_msgs
+    src/planning/octomap_msgs
     src/web/foxglove_bridge
     src/web/interactive_marker_proxy
     src/web/rosapi
@@ -16,7 +16,7 @@ STAND_INS=(
     src/web/rosbridge_server
     src/web/tf2_web_republisher
     src/web/web_video_server
-    src/compat/xacro
+    src/base/xacro
     src/compat/rqt_plot
     src/compat/joy
     src/compat/joint_state_controller

@@ -346,7 +346,7 @@ def workspace(tmp_path):
         "devel/setup.bash": "",
         ".venv/bin/python3": "#!/bin/bash",
         ".baxter/build.stamp": "",
-        "src/rf_labs/rf_checks/scripts/check": "import sys; print(*sys.argv[1:])",
+        "src/courses/rf_checks/scripts/check": "import sys; print(*sys.argv[1:])",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -46,7 +46,7 @@ def test_the_dev_container_is_a_stage_with_its_user_and_forwards_the_page():
     assert (ROOT / ".devcontainer" / wanted["build"]["context"]).resolve() == ROOT
     stage = file.read_text().split(f" AS {wanted['build']['target']}\n")[1].split("\nFROM ")[0]
     assert f" {wanted['remoteUser']}\n" in stage and "COPY" not in stage
-    page = (ROOT / "src/web/lab_web/src/lab_web/node.py").read_text()
+    page = (ROOT / "src/lab/lab_web/src/lab_web/node.py").read_text()
     assert f"\nFIRST_PORT = {wanted['forwardPorts'][0]}\n" in page
     for command in (wanted["postCreateCommand"], wanted["postAttachCommand"]):
         assert (ROOT / command.split()[0]).exists()

@@ -92,7 +92,7 @@ def test_jupyterlab_does_not_ask_about_news(tmp_path):
 
 
 def test_checkpoints_are_no_part_of_the_repository():
-    done = subprocess.run(["git", "check-ignore", "src/rf_labs/rf_lab2/notebooks/.ipynb_checkpoints/a.ipynb"], cwd=ROOT)
+    done = subprocess.run(["git", "check-ignore", "src/courses/rf_lab2/notebooks/.ipynb_checkpoints/a.ipynb"], cwd=ROOT)
     if done.returncode == 128:
         pytest.skip("no git checkout")
     assert done.returncode == 0

@@ -15,16 +15,16 @@ from baxter_model import JOINTS, SIDES
 pytestmark = pytest.mark.tree
 
 HOME = "src/baxter/baxter_common/baxter_model/"
-LIBRARY = "src/cwru_baxter/baxter_traj_streamer/src/cpp/baxter_traj_streamer.cpp"
+LIBRARY = "src/courses/baxter_traj_streamer/src/cpp/baxter_traj_streamer.cpp"
 IK_LAUNCH = "src/baxter/baxter_simulator/baxter_sim_kinematics/launch/baxter_sim_kinematics.launch"
 #: They cannot import the package; tests below compare their content.
 COPIES = (LIBRARY, IK_LAUNCH)
 #: Written out for readers; pages are prose.
-FOR_READERS = ("src/rf_labs/rf_checks/exercises/", ".md", ".rst", ".ipynb", ".svg")
+FOR_READERS = ("src/courses/rf_checks/exercises/", ".md", ".rst", ".ipynb", ".svg")
 #: Files about the physical robot's own data.
 DESCRIPTION = ("src/baxter/baxter_common/baxter_description/", "src/baxter/baxter_common/rethink_ee_description/")
 #: Parts of the workspace without Baxter: vehicles have left and right wheels.
-NO_BAXTER = ("src/bullet_gazebo/", "src/ros_control/", "src/probot/")
+NO_BAXTER = ("src/base/", "src/simulator/", "src/ros_control/", "src/probot/")
 #: Tests contain expected values on purpose.
 EXPECTATIONS = re.compile(r"src/.*/test/|tests/unit/|tests/rostest/(custom_gripper|grippers)\.py")
 

@@ -22,7 +22,7 @@ RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-o
            "rospkg": "python3-rospkg", "psutil": "python3-psutil"}
 SHARES = (Path("/usr/share"), Path("/opt/ros/noetic/share"))
 #: Students' programs, which run in the environment of a whole lab.
-NO_PARTS = ("src/rf_labs/rf_checks/exercises/", "src/rf_labs/rf_checks/test/wrong/")
+NO_PARTS = ("src/courses/rf_checks/exercises/", "src/courses/rf_checks/test/wrong/")
 
 
 def imported(text):

@@ -58,7 +58,7 @@ def test_paths_in_pages_comments_and_tools_exist():
 def test_a_stale_path_is_noticed():
     text = "see `src/nowhere/`, docs/architecture.md,\ntest/unit, and docs/decisions/0007; tools/gone.py"
     assert stale_paths("README.md", text) == [(1, "src/nowhere/"), (2, "tools/gone.py")]
-    assert stale_paths("src/lab_tools/live_plot/README.md", "`src/live_plot/`, `src/rqt_plot/`, `config/a.yaml`") == [
+    assert stale_paths("src/lab/live_plot/README.md", "`src/live_plot/`, `src/rqt_plot/`, `config/a.yaml`") == [
         (1, "src/rqt_plot/"), (1, "config/a.yaml")]
 
 

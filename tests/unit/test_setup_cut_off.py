@@ -103,11 +103,11 @@ whole_work "$@"
 def workspace(tmp_path):
     """(folder of a workspace with the files that set-up reads, folder of the fake commands)."""
     root, fakes = tmp_path / "ws", tmp_path / "fakes"
-    for folder in ("src/baxter/baxter_common/baxter_description/urdf", "src/cwru_baxter/cwru_baxter_sim",
-                   "src/baxter/baxter_common/rethink_ee_description", "src/compat/xacro"):
+    for folder in ("src/baxter/baxter_common/baxter_description/urdf", "src/courses/cwru_baxter_sim",
+                   "src/baxter/baxter_common/rethink_ee_description", "src/base/xacro"):
         (root / folder).mkdir(parents=True)
     (root / "src/baxter/baxter_common/baxter_description/urdf/baxter.urdf.xacro").write_text("<robot/>")
-    (root / "src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf.xacro").write_text("<robot/>")
+    (root / "src/courses/cwru_baxter_sim/cwru_baxter.urdf.xacro").write_text("<robot/>")
     subprocess.run(["cp", "-r", *(ROOT / name for name in ("baxter.sh", "tools")), root], check=True)
     for name in ("requirements.txt", "requirements-nodeps.txt"):
         (root / name).write_text("something==1\n")

@@ -49,7 +49,7 @@ def test_torso_and_lines_of_the_description(robot):
 
 
 def test_second_pose_of_the_notes():
-    settings = (ROOT / "src/cwru_baxter/baxter_traj_streamer/config/streamer.yaml").read_text()
+    settings = (ROOT / "src/courses/baxter_traj_streamer/config/streamer.yaml").read_text()
     wanted = re.findall(r"-?\d\.\d+", row("second pose")[0])
     assert len(wanted) == 7
     assert [number for number in wanted if number in settings] == wanted

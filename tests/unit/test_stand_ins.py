@@ -26,11 +26,11 @@ def test_listed_packages_exist_and_what_set_up_writes_is_not_tracked():
 
 def test_installed_packages_win_and_ours_come_back(tmp_path):
     workspace, share = tmp_path / "ws", tmp_path / "share"
-    for name in ("compat/xacro", "bullet_gazebo/gazebo_msgs"):
+    for name in ("base/xacro", "simulator/gazebo_msgs"):
         (workspace / "src" / name).mkdir(parents=True)
     (share / "xacro").mkdir(parents=True)
     (share / "xacro" / "package.xml").touch()
-    marks = [workspace / "src" / name / "CATKIN_IGNORE" for name in ("compat/xacro", "bullet_gazebo/gazebo_msgs")]
+    marks = [workspace / "src" / name / "CATKIN_IGNORE" for name in ("base/xacro", "simulator/gazebo_msgs")]
     bash('leave_out_stand_ins "$@"', workspace, tmp_path / "nowhere", share)
     assert [mark.exists() for mark in marks] == [True, False]
     (share / "xacro" / "package.xml").unlink()

@@ -49,7 +49,7 @@ def run(script, cwd, shell="bash", **variables):
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("student")
-    shutil.copytree(ROOT / "src/lab_tools/lab_environment", folder / "src/lab_tools/lab_environment")
+    shutil.copytree(ROOT / "src/base/lab_environment", folder / "src/base/lab_environment")
     (folder / "tools").mkdir()
     for name in ("tools/setup.bash", "tools/apt_packages.txt", "requirements.txt"):
         (folder / name).touch()
@@ -153,7 +153,7 @@ def catkin_make_leaves_the_lab_alone(workspace):
     for words in ("-DX=1", "--pkg lab_environment", "install", "--pkg mine_a install --force-cmake"):
         assert said(f"tools/catkin_make {words}") == f"catkins own: {words}\n"
     assert said("cd src && ../tools/catkin_make") == "catkins own: \n"
-    package = workspace / "src/lab_tools/lab_environment"
+    package = workspace / "src/base/lab_environment"
     changed = package / "new.cpp"
     changed.touch()
     assert said("tools/catkin_make") == "catkins own: \n"
