@@ -7,9 +7,9 @@ import PyKDL
 import rospkg
 
 import xacro
+from arm_kinematics import Chain
+from arm_kinematics.bullet_checker import BulletChecker
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
-from baxter_sim_kinematics import Chain
-from baxter_sim_kinematics.bullet_checker import BulletChecker
 from model_files.resources import ResourceFinder
 from urdf_model import Robot, parse_urdf
 

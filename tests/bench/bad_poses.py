@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from ik_oracle import MISSED, Oracle
 
-from baxter_sim_kinematics import Budget, NoSolution, Reason, Target, solve
-from baxter_sim_kinematics.target import METRES_PER_RADIAN
+from arm_kinematics import Budget, NoSolution, Reason, Target, solve
+from arm_kinematics.target import METRES_PER_RADIAN
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, rigid

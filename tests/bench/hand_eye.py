@@ -6,13 +6,13 @@ its description, as for any program.
 """
 import numpy as np
 
+from arm_kinematics import Chain
 from baxter_sim_examples import TABLE_TOP_M, TABLE_XY_M
 from baxter_sim_examples.looking import View
 from baxter_sim_examples.scene import TABLE_SIZE_M
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.sensing.cameras import CaptureSettings
 from baxter_sim_hardware.sensing.optics import Optics
-from baxter_sim_kinematics import Chain
 from model_files.resources import ResourceFinder
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror

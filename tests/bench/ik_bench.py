@@ -16,9 +16,9 @@ import PyKDL
 from arms import arms, checker_of, fill, kdl_chain
 from ik_oracle import Oracle
 
-from baxter_sim_kinematics import Budget, NoSolution, solve, solve_batch, warm_up
-from baxter_sim_kinematics.budget import SERVICE_BUDGET as SERVICE
-from baxter_sim_kinematics.target import METRES_PER_RADIAN
+from arm_kinematics import Budget, NoSolution, solve, solve_batch, warm_up
+from arm_kinematics.budget import SERVICE_BUDGET as SERVICE
+from arm_kinematics.target import METRES_PER_RADIAN
 from urdf_model.transforms import rotation_angle
 
 POSES = 2000

@@ -25,6 +25,7 @@ from hand_eye import Eye
 from robot_bench import load_lab
 
 import xacro
+from arm_kinematics import Chain, NoSolution, pose_from_quaternion, solve
 from baxter_interface.joint_motion import Move
 from baxter_sim_examples import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_XY_M, BlockLost, Trial, block_urdf, pick_and_place
 from baxter_sim_examples.looking import NotSeen, locate, locate_tagged
@@ -32,7 +33,6 @@ from baxter_sim_examples.pick_and_place import aside_angles, grip_yaw
 from baxter_sim_examples.scene import ABOUT_M, MIDDLE_M
 from baxter_sim_examples.tagged import tagged_block_urdf
 from baxter_sim_hardware import effects, individual
-from baxter_sim_kinematics import Chain, NoSolution, pose_from_quaternion, solve
 from bullet_sim import Pose
 from model_files.resources import model_folders
 from sdf_model import ModelFolders, parse_sdf_model

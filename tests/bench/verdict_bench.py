@@ -7,7 +7,7 @@ import numpy as np
 from arms import arms, checker_of
 from bad_poses import KINDS, Builder
 
-from baxter_sim_kinematics import warm_up
+from arm_kinematics import warm_up
 
 # Share of the diagnoses that must name the cause [%].
 RIGHT = 95.0

@@ -16,10 +16,10 @@ import tcpros
 from commands import WORDS, may_move
 from hostile import Generator
 from invariants import Usage, grown
-from lab import FOREIGN, class_of, cpu_s, request_class, usage
 from message_spec import spec_of
 from robot import PATIENCE_WALL_S, LabError, Robot, Services
 
+from lab import FOREIGN, class_of, cpu_s, request_class, usage
 from lab_testing.waiting import wait_until
 
 BATCH = 250

@@ -8,12 +8,12 @@ from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import Press, PressRequest
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties
 from invariants import Patience
-from lab import CALLER, cpu_s
 from std_msgs.msg import Bool, Empty, Float64, UInt16
 from std_srvs.srv import Empty as EmptyService
 from watch import STATE, STATES
 
 from baxter_model import JOINTS, SIDES
+from lab import CALLER, cpu_s
 from lab_testing.waiting import wait_until
 
 # Time limits of a service's answer [s]: CPU time of its node, and wall time.

@@ -5,10 +5,11 @@ import collections
 import rosbag
 from full import bear
 from invariants import Stamps, not_finite
-from lab import Lab, end
 from limits import arm_limits
 from robot import init_node
 from watch import BULKY, STATES, Watch
+
+from lab import Lab, end
 
 STILL_RAD = 0.001
 MINUTES = 2.0

@@ -7,12 +7,13 @@ import time
 
 from full import bear
 from gazebo_msgs.srv import GetModelState, GetModelStateRequest
-from lab import Lab
 from limits import arm_limits
 from message_spec import encode, spec_of
 from robot import init_node
 from tcpros import ServiceConnection, service_type
 from watch import STATES, Watch, class_of, subscribe
+
+from lab import Lab
 
 CLIENTS = 60
 STILL_RAD = 0.001

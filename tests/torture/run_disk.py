@@ -3,10 +3,11 @@
 import subprocess
 
 from full import bear, fill, require_root
-from lab import Lab
 from limits import arm_limits
 from robot import init_node
 from watch import Watch
+
+from lab import Lab
 
 SIZE = "48m"
 STILL_RAD = 0.001

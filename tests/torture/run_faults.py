@@ -7,11 +7,11 @@ import signal
 import statistics
 import time
 
-from lab import Lab
 from limits import arm_limits
 from robot import LabError, Robot, init_node
 from watch import Watch
 
+from lab import Lab
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """torture.py fuzz"""
 from fuzz import BATCH, Fuzz
-from lab import Lab
 from limits import arm_limits
 from robot import init_node
 from watch import Watch
+
+from lab import Lab
 
 # Greatest motion of an arm on messages that it must refuse [rad].
 STILL_RAD = 0.001

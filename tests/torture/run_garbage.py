@@ -6,11 +6,12 @@ import socket
 import time
 import xmlrpc.client
 
-from lab import CALLER, Lab, address_of
 from limits import arm_limits
 from robot import LabError, Robot, init_node
 from tcpros import garbage
 from watch import Watch
+
+from lab import CALLER, Lab, address_of
 
 STILL_RAD = 0.001
 BATCH = 50

@@ -4,12 +4,13 @@ import time
 
 import hypothesis
 from hypothesis.stateful import run_state_machine_as_test
-from lab import Lab
 from limits import arm_limits
 from lockstep import LockStep
 from machine import Machine
 from robot import init_node
 from watch import Watch
+
+from lab import Lab
 
 STILL_RAD = 0.001
 # Of a round. The first example of hypothesis is always the simplest: the same step again and again.

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """torture.py slice: hostile messages, then a round of the state machine, on one lab."""
-from lab import Lab
 from limits import arm_limits
 from robot import init_node
 from run_fuzz import STILL_RAD, fuzz
 from run_machine import machine
 from watch import Watch
+
+from lab import Lab
 
 EXAMPLES, STEPS = 6, 15
 

@@ -13,9 +13,9 @@ import traceback
 import genpy
 import tcpros
 from invariants import JointLimits, Stamps, Still, not_finite
-from lab import class_of, subscribe
 
 from baxter_model import SIDES
+from lab import class_of, subscribe
 
 STATES, STATE = "/robot/joint_states", "/robot/state"
 CORE = {"/clock", STATES, STATE, "/robot/limb/left/endpoint_state", "/robot/limb/right/endpoint_state",

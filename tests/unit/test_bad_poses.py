@@ -8,9 +8,9 @@ import numpy as np
 import PyKDL
 import pytest
 
-from baxter_sim_kinematics import NoSolution, Reason
-from baxter_sim_kinematics.errors import Attempt
-from baxter_sim_kinematics.target import METRES_PER_RADIAN
+from arm_kinematics import NoSolution, Reason
+from arm_kinematics.errors import Attempt
+from arm_kinematics.target import METRES_PER_RADIAN
 
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 RIGHT = 0.95

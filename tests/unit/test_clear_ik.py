@@ -5,9 +5,9 @@ import pytest
 import rospkg
 
 import xacro
+from arm_kinematics import Chain, NoSolution, Reason, solve
+from arm_kinematics.bullet_checker import BulletChecker
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
-from baxter_sim_kinematics import Chain, NoSolution, Reason, solve
-from baxter_sim_kinematics.bullet_checker import BulletChecker
 from bullet_sim import World
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf

@@ -132,8 +132,24 @@ def test_a_package_below_imports_none_above():
     viewers = {"sensor_renderer", "lab_display"}
     assert {pair for pair in product if pair[0] in viewers and pair[1] == "gazebo_ros"} == set()
     simulator = {"gazebo_ros", "baxter_sim_hardware", "gazebo_ros_control", "baxter_gazebo"}
-    robot_side = {"baxter_model", "baxter_interface", "baxter_tools", "baxter_examples", "baxter_sim_kinematics"}
+    robot_side = {"arm_kinematics", "baxter_model", "baxter_interface", "baxter_tools", "baxter_examples",
+                  "baxter_sim_kinematics"}
     assert {pair for pair in product if pair[0] in robot_side and pair[1] in simulator} == set()
+
+
+#: Imports against the floors: Baxter's set-points and gripper.
+UPWARDS = {("moveit_servo", "baxter_core_msgs"), ("moveit_servo", "baxter_interface")}
+
+
+def test_a_room_imports_from_itself_and_from_lower_floors_alone():
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    floors = {room: int(floor) for floor, room in re.findall(r"^\| (\d) \| `(\w+)` \|", page, re.MULTILINE)}
+    room = {name: folder.parts[1] for name, folder in PACKAGES.items() if folder.parts[0] == "src"}
+    assert set(room.values()) == set(floors)
+    upwards = {(package, needed) for package, file, needed in uses()
+               if not is_in_tests(file) and {package, needed} <= set(room) and room[package] != room[needed]
+               and floors[room[package]] <= floors[room[needed]]}
+    assert upwards == UPWARDS
 
 
 @pytest.mark.parametrize(("text", "names"), [

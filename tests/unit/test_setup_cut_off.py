@@ -27,7 +27,7 @@ COMMANDS = {
     "meshes": "cp -r*",
     "build": "catkin_make*",
     "urdf": "rosrun xacro*",
-    "kernels": "python3 -m baxter_sim_kinematics*",
+    "kernels": "python3 -m arm_kinematics*",
 }
 TITLES = {
     "apt": "Debian packages", "venv": "virtual environment", "pip": "Python packages", "meshes": "Baxter's meshes",

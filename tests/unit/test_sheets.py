@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from arm_kinematics import Chain, pose_from_quaternion, solve_as_vendor
 from baxter_model import joint_names, poses
-from baxter_sim_kinematics import Chain, pose_from_quaternion, solve_as_vendor
 from urdf_model import parse_urdf
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -3,6 +3,4 @@ from distutils.core import setup
 
 from catkin_pkg.python_setup import generate_distutils_setup
 
-PACKAGES = ["baxter_sim_kinematics", "baxter_sim_kinematics.kernels"]
-
-setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["baxter_sim_kinematics"], package_dir={"": "src"}))

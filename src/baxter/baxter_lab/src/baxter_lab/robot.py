@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from arm_kinematics import NoSolution, solve, solve_as_vendor
 from baxter_model import HEAD_JOINT, JOINTS, SIDES
 from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.robot_state import Event, State
 from baxter_sim_hardware.simulated import SimulatedBaxter
-from baxter_sim_kinematics import NoSolution, solve, solve_as_vendor
 
 from .errors import LabError
 
@@ -84,7 +84,7 @@ class Gripper:
 class Arm:
     """One arm. Poses (4, 4) are of its `<side>_gripper` in `base` [m]; angles (7,) go from s0 to w2 [rad].
 
-    Attributes: `side`, `joint_names`, `chain` (`baxter_sim_kinematics.Chain`), `gripper`.
+    Attributes: `side`, `joint_names`, `chain` (`arm_kinematics.Chain`), `gripper`.
     """
 
     def __init__(self, simulated: SimulatedBaxter, side: str, wait: Callable):

@@ -4,8 +4,8 @@ import numpy as np
 import rospy
 
 import urdf_model
+from arm_kinematics import Chain
 from baxter_model import BASE_FRAME, tip_of
-from baxter_sim_kinematics import Chain
 
 from .ros_settings import read_limits
 from .settings import SIDES, SettingsError, arm_joint_names

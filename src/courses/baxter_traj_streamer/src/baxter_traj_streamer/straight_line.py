@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import Budget, NoSolution, Reason, solve
+from arm_kinematics import Budget, NoSolution, Reason, solve
 
 from .optimal import time_optimal
 

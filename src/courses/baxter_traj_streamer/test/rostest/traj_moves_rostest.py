@@ -12,7 +12,7 @@ from geometry_msgs.msg import Vector3
 from traj_rostest_kit import DEADLINE_S, FakeRobotTest, wait_until
 
 import urdf_model
-from baxter_sim_kinematics import Chain
+from arm_kinematics import Chain
 from baxter_traj_streamer.playfile import Playfile
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
 

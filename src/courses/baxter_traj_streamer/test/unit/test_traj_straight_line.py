@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdf_model
-from baxter_sim_kinematics import Chain, solve
+from arm_kinematics import Chain, solve
 from baxter_traj_streamer.curve import interpolate
 from baxter_traj_streamer.straight_line import LeavesReach, straight_line
 

@@ -2,8 +2,8 @@
 """Poses of the robot's frames for given joint values. Free of ROS."""
 import numpy as np
 
+from arm_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
 from baxter_model import BASE_FRAME, joint_names, poses, tip_of
-from baxter_sim_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
 from urdf_model import parse_urdf
 
 # Start of inverse kinematics: the middle of the arm's usual workspace.

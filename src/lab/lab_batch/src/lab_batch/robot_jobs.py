@@ -197,8 +197,8 @@ class Serials(Job):
 
     @staticmethod
     def _chain(xml, side):
+        from arm_kinematics import Chain
         from baxter_model import BASE_FRAME, tip_of
-        from baxter_sim_kinematics import Chain
         from urdf_model import parse_urdf
 
         return Chain.from_robot(parse_urdf(xml, source="robot"), BASE_FRAME, tip_of(side))

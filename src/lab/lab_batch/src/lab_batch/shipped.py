@@ -31,8 +31,8 @@ class InverseKinematics(Job):
     def start(self):
         import rospkg
 
+        from arm_kinematics import Chain, warm_up
         from baxter_model import BASE_FRAME, SIDES, tip_of
-        from baxter_sim_kinematics import Chain, warm_up
         from urdf_model import description_text, parse_urdf
 
         if self._side not in SIDES:
@@ -45,7 +45,7 @@ class InverseKinematics(Job):
     def run(self, seed):
         import numpy as np
 
-        from baxter_sim_kinematics import Budget, NoSolution, solve
+        from arm_kinematics import Budget, NoSolution, solve
 
         rng = np.random.default_rng(seed)
         chain = self._chain

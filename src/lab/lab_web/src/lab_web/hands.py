@@ -2,7 +2,7 @@
 """Where the arms would be for a pose of a hand, for pages that drag one; nothing moves. No ROS."""
 import threading
 
-from baxter_sim_kinematics import Budget, Chain, KinematicsError, NoSolution, pose_from_quaternion, solve, warm_up
+from arm_kinematics import Budget, Chain, KinematicsError, NoSolution, pose_from_quaternion, solve, warm_up
 from urdf_model import UrdfError
 from urdf_model.transforms import inverse, quaternion_from_matrix
 

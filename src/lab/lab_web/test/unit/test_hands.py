@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Reason
+from arm_kinematics import Reason
 from lab_testing.waiting import wait_until
 from lab_web.hands import Hands, ghost
 from lab_web.scene import SceneFollower

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import Budget, Chain, InvalidTarget, KinematicsError, NoSolution, Target, solve
+from arm_kinematics import Budget, Chain, InvalidTarget, KinematicsError, NoSolution, Target, solve
 from motion_planning.errors import PlanningError
 from urdf_model.transforms import axis_rotation, inverse, rigid, rotation_angle
 

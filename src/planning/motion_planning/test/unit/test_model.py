@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Chain
+from arm_kinematics import Chain
 from motion_planning.model import MeshReader, MeshUnreadable, ModelError, PlanningModel
 from motion_planning.model import meshes as mesh_files
 from urdf_model.transforms import axis_rotation, rigid

@@ -9,7 +9,7 @@ from moveit_msgs.msg import (
 )
 from sensor_msgs.msg import JointState
 
-from baxter_sim_kinematics import NoSolution, solve
+from arm_kinematics import NoSolution, solve
 from urdf_model.transforms import rpy_from_matrix, rpy_matrix
 
 from . import states

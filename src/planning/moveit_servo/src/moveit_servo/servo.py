@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import Chain, ChainError
+from arm_kinematics import Chain, ChainError
 from moveit_servo.directions import Thresholds, velocity_for
 from moveit_servo.limits import JointLimits, Motion, speed_towards, stoppable
 from moveit_servo.pose_tracking import PoseTracker

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arm_kinematics import Chain, kernels
 from baxter_model import BASE_FRAME, SIDES, is_part_of_arm, tip_of
 from baxter_model.description import arm_radius, finger_openings, limbs_of
-from baxter_sim_kinematics import Chain, kernels
 
 from . import effects, individual
 from .arms import endpoint

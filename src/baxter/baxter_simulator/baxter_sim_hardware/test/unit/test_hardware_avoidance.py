@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from std_msgs.msg import Empty
 
+from arm_kinematics import Chain, OwnBody
 from baxter_model import JOINTS, SIDES, poses, tip_of
 from baxter_model.description import arm_radius, avoided_balls, head_guards
 from baxter_model.self_collision import HEAD, HEAD_GUARDS
 from baxter_sim_hardware.arms import avoidance, collision
 from baxter_sim_hardware.arms.guarding import guards_of
-from baxter_sim_kinematics import Chain, OwnBody
 
 HEARD = ("state", "limb/*/collision_avoidance_state")
 

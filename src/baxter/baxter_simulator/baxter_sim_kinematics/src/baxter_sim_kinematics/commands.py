@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from arm_kinematics.chain import Chain
+from arm_kinematics.errors import KinematicsError, NoSolution
+from arm_kinematics.ik import solve_all
+from arm_kinematics.reach import yoshikawa
+from arm_kinematics.target import Target, pose_from_quaternion
 from baxter_model import BASE_FRAME, SIDES, poses, tip_of
-from baxter_sim_kinematics.chain import Chain
-from baxter_sim_kinematics.errors import KinematicsError, NoSolution
-from baxter_sim_kinematics.ik import solve_all
-from baxter_sim_kinematics.reach import yoshikawa
-from baxter_sim_kinematics.target import Target, pose_from_quaternion
 from lab_environment.options import number
 from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
@@ -167,7 +167,7 @@ def _ik(parser, options):
 
 def self_collision_checker(robot, warn):
     """Return a BulletChecker of ``robot`` alone; ``warn`` is called with a text where a mesh is missing."""
-    from baxter_sim_kinematics.bullet_checker import self_checker
+    from baxter_sim_kinematics.self_checker import self_checker
     from model_files.resources import ResourceFinder
     return self_checker(robot, ResourceFinder(), warn)
 

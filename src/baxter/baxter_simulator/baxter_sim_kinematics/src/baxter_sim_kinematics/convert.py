@@ -4,8 +4,8 @@ from baxter_kinematics_msgs.msg import IKVerdict
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
 
-from baxter_sim_kinematics.errors import NoSolution, Reason
-from baxter_sim_kinematics.target import pose_from_quaternion
+from arm_kinematics.errors import NoSolution, Reason
+from arm_kinematics.target import pose_from_quaternion
 from urdf_model.transforms import quaternion_from_matrix
 
 _VERDICTS = {

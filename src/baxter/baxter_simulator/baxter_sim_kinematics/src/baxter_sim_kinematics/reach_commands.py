@@ -9,6 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from arm_kinematics.errors import NoSolution
+from arm_kinematics.ik import solve
+from arm_kinematics.reach import MapParts, MapSettings, ReachError, compute
+from arm_kinematics.reach_bounds import balls
+from arm_kinematics.reach_map import ReachMap, overlap
+from arm_kinematics.reach_places import Region, best_places, nearest_rotations, table_poses
+from arm_kinematics.target import pose_from_quaternion
 from baxter_sim_kinematics.commands import (
     chain_of,
     new_parser,
@@ -17,13 +24,6 @@ from baxter_sim_kinematics.commands import (
     tell,
     with_numbers,
 )
-from baxter_sim_kinematics.errors import NoSolution
-from baxter_sim_kinematics.ik import solve
-from baxter_sim_kinematics.reach import MapParts, MapSettings, ReachError, compute
-from baxter_sim_kinematics.reach_bounds import balls
-from baxter_sim_kinematics.reach_map import ReachMap, overlap
-from baxter_sim_kinematics.reach_places import Region, best_places, nearest_rotations, table_poses
-from baxter_sim_kinematics.target import pose_from_quaternion
 from lab_environment.options import MOST_WORKERS, number
 from lab_environment.user_files import PIPE_WAIT_S, read_text
 
@@ -84,7 +84,7 @@ def _settings(options):
 
 
 def _reach(options):
-    from baxter_sim_kinematics.reach_picture import draw
+    from arm_kinematics.reach_picture import draw
 
     robot, chain, settings = _settings(options)
     if settings.self_collision:
@@ -152,7 +152,7 @@ def reach_overlap():
 
 
 def _overlap(options):
-    from baxter_sim_kinematics.reach_picture import draw
+    from arm_kinematics.reach_picture import draw
 
     first, second = (ReachMap.read(path) for path in options.maps)
     both = overlap(first, second)

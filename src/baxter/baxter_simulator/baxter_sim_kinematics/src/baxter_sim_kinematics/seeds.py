@@ -3,7 +3,7 @@
 import enum
 from typing import NamedTuple
 
-from baxter_sim_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
+from arm_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
 
 
 class SeedMode(enum.IntEnum):

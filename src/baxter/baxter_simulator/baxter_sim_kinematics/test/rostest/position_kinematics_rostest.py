@@ -20,7 +20,7 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
-from baxter_sim_kinematics import Chain
+from arm_kinematics import Chain
 from lab_testing.waiting import beats, wait_until
 from urdf_model import parse_urdf
 from urdf_model.transforms import quaternion_from_matrix

@@ -14,7 +14,7 @@ from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from baxter_sim_kinematics.reach_map import ReachMap
+from arm_kinematics.reach_map import ReachMap
 
 NODE = Path(__file__).resolve().parents[2] / "nodes" / "reach_markers"
 WAIT_S = 60.0

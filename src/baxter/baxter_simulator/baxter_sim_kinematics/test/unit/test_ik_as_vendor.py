@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from baxter_model import JOINTS, MIRROR_SIGNS
-from baxter_sim_kinematics import (
+from arm_kinematics import (
     Budget,
     Chain,
     NoSolution,
@@ -15,7 +14,8 @@ from baxter_sim_kinematics import (
     solve,
     solve_as_vendor,
 )
-from baxter_sim_kinematics.search import Search
+from arm_kinematics.search import Search
+from baxter_model import JOINTS, MIRROR_SIGNS
 from urdf_model.transforms import rigid, rotation_angle
 
 NEUTRAL = np.array([0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0])

@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from baxter_sim_kinematics.commands import read_robot
+from urdf_model import UrdfError
+
 PACKAGE = Path(__file__).resolve().parents[2]
 BAXTER = PACKAGE.parents[1] / "baxter_common/baxter_description/urdf/baxter.urdf"
 NEUTRAL = "0 -0.55 0 0.75 0 1.26 0".split()
@@ -69,3 +72,11 @@ def test_bad_input_gets_one_line(arguments, text, tmp_path):
     assert status in (1, 2)
     assert text in err
     assert "Traceback" not in err
+
+
+def test_xacro_that_does_not_expand_is_named(tmp_path):
+    file = tmp_path / "arm.urdf.xacro"
+    for text in ("<robot", '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${no}"/></robot>'):
+        file.write_text(text)
+        with pytest.raises(UrdfError, match="arm.urdf.xacro"):
+            read_robot(file)

@@ -14,10 +14,10 @@ import h5py
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Chain, reach, solve
-from baxter_sim_kinematics.reach import MapSettings
-from baxter_sim_kinematics.reach_map import ReachMap, overlap
-from baxter_sim_kinematics.reach_places import Region, best_places, table_poses
+from arm_kinematics import Chain, reach, solve
+from arm_kinematics.reach import MapSettings
+from arm_kinematics.reach_map import ReachMap, overlap
+from arm_kinematics.reach_places import Region, best_places, table_poses
 from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix, rigid, rpy_matrix
 
 PACKAGE = Path(__file__).resolve().parents[2]
@@ -184,7 +184,7 @@ def test_files_that_are_no_maps_are_refused(tmp_path):
 
 
 def test_hdf5_has_the_rows_of_reuleaux(tmp_path, monkeypatch):
-    monkeypatch.setattr("baxter_sim_kinematics.reach_map._ROWS", 7)  # several portions
+    monkeypatch.setattr("arm_kinematics.reach_map._ROWS", 7)  # several portions
     reached = np.zeros((2, 2, 2, 2), dtype=bool)
     reached[0, 1, 0] = True, False
     reached[1, 1, 1] = True, True

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from baxter_core_msgs.srv import SolvePositionIKRequest
 
-from baxter_sim_kinematics import Chain, InvalidPosture, NoSolution, PostureMap, Reason
-from baxter_sim_kinematics.errors import Attempt, InvalidSeed
+from arm_kinematics import Chain, InvalidPosture, NoSolution, PostureMap, Reason
+from arm_kinematics.errors import Attempt, InvalidSeed
 from baxter_sim_kinematics.seeds import SeedMode, SeedPolicy, SeedRequest, seed_mode
 
 GIVEN, CURRENT, IN_MAP, NEUTRAL = 0.1, 0.2, 0.3, 0.4

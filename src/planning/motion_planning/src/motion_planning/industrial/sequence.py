@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from baxter_sim_kinematics import NoSolution
+from arm_kinematics import NoSolution
 from motion_planning.errors import PlanningError
 from motion_planning.industrial.blend import Blend
 from motion_planning.industrial.commands import check, failing, in_time, motion

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import Chain, ChainError, KinematicsError, Several, Target, solve, solve_all
+from arm_kinematics import Chain, ChainError, KinematicsError, Several, Target, solve, solve_all
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import read_only
 from urdf_model.transforms import inverse

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baxter_sim_kinematics import Chain, ChainError
+from arm_kinematics import Chain, ChainError
 from motion_planning.shapes import read_only
 
 if TYPE_CHECKING:

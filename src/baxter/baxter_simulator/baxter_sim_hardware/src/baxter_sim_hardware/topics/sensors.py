@@ -7,10 +7,10 @@ from geometry_msgs.msg import Point32, Vector3
 from sensor_msgs.msg import ChannelFloat32, Imu, LaserScan, PointCloud, Range
 from std_msgs.msg import Float32, Header, UInt16
 
+from arm_kinematics import Chain
 from baxter_model import BASE_FRAME, SIDES
 from baxter_sim_hardware.sensing import sensors, sonar_lights
 from baxter_sim_hardware.sensing.panel import RANGE_SENSORS
-from baxter_sim_kinematics import Chain
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 
