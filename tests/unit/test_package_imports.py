@@ -137,10 +137,6 @@ def test_a_package_below_imports_none_above():
     assert {pair for pair in product if pair[0] in robot_side and pair[1] in simulator} == set()
 
 
-#: Imports against the floors: Baxter's set-points and gripper.
-UPWARDS = {("moveit_servo", "baxter_core_msgs"), ("moveit_servo", "baxter_interface")}
-
-
 def test_a_room_imports_from_itself_and_from_lower_floors_alone():
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     floors = {room: int(floor) for floor, room in re.findall(r"^\| (\d) \| `(\w+)` \|", page, re.MULTILINE)}
@@ -149,7 +145,7 @@ def test_a_room_imports_from_itself_and_from_lower_floors_alone():
     upwards = {(package, needed) for package, file, needed in uses()
                if not is_in_tests(file) and {package, needed} <= set(room) and room[package] != room[needed]
                and floors[room[package]] <= floors[room[needed]]}
-    assert upwards == UPWARDS
+    assert upwards == set()
 
 
 @pytest.mark.parametrize(("text", "names"), [

@@ -34,7 +34,7 @@ from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_servo.commands import CommandIgnored, Commands, sent_at
-from moveit_servo.outputs import MESSAGE_TYPES, message_of
+from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
 from moveit_servo.settings import ServoSettings, SettingsError
 from moveit_servo.surroundings import Surroundings
@@ -84,7 +84,7 @@ class ServoNode:
         self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
                                     {"joint_state_topic": settings.joint_topic})
         self._prepare(self.monitor.scene())
-        kind = MESSAGE_TYPES[settings.command_out_type]
+        kind = message_type(settings.command_out_type)
         self._out = rospy.Publisher(_private(settings.command_out_topic), kind, queue_size=2, tcp_nodelay=True)
         self._status = rospy.Publisher(_private(settings.status_topic), Int8, queue_size=2)
         self._reason = rospy.Publisher("~status_reason", String, queue_size=2, latch=True)

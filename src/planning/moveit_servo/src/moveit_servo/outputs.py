@@ -5,22 +5,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import roslib.message
 import rospy
-from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY
+from moveit_servo.settings import ARRAY, BAXTER, SettingsError
 
 if TYPE_CHECKING:
     from moveit_servo.servo import Step
     from moveit_servo.settings import ServoSettings
 
-MESSAGE_TYPES = {TRAJECTORY: JointTrajectory, ARRAY: Float64MultiArray, BAXTER: JointCommand}
 # Points of a trajectory for Gazebo, whose controller may drop those that are late.
 _POINTS_FOR_GAZEBO = 30
 # Velocities without positions drift; this share of the distance to the set-point is added to them [1/s].
 _RETURN_RATE = 2.0
+
+
+def message_type(name: str) -> type:
+    """Return the class of a settings' ``command_out_type``. Raises SettingsError where its package is missing."""
+    # Baxter's by its name: a robot without it needs no package of Baxter.
+    kind = roslib.message.get_message_class(name)
+    if kind is None:
+        raise SettingsError("command_out_type is %s, and the package %s is not there" % (name, name.partition("/")[0]))
+    return kind
 
 
 def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings, seconds: float = 0.0,
@@ -38,8 +46,9 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
                                  velocities if settings.publish_joint_velocities else [])
     if settings.command_out_type == BAXTER:
         by_position = settings.publish_joint_positions
-        return JointCommand(mode=JointCommand.RAW_POSITION_MODE if by_position else JointCommand.VELOCITY_MODE,
-                            names=list(joints), command=positions if by_position else velocities)
+        kind = message_type(BAXTER)
+        return kind(mode=kind.RAW_POSITION_MODE if by_position else kind.VELOCITY_MODE, names=list(joints),
+                    command=positions if by_position else velocities)
     trajectory = JointTrajectory(joint_names=list(joints))
     trajectory.header.frame_id = settings.planning_frame  # a stamp of 0: now
     first = max(seconds, settings.publish_period)

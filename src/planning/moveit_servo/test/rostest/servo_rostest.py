@@ -1,12 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Both of Baxter's arms are steered over the interface: by programs, by a gamepad, by keys."""
+"""Both of Baxter's arms are steered over the interface."""
 import math
-import os
-import pty
-import subprocess
 import sys
-import threading
 import unittest
 
 import numpy as np
@@ -17,7 +13,7 @@ from control_msgs.msg import JointJog
 from geometry_msgs.msg import Pose, PoseStamped, TwistStamped
 from moveit_msgs.msg import CollisionObject
 from moveit_msgs.srv import ChangeControlDimensions, ChangeDriftDimensions
-from sensor_msgs.msg import JointState, Joy
+from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Int8, String
 from std_srvs.srv import Empty
@@ -165,49 +161,6 @@ class ServoTest(unittest.TestCase):
         self.stream(lambda: arm.twists.publish(twist(z=-0.2)), lambda: arm.position[2] < where[2] + 0.1, "the way back")
         objects.publish(CollisionObject(id="shelf", operation=CollisionObject.REMOVE, header=box.header))
         arm.wait_for_rest()
-
-    def test_6_a_gamepad(self):
-        pad = rospy.Publisher("joy", Joy, queue_size=1)
-        wait_until(pad.get_num_connections, "the gamepad's node", 20.0)
-        arm = self.arms["left"]
-        before = arm.position
-        axes = [0.0, 0.0, 1.0, 0.0, -1.0, 1.0, 0.0, 0.0]
-        held = Joy(axes=axes, buttons=[0, 0, 0, 0, 0, 1, 0, 0])
-        self.stream(lambda: pad.publish(held), lambda: arm.position[2] < before[2] - 0.05, "the hand 5 cm lower")
-        pad.publish(Joy(axes=axes, buttons=[0] * 8))
-        # 0.1 s of the servo's own; the rest is the way of the messages, in real time.
-        self.assertLess(arm.wait_for_rest(), 0.1 + stretched(0.15))
-
-    def test_7_keys(self):
-        arm = self.arms["right"]
-        before = arm.position
-        end, terminal = pty.openpty()
-        keys = subprocess.Popen(["rosrun", "moveit_servo", "servo_keyboard", "_servos:=left_servo right_servo"],
-                                stdin=terminal, stdout=terminal, stderr=terminal, env={**os.environ, "TERM": "xterm"})
-        os.close(terminal)
-        screen = []
-        reading = threading.Thread(target=_read, args=(end, screen), daemon=True)
-        reading.start()
-        try:
-            wait_until(lambda: b"hand" in b"".join(screen), "the keys on screen", 30.0)
-            os.write(end, b"h+++")
-            self.stream(lambda: os.write(end, b"f"), lambda: arm.position[2] < before[2] - 0.05, "the hand 5 cm lower")
-            arm.wait_for_rest()
-            os.write(end, b"x")
-            self.assertEqual(keys.wait(timeout=30.0), 0)
-        finally:
-            if keys.poll() is None:
-                keys.kill()
-                keys.wait()
-            os.close(end)
-
-
-def _read(end, screen):
-    try:
-        while data := os.read(end, 4096):
-            screen.append(data)
-    except OSError:
-        pass  # the terminal is closed
 
 
 if __name__ == "__main__":

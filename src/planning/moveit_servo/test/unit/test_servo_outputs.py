@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from baxter_core_msgs.msg import JointCommand
 
-from moveit_servo.outputs import message_of
+from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Status, Step
-from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, ServoSettings
+from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, ServoSettings, SettingsError
 
 JOINTS = ("a", "b")
 STEP = Step(np.array((0.1, 0.2)), np.array((0.5, -0.5)), np.zeros(2), Status.NO_WARNING, "", False, False)
@@ -50,3 +50,8 @@ def test_arrays_and_commands_of_baxter():
     raw = sent(command_out_type=BAXTER)
     assert raw.mode == JointCommand.RAW_POSITION_MODE and raw.names == ["a", "b"] and raw.command == [0.1, 0.2]
     assert sent(command_out_type=BAXTER, **velocities).mode == JointCommand.VELOCITY_MODE
+
+
+def test_a_type_whose_package_is_missing():
+    with pytest.raises(SettingsError, match="the package of_nobody is not there"):
+        message_type("of_nobody/Command")

@@ -10,10 +10,10 @@ import time
 import rospy
 from sensor_msgs.msg import Joy
 
-from moveit_servo.hands import Hands
-from moveit_servo.steering import Gamepad, LayoutError, Steering
 from rospy_limits.node import limit_ports
 from rospy_start import end_on_signals
+from steering_devices.hands import Hands
+from steering_devices.steering import Gamepad, LayoutError, Steering
 
 _RATE_HZ = 50.0
 _DESCRIPTION = """Steer by a gamepad. Subscribes: joy. Publishes: twists to the servos, ~mark.

@@ -14,7 +14,7 @@ from baxter_interface import Gripper
 from moveit_servo.settings import UNITLESS
 
 if TYPE_CHECKING:
-    from moveit_servo.steering import Steering
+    from steering_devices.steering import Steering
 
 # Twists of zero that end a motion.
 _MAX_STOPS = 5

@@ -9,9 +9,9 @@ import time
 
 import rospy
 
-from moveit_servo.hands import Hands
-from moveit_servo.steering import MOTIONS, OTHER_KEYS, Keyboard
 from rospy_limits.node import limit_ports
+from steering_devices.hands import Hands
+from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
 
 _PERIOD_S, _DRAWN_EVERY_S = 0.02, 0.1
 _DESCRIPTION = """Steer by the keys of this terminal. Publishes: twists to the servos, ~mark.

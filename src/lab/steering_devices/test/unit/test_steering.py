@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from moveit_servo.steering import MOTIONS, OTHER_KEYS, Gamepad, Keyboard, LayoutError
+from steering_devices.steering import MOTIONS, OTHER_KEYS, Gamepad, Keyboard, LayoutError
 
 CONFIG = Path(__file__).parents[2] / "config"
 PADS = ("xbox", "playstation")
