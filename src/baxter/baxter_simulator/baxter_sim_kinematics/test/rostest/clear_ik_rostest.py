@@ -11,7 +11,8 @@ from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
 from baxter_kinematics_msgs.msg import IKReport, IKVerdict
 from geometry_msgs.msg import PoseStamped
 
-from arm_kinematics import Chain, convert
+from arm_kinematics import Chain
+from baxter_sim_kinematics import convert
 from lab_testing.waiting import wait_until
 from urdf_model import parse_urdf
 
