@@ -226,7 +226,7 @@ main() {
             ;;
         handout)
             # Needs no set-up, so it takes the system's Python: the first one in PATH may be conda's.
-            PYTHONPATH=$LAB_ROOT/src/courses/rf_checks/src:$LAB_ROOT/src/base/lab_environment/src \
+            PYTHONPATH=$LAB_ROOT/src/courses/rf_checks/src:$LAB_ROOT/src/base/command_line/src \
                 exec /usr/bin/python3 -m rf_checks.handout "$@"
             ;;
         sim)

@@ -11,9 +11,10 @@ import urllib.request
 import uuid
 from pathlib import Path
 
-from lab_environment import jupyter, ports
-from lab_environment.options import did_you_mean
+from command_line.options import did_you_mean
 from lab_tests import processes
+from lab_web import jupyter
+from processes import ports
 
 ROOT = Path(__file__).resolve().parent.parent
 # Everything that Jupyter writes, so that nothing gets into the user's home.

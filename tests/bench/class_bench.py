@@ -19,9 +19,9 @@ import websocket
 
 from lab_class import control
 from lab_class.store import Store
-from lab_environment.family import children_of
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from processes.family import children_of
+from processes.ports import free_port
 from rf_checks.pacing import cpu_time_s
 
 CLASSES, QUICK_CLASSES = "6,16:4", "2,3:1"

@@ -16,9 +16,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from lab_environment.ports import free_port
 from lab_testing.virtual_screen import VirtualScreen
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 
 HERE = Path(__file__).resolve().parent
 WORLD = ("baxter_gazebo", "baxter_world.launch")

@@ -7,9 +7,9 @@ import uuid
 
 from notebook_runs import ROBOT, faults_of, prepare
 
-from lab_environment import jupyter
-from lab_environment.ports import free_port
 from lab_tests import processes
+from lab_web import jupyter
+from processes.ports import free_port
 
 MARKER = "LAB_NOTEBOOK_TEST"
 

@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROBOT, ROOT, WATCHING, faults_of, is_blank, prepare, tool
 
-from lab_environment import jupyter
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 from lab_tests import processes
+from lab_web import jupyter
+from processes.ports import free_port
 
 # Set for one server and all its children.
 MARKER = "LAB_NOTEBOOK_TEST"

@@ -13,10 +13,10 @@ from pathlib import Path
 import rospkg
 import rospy
 
-from lab_environment.family import children_of
 from lab_testing.processes import is_alive
 from lab_testing.skipping import skip
 from lab_testing.waiting import stretched, wait_until
+from processes.family import children_of
 
 # What the tests of the page share is no part of an installed package.
 sys.path.insert(0, str(Path(rospkg.RosPack().get_path("lab_web")) / "test" / "rostest"))

@@ -19,7 +19,7 @@ from nbclient.exceptions import CellExecutionError
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import notebook as tool  # noqa: E402  (a tool at the root of the workspace is not an installed package)
-from lab_environment import jupyter  # noqa: E402
+from lab_web import jupyter  # noqa: E402
 
 PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import rostest
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))

@@ -13,9 +13,9 @@ import roslib.message
 import tcpros
 from invariants import Usage
 
-from lab_environment.ports import free_port
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 
 LAUNCH = ("workspace_tests", "torture.launch")
 # The lab is ready when these are registered: the last topic or service of each node.

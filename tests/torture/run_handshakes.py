@@ -23,7 +23,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from tcpros import ServiceConnection, handshake, header
 
 from lab_testing.waiting import wait_until
-from rospy_limits.node import limit_ports
+from rospy_nodes.start import limit_ports
 
 BATCH = 500
 DEADLINE_S = 60.0

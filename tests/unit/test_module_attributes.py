@@ -116,8 +116,8 @@ def test_modules_have_what_others_ask_of_them(folder):
 
 
 def test_what_is_not_there_is_found():
-    path = module_paths()["lab_environment", "first_clock"]
-    text = "from lab_environment import first_clock\nfirst_clock.ClockWait\nfirst_clock.nothing_of_it\n" \
+    path = module_paths()["rospy_fixes", "first_clock"]
+    text = "from rospy_fixes import first_clock\nfirst_clock.ClockWait\nfirst_clock.nothing_of_it\n" \
         "from rf_checks import no_module\nfrom rf_checks.command import main, no_name\n"
     facts = facts_in(path, text)
     assert unknown(facts) == ["3: first_clock.nothing_of_it"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import notebook as tool
-from lab_environment import jupyter
+from lab_web import jupyter
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ["1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro", "5_moving_baxter", "6_rotating_the_gripper", "7_waving",

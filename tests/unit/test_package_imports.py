@@ -126,7 +126,7 @@ def test_a_package_below_imports_none_above():
     """The lowest packages, and packages that a physical robot must not need."""
     product = {(package, needed) for package, file, needed in uses() if not is_in_tests(file)}
     assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
-    for low, below in (("loop_ros", {"rospy_limits", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),
+    for low, below in (("loop_ros", {"rospy_fixes", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),
                        ("model_files", {"urdf_model"})):
         assert {needed for package, needed in product if package == low} & set(PACKAGES) == below
     viewers = {"sensor_renderer", "lab_display"}

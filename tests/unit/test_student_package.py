@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A student's own package as in the lab sheet, in a shell that was open before the package was created.
 
-Runs in a scratch workspace that holds a copy of lab_environment and uses this workspace's virtual environment.
+Runs in a scratch workspace that has copies of the environment's packages and uses this workspace's virtual environment.
 """
 
 import shutil
@@ -49,7 +49,8 @@ def run(script, cwd, shell="bash", **variables):
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("student")
-    shutil.copytree(ROOT / "src/base/lab_environment", folder / "src/base/lab_environment")
+    for name in ("command_line", "lab_environment", "master_calls", "rospy_fixes"):
+        shutil.copytree(ROOT / "src/base" / name, folder / "src/base" / name)
     (folder / "tools").mkdir()
     for name in ("tools/setup.bash", "tools/apt_packages.txt", "requirements.txt"):
         (folder / name).touch()

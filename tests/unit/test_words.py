@@ -39,8 +39,8 @@ OF_OTHERS = {
     "src/baxter/baxter_common/baxter_core_msgs/msg/AssemblyState.msg": {"brain"},
     "src/baxter/baxter_simulator/baxter_sim_hardware/src/baxter_sim_hardware/robot_state.py": {"brain"},
     # A heading of columns in Moodle's exports.
-    "src/base/lab_environment/src/lab_environment/roster.py": {"mail"},
-    "src/base/lab_environment/test/unit/test_roster.py": {"mail"},
+    "src/courses/rf_checks/src/rf_checks/roster.py": {"mail"},
+    "src/courses/rf_checks/test/unit/test_roster.py": {"mail"},
     "LICENSE": {"shall"},
     "tests/bench/recordings/LICENSE.klampt-examples": {"shall"},
 }

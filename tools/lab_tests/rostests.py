@@ -10,10 +10,10 @@ import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
-from lab_environment.ports import free_port
 from lab_tests import processes
 from lab_tests.discovery import is_long
 from lab_tests.results import Tally, failure, read_rostest_results
+from processes.ports import free_port
 
 TIME_LIMIT_S = 240.0
 LONG_TIME_LIMIT_S = 1200.0

@@ -6,7 +6,7 @@ import sys
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_interface import JOINT_ANGLE_TOLERANCE, Limb, Navigator
 from baxter_interface.programs import EnabledRobot, run
-from lab_environment.options import counted, number
+from command_line.options import counted, number
 
 RATE_HZ = 20.0
 PROMPT = "press the wheel to record a waypoint (%d so far), the button below it to play them; Ctrl-C: quit"

@@ -8,7 +8,7 @@ from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_examples.cuff_control import CuffControl
 from baxter_interface.programs import EnabledRobot, run
 from baxter_model import SIDES
-from lab_environment.options import number
+from command_line.options import number
 
 
 def record(path, rate_hz):

@@ -11,7 +11,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface.programs import ProgramFailed, run
-from lab_environment.user_files import PIPE_WAIT_S, read_text
+from command_line.user_files import PIPE_WAIT_S, read_text
 
 RATE_HZ = 5.0
 # Of a fragment; a whole robot has less.

@@ -14,8 +14,8 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed, run
-from lab_environment.options import MOST_SECONDS, number
-from lab_environment.user_files import PIPE_WAIT_S, check_picture, read_file
+from command_line.options import MOST_SECONDS, number
+from command_line.user_files import PIPE_WAIT_S, check_picture, read_file
 
 # A latched picture disappears with its publisher: time for new subscribers to receive it [s].
 HAND_OVER_S = 1.0

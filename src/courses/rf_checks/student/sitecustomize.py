@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run a judged program on simulated time: `time.sleep(1)` lasts one simulated second.
 
-lab_environment's sitecustomize runs this module when Python starts, because the judge puts its folder right behind in
+rospy_fixes' sitecustomize runs this module when Python starts, because the judge puts its folder right behind in
 PYTHONPATH. So a program that waits with `time` instead of rospy works with any speed of the simulation, and so do
 rospy's own time-outs. rf_checks/run_clock.py has the other side and the layout of the page.
 """

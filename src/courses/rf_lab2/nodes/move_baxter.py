@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import BASE_FRAME, SIDES
-from lab_environment.options import number
+from command_line.options import number
 from rf_lab2.poses import pose_difference, unit_quaternion
 from rf_lab2.programs import ProgramFailed, run
 

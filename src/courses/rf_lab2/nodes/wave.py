@@ -9,7 +9,7 @@ import rospy
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import SIDES
-from lab_environment.options import number
+from command_line.options import number
 from rf_lab2.programs import ProgramFailed, run
 from rf_lab2.waving import Swing, hands_up, shifts
 

@@ -22,7 +22,7 @@ from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.request_queue import LoopEnded, RequestQueue
 from loop_ros.subscriber import Connection, SubscriberHub
 from loop_ros.subscription import Subscription
-from rospy_limits.messages import largest_message_bytes
+from rospy_fixes.ports.messages import largest_message_bytes
 
 
 def remapped(name: str) -> str:

@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rospy_limits.limits import size_fault
+from rospy_fixes.ports.limits import size_fault
 
 _LENGTH = struct.Struct("<I")
 # Smallest and largest portion of one read [bytes]: a few commands; for a larger message, its missing part.

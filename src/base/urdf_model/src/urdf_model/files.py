@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read descriptions from files."""
 
-from lab_environment.user_files import PIPE_WAIT_S, check_file, read_file, read_text
+from command_line.user_files import PIPE_WAIT_S, check_file, read_file, read_text
 
 from . import bounds
 from .errors import UrdfError

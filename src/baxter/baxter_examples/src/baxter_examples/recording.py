@@ -10,7 +10,7 @@ import math
 
 from baxter_interface.joint_checks import limb_joint_names
 from baxter_model import SIDES
-from lab_environment.user_files import PIPE_WAIT_S, read_text
+from command_line.user_files import PIPE_WAIT_S, read_text
 
 #: An hour of both arms at 100 Hz has a quarter of it.
 MOST_BYTES = 200_000_000

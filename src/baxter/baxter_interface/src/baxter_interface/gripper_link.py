@@ -11,7 +11,7 @@ from baxter_dataflow import Signal, wait_for
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, is_unlimited
 from baxter_model.readiness import NOT_ENABLED
-from rospy_limits.json_object import JsonRefused, read_object
+from rospy_nodes.json_object import JsonRefused, read_object
 
 from . import startup
 from .gripper_types import TYPES

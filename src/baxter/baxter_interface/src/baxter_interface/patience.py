@@ -52,7 +52,7 @@ def wait_in_order(conditions, timeout_s, line=None, is_coming=lambda: False, is_
     """Wait until each of `conditions` has been met, in their order, for `timeout_s` in all.
 
     Parameters:
-        line: a lab_environment.waiting_line.WaitingLine, which shows what is waited for; None: nothing is shown.
+        line: a command_line.waiting_line.WaitingLine, which shows what is waited for; None: nothing is shown.
         is_coming: returns whether the awaited thing is starting, called once a second; while it is true, the time limit
         does not run. It may raise an OSError, which ends the wait. is_shutdown: ends the wait. now, sleep: the clock
         [s], wall time by default because no other time is reliable while a robot starts.

@@ -52,7 +52,7 @@ def run(node_name, body, **options):
         return 130
     except (OSError, ValueError, rospy.ROSException) as error:
         if getattr(error, "errno", None) == errno.EPIPE:
-            raise  # of the standard output: lab_environment ends the program without a word
+            raise  # of the standard output: rospy_fixes ends the program without a word
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1
     finally:

@@ -14,9 +14,9 @@ import rosgraph
 import rospy
 import rospy.impl.simtime
 
-from lab_environment.simulator_start import StartWatch
-from lab_environment.waiting_line import WaitingLine
-from rospy_limits.node import limit_ports
+from command_line.waiting_line import WaitingLine
+from master_calls.simulator_start import StartWatch
+from rospy_nodes.start import limit_ports
 
 from .patience import Condition, others_than, wait_in_order
 

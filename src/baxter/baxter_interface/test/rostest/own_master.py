@@ -9,8 +9,8 @@ import unittest
 
 import rosgraph
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 
 DEADLINE_S = 60.0
 # Time for a process to end before it is killed [s].

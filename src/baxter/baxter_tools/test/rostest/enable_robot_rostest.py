@@ -10,8 +10,8 @@ import unittest
 import rospy
 from std_srvs.srv import Trigger
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import stretched
+from processes.ports import free_port
 
 DEADLINE_S = stretched(60.0)
 LAUNCH_FILE = pathlib.Path(__file__).with_name("enable_with_launch.launch")

@@ -15,15 +15,16 @@ from urllib.parse import urlsplit
 
 import rospkg
 
+from command_line.user_files import PIPE_WAIT_S, read_file
 from lab_class import control, control_groups, memory
 from lab_class.disk import ENTRIES, entries_left, remove, room
 from lab_class.labs import ClassError, State
 from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError, default_folder
-from lab_environment import isolation, roster
-from lab_environment.family import is_running
-from lab_environment.roster import INSTRUCTOR, RosterError
-from lab_environment.user_files import PIPE_WAIT_S, read_file
 from lab_web.libraries import LibrariesError, fetched
+from processes import isolation
+from processes.family import is_running
+from rf_checks import roster
+from rf_checks.roster import INSTRUCTOR, RosterError
 
 #: Time for the supervisor to open the front door, and to end all labs [s].
 OPEN_S, DOWN_S = 30.0, 60.0
@@ -42,7 +43,7 @@ def main(arguments=None):
     try:
         return options.run(options, store)
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (RosterError, StoreError, ClassError, LibrariesError, OSError) as error:
         print("labs: %s" % error, file=sys.stderr)
         return _WRONG_WORDS if isinstance(error, RosterError) else _FAILED

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from lab_environment.family import children_of, direct_children
+from processes.family import children_of, direct_children
 
 _CHUNK = 65536
 #: Time for a lab to end by itself after Ctrl-C [s].

@@ -7,7 +7,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from lab_environment.family import children_of, is_running
+from processes.family import children_of, is_running
 
 #: Time for a lab to end by itself [s]; a little more than inside.END_S.
 END_S = 12.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lab_class.store import HOME
-from lab_environment import isolation, ports, system_calls
 from lab_web.tokens import TOKEN, VIEW_TOKEN
+from processes import isolation, ports, system_calls
 from rf_checks import hidden
 from rf_checks.handout import STUBBED, emptied_notebook, stub
 from world_picture.results import READY, cache_folder

@@ -2,7 +2,7 @@
 """The folders of a lab that are in memory, /tmp and /dev/shm among them: their number of files, which Linux does not
 limit in a way that this user could set, and, where no control group counts it, their memory. Free of ROS; Linux only.
 """
-from lab_environment import usage
+from processes import usage
 
 #: Most files and folders of a lab in memory. Each takes a kilobyte of the kernel's.
 ENTRIES = 100_000

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from lab_class.disk import remove
 from lab_class.labs import ClassError
-from lab_environment.roster import INSTRUCTOR, Student
+from rf_checks.roster import INSTRUCTOR, Student
 
 _CLASS, _RUNNING, _LOCK = "class.json", "running.json", "lock"
 # Of a file that is being written.

@@ -27,7 +27,7 @@ from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.settling import Settling, demand_s
 from lab_class.store import HOME, RUNTIME, Store, StoreError
 from lab_class.verdicts import Verdicts
-from lab_environment.isolation import NotIsolated
+from processes.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
 _TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S = 0.2, 0.5, 2.0, 5.0

@@ -11,7 +11,7 @@ import stat
 
 from lab_web.exercises import shown_of
 
-#: The result's file below a student's home (lab_environment.page_files, where ROS_HOME is ~/.ros).
+#: The result's file below a student's home (lab_web.page_files, where ROS_HOME is ~/.ros).
 RESULT = (".ros", "lab_page", "exercise.json")
 _KEPT = "verdicts.json"
 _LARGEST_BYTES = 1 << 20

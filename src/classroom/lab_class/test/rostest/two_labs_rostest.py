@@ -23,11 +23,11 @@ import websocket
 
 from lab_class import control
 from lab_class.store import Store
-from lab_environment import isolation
-from lab_environment.family import children_of, is_running
-from lab_environment.ports import free_port
 from lab_testing.waiting import stretched, wait_until
 from lab_web import libraries
+from processes import isolation
+from processes.family import children_of, is_running
+from processes.ports import free_port
 from rf_checks.handout import SOLUTION_TAG
 
 NAMES = ("student-01", "student-02")

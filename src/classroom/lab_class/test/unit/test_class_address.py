@@ -11,7 +11,7 @@ from tornado.netutil import bind_sockets
 from lab_class import command, front_door, launching
 from lab_class.labs import ClassError, Labs, State
 from lab_class.store import ClassRecord, Options, Store, Tokens
-from lab_environment.roster import Student
+from rf_checks.roster import Student
 from world_picture.results import READY
 
 PAGE = Path(__file__).resolve().parents[2] / "page"

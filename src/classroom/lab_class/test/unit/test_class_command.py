@@ -15,8 +15,8 @@ from lab_class.disk import remove
 from lab_class.factors import factor_of
 from lab_class.store import ClassRecord, Options, Store, StoreError, default_folder
 from lab_class.supervisor import Supervisor
-from lab_environment import roster
-from lab_environment.roster import Student
+from rf_checks import roster
+from rf_checks.roster import Student
 
 
 def test_a_launch_file_of_this_folder_is_found_from_another(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from tornado.netutil import bind_sockets
 from lab_class import front_door
 from lab_class.labs import MOST_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
-from lab_environment import roster
+from rf_checks import roster
 from web_bridge import passing
 
 LIMIT_S = 20.0

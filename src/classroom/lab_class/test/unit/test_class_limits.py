@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from lab_class.launching import limited
-from lab_environment import isolation
+from processes import isolation
 
 TASKS = 40
 # Starts processes until it cannot; they wait for the end of their standard input, which they share.

@@ -11,9 +11,9 @@ from tornado.netutil import bind_sockets
 from lab_class import front_door
 from lab_class.labs import ClassError
 from lab_class.store import ClassRecord, Options
-from lab_environment import roster
 from lab_testing.browser import Browser, why_not
 from lab_testing.waiting import wait_until
+from rf_checks import roster
 
 PAGE = Path(__file__).resolve().parents[2] / "page"
 

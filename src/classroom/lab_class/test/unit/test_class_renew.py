@@ -6,7 +6,7 @@ from lab_class import front_door
 from lab_class.labs import Action, Labs, Role, State
 from lab_class.store import ClassRecord, Options
 from lab_class.supervisor import Supervisor
-from lab_environment import roster
+from rf_checks import roster
 
 
 def test_new_tokens_end_what_the_old_ones_opened():

@@ -14,8 +14,8 @@ from lab_class.lab_process import LabProcess
 from lab_class.labs import Labs, State
 from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.supervisor import Supervisor
-from lab_environment import isolation, usage
-from lab_environment.family import children_of
+from processes import isolation, usage
+from processes.family import children_of
 
 EMPTY, LARGE_BYTES = 300, 8 << 20
 # Fills folders in memory, then waits for the end of its standard input.

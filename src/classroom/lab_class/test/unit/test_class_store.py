@@ -7,7 +7,7 @@ import pytest
 
 from lab_class.labs import ClassError
 from lab_class.store import ClassRecord, Options, Store, StoreError
-from lab_environment import roster
+from rf_checks import roster
 
 
 @pytest.fixture

@@ -10,13 +10,13 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from command_line.options import MOST_SEED, MOST_WORKERS, number, seconds
+from command_line.user_files import read_file
 from lab_batch import JobError, Spec
 from lab_batch.keeping import default_memory_bytes
 from lab_batch.processes import Limits, map_seeds
-from lab_environment import isolation
-from lab_environment.options import MOST_SEED, MOST_WORKERS, number, seconds
-from lab_environment.user_files import read_file
-from lab_environment.work_folder import work_folder
+from processes import isolation
+from processes.work_folder import work_folder
 from rf_checks import similarity
 from rf_checks.command import remove_drafts, write_report
 from rf_checks.exercises import LABS, UnknownExercise

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from lab_batch import Job
-from lab_environment import isolation
+from processes import isolation
 from rf_grading import motion
 
 #: Bytes of a program's output and of its errors that the feedback shows: the end of each.

@@ -6,7 +6,7 @@ import posixpath
 import re
 from dataclasses import dataclass
 
-from lab_environment.options import did_you_mean
+from command_line.options import did_you_mean
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.submission import LARGEST_BYTES, decoded, imported
 

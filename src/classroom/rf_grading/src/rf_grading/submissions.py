@@ -12,7 +12,7 @@ from pathlib import Path
 
 import yaml
 
-from lab_environment.user_files import check_file
+from command_line.user_files import check_file
 from rf_checks import submission as files_of_programs
 from rf_grading import archives, reading
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import rostest
 
-from lab_environment import isolation
 from lab_testing.waiting import wait_until
+from processes import isolation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import class_of_thirty  # noqa: E402

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from lab_batch import JobError, Outcome
-from lab_environment import isolation
+from processes import isolation
 from rf_grading import command, keys, pages
 
 MOTION = {"times": [0.0, 1.0], "left": [[[0, 0, 0]] * 5] * 2, "right": [[[0, 0, 0]] * 5] * 2}

@@ -5,7 +5,7 @@ import sys
 import rospy
 
 import baxter_interface.startup
-from lab_environment.options import MOST_SECONDS, number
+from command_line.options import MOST_SECONDS, number
 
 from .move_service import REFUSALS
 from .traj_client import MoveFailed, TrajClient

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lab_environment.user_files import PIPE_WAIT_S, read_text
+from command_line.user_files import PIPE_WAIT_S, read_text
 
 from .errors import GoalRefused
 from .judging import judge

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import rospkg
 
-from lab_environment import isolation, page_files
-from lab_environment.isolation import NotIsolated
-from lab_environment.options import MOST_SEED, did_you_mean, number, seconds
-from lab_environment.work_folder import work_folder
+from command_line.options import MOST_SEED, did_you_mean, number, seconds
+from lab_web import page_files
+from processes import isolation
+from processes.isolation import NotIsolated
+from processes.work_folder import work_folder
 from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose, meant_instead
 from rf_checks.graph import LabFailed

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from baxter_model import SIDES
-from lab_environment.options import did_you_mean
+from command_line.options import did_you_mean
 from rf_checks import tasks, tasks_planning, tasks_printed
 
 #: Points of 100 from which an exercise counts as done.

@@ -10,7 +10,7 @@ import xmlrpc.client
 
 import rosgraph
 
-from lab_environment import master_calls
+import master_calls
 from rf_checks.recording import Changes
 
 #: Topics on which programs may publish.

@@ -14,9 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lab_environment import roster
-from lab_environment.user_files import read_file
-from rf_checks import similarity
+from command_line.user_files import read_file
+from rf_checks import roster, similarity
 
 #: Left out: solutions, and tests that contain them or their programs.
 LEFT_OUT = ("src/courses/rf_checks/exercises/solutions", "src/courses/rf_checks/test", "src/courses/rf_lab2/test",

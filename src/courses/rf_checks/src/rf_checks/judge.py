@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lab_environment import isolation
+from processes import isolation
 from rf_checks import diagnosis, submission
 from rf_checks.exercises import meant_instead
 from rf_checks.graph import LabFailed, MasterSilent

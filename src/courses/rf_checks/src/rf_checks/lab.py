@@ -23,9 +23,9 @@ import rospkg
 from roslib.packages import find_node
 
 from baxter_model import SIDES
-from lab_environment import isolation
-from lab_environment.family import children_of, direct_children, is_running, with_parent
-from lab_environment.ports import free_port
+from processes import isolation
+from processes.family import children_of, direct_children, is_running, with_parent
+from processes.ports import free_port
 from rf_checks import hidden
 from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch

@@ -9,7 +9,7 @@ import contextlib
 import os
 import time
 
-from lab_environment.family import children_of
+from processes.family import children_of
 
 #: Processor time per record [s] for which a busy program, and its helpers, delay the world.
 PROGRAM_ALLOWANCE_S = 0.04

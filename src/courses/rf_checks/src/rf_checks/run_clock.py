@@ -80,6 +80,6 @@ def _new_page():
     except OSError as error:
         if error.errno != errno.ENOSYS:
             raise
-    # In the lab of a class (lab_environment.system_calls), where programs are their author's own risk.
+    # In the lab of a class (processes.system_calls), where programs are their author's own risk.
     with tempfile.TemporaryFile(dir="/dev/shm") as file:
         return os.dup(file.fileno()), False

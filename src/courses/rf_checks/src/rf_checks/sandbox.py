@@ -18,9 +18,9 @@ import threading
 import time
 from pathlib import Path
 
-import lab_environment
-from lab_environment import isolation, system_calls, usage
-from lab_environment.family import children_of, direct_children, is_running, memory_exceeds, with_parent
+import rospy_fixes
+from processes import isolation, system_calls, usage
+from processes.family import children_of, direct_children, is_running, memory_exceeds, with_parent
 from rf_checks import hidden, submission
 
 CPU_S = 120
@@ -70,7 +70,7 @@ class Startup:
 
         Python runs the first sitecustomize.py of all folders. The lab's runs the next one after its own work.
         """
-        return os.pathsep.join(filter(None, (str(Path(lab_environment.__file__).parents[1]), folder, python_path)))
+        return os.pathsep.join(filter(None, (str(Path(rospy_fixes.__file__).parents[1]), folder, python_path)))
 
 
 class Student:

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import rostest
 
-from lab_environment import isolation
 from lab_testing.skipping import skip
+from processes import isolation
 
 isolation.try_to_enter_network()  # before any library starts threads
 

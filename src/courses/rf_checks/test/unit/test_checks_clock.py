@@ -102,7 +102,7 @@ def test_the_labs_own_environment_is_there_as_well(clock, tmp_path):
     (tmp_path / "rospy/client.py").write_text("def init_node(name):\n    return name\n")
     # A user's own sitecustomize must not disturb either.
     (tmp_path / "sitecustomize.py").write_text("print('not this one')\n")
-    text = ("import time, rospy, lab_environment.first_clock as first_clock\n"
+    text = ("import time, rospy, rospy_fixes.first_clock as first_clock\n"
             "print(rospy.init_node.__wrapped__.__module__, type(time.sleep).__name__, first_clock.time is time)")
     with start(clock, text, tmp_path) as program:
         assert program.stdout.read() == "rospy.client method True\n"

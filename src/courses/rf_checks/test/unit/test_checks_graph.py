@@ -3,8 +3,8 @@
 import pytest
 from rosmaster.master import Master
 
-from lab_environment import master_calls
-from lab_environment.ports import free_port
+import master_calls
+from processes.ports import free_port
 from rf_checks import graph as graph_module
 from rf_checks.graph import Graph, LabFailed, flat
 

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from lab_environment import family, isolation
 from lab_testing.waiting import wait_until
+from processes import family, isolation
 from rf_checks import hidden, pacing, sandbox
 from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
 

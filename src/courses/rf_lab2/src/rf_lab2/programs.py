@@ -27,7 +27,7 @@ def run(node_name, body):
     except BrokenPipeError as error:
         if error.errno == errno.ESHUTDOWN:  # Ctrl-C while the SDK waited
             return 130
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (ProgramFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1

@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from lab_environment.options import MOST_SEED, MOST_WORKERS, counted, did_you_mean, number, seconds
+from command_line.options import MOST_SEED, MOST_WORKERS, counted, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
@@ -272,7 +272,7 @@ def main(argv=None):
             return 0
         return run(options)
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (JobError, RecordsError, OSError) as error:
         print("batch: %s" % error, file=sys.stderr)
         return 1

@@ -12,7 +12,7 @@ import signal
 import time
 from pathlib import Path
 
-from lab_environment.family import children_of, memory_exceeds
+from processes.family import children_of, memory_exceeds
 
 #: Exit code of a keeper that has ended its worker for its memory.
 TOO_MUCH_MEMORY = 238

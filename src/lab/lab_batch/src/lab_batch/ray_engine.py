@@ -8,7 +8,7 @@ from pathlib import Path
 
 import psutil
 
-from lab_environment.work_folder import claimed_folder
+from processes.work_folder import claimed_folder
 
 from . import keeping, on_first_use
 from .job import JobError, Outcome, load, run_episode

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from lab_environment.options import MOST_WORKERS, number
+from command_line.options import MOST_WORKERS, number
 
 from . import ray_engine
 from .job import JobError

@@ -10,8 +10,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from lab_environment.family import with_parent
-from lab_environment.ports import free_port
+from processes.family import with_parent
+from processes.ports import free_port
 
 from .job import Job
 

@@ -11,8 +11,8 @@ import pytest
 
 from lab_batch import JobError, Spec, command, keeping
 from lab_batch.processes import Limits, map_seeds
-from lab_environment.family import is_running
 from lab_testing.waiting import wait_until
+from processes.family import is_running
 
 HERE = Path(__file__).parent
 # A worker starts in a new Python, which reads the jobs from this folder.

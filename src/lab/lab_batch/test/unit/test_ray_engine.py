@@ -102,7 +102,7 @@ class LateRay:
 
 
 HOLDS = """import signal, sys, tempfile
-from lab_environment.work_folder import claimed_folder
+from processes.work_folder import claimed_folder
 tempfile.tempdir = sys.argv[1]
 with claimed_folder("ray-") as folder:
     print(folder, flush=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import rospy
 
 from baxter_interface import startup
-from lab_environment.options import number, seconds
+from command_line.options import number, seconds
 
 from . import show
 
@@ -96,7 +96,7 @@ def main():
         else:
             print(shown)
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (OSError, ValueError, show.ShowError, rospy.ROSException) as error:
         print("show: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1

@@ -16,8 +16,9 @@ import rospy
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
-from lab_environment import keeper, page_files
-from lab_environment.ports import free_port
+from lab_web import page_files
+from processes import keeper
+from processes.ports import free_port
 
 from .labs import LABS
 

@@ -24,8 +24,7 @@ from tornado import netutil
 
 from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
-from lab_environment import jupyter, page_files, ports
-from lab_environment.simulator_start import SimulatorDied, StartWatch
+from lab_web import jupyter, page_files
 from lab_web.buttons import Buttons
 from lab_web.comparison import Comparison, findings_of
 from lab_web.errands import Errands
@@ -49,10 +48,11 @@ from lab_web.sim_clock import LINGER_S, SimClock
 from lab_web.simulation import Simulation
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
-from rospy_limits.node import limit_ports
-from rospy_limits.rest import Demand
-from rospy_limits.threads import lasting
-from rospy_start import end_on_signals
+from master_calls.simulator_start import SimulatorDied, StartWatch
+from processes import ports
+from rospy_fixes.ports.threads import lasting
+from rospy_nodes.rest import Demand
+from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge import ros_graph
 from web_bridge.access import Access
 from web_bridge.cameras import Cameras

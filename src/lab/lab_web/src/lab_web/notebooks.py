@@ -12,7 +12,7 @@ import threading
 from pathlib import Path
 from urllib.parse import unquote, urlencode
 
-from lab_environment import jupyter
+from lab_web import jupyter
 from web_bridge import http_text
 from web_bridge.errors import Refused
 from web_bridge.passing import PassingHandler

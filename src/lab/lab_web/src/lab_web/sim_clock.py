@@ -7,7 +7,7 @@ import time
 import rospy
 from rosgraph_msgs.msg import Clock
 
-from rospy_limits.rest import Demand
+from rospy_nodes.rest import Demand
 
 #: How long topics are still read when nobody needs them any more: a page that is loaded again finds all as it was [s].
 LINGER_S = 10.0

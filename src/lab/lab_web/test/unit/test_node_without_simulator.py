@@ -18,11 +18,11 @@ import rosgraph
 import websocket
 from fake_move_group import BLOCKED_RAD, ENDLESS_RAD, IN_COLLISION
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import stretched, wait_until
 from lab_web.control import HEARTBEAT_S
 from lab_web.libraries import LibrariesError, fetched
 from lab_web.serving import SCREEN
+from processes.ports import free_port
 from world_picture.snapshot import SnapshotWriter
 
 HERE = Path(__file__).resolve().parent

@@ -11,8 +11,8 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_unix_socket
 from tornado.websocket import WebSocketHandler
 
-from lab_environment.jupyter import JupyterError
 from lab_testing.waiting import stretched, wait_until
+from lab_web.jupyter import JupyterError
 from lab_web.notebooks import Door, NotebookHandler, Notebooks, labs_notebooks
 from web_bridge.access import Access
 from web_bridge.loop_thread import LoopThread
@@ -56,7 +56,7 @@ class Anything(web.RequestHandler):
 
 
 class JupyterServer:
-    """As lab_environment.jupyter.Server; ``asked``: the requests that reached it."""
+    """As lab_web.jupyter.Server; ``asked``: the requests that reached it."""
 
     def __init__(self, loop, path):
         self.has_ended = False

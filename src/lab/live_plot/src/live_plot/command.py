@@ -9,11 +9,11 @@ import time
 import rosgraph
 import rospy
 
-from lab_environment.options import counted, seconds
+from command_line.options import counted, seconds
 from live_plot import fields
 from live_plot.recording import Recording
 from live_plot.subscriptions import Subscriptions, topic_types
-from rospy_limits.node import limit_ports
+from rospy_nodes.start import limit_ports
 
 POLL_S = 0.2
 END_POLL_MS = 50

@@ -10,8 +10,7 @@ import time
 import rospy
 from sensor_msgs.msg import Joy
 
-from rospy_limits.node import limit_ports
-from rospy_start import end_on_signals
+from rospy_nodes.start import end_on_signals, limit_ports
 from steering_devices.hands import Hands
 from steering_devices.steering import Gamepad, LayoutError, Steering
 

@@ -9,7 +9,7 @@ import time
 
 import rospy
 
-from rospy_limits.node import limit_ports
+from rospy_nodes.start import limit_ports
 from steering_devices.hands import Hands
 from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
 

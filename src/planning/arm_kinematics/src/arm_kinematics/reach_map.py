@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from arm_kinematics.reach import ReachError
-from lab_environment.user_files import check_file
+from command_line.user_files import check_file
 from urdf_model.transforms import quaternion_from_matrix
 
 # Rows that are written to HDF5 at a time.

@@ -8,8 +8,8 @@ import sys
 import pytest
 
 import arm_kinematics
-import lab_environment
-import numba_cache
+import command_line
+import disk_cache
 import urdf_model
 
 # A kernel that calls some of other files; how far its tip is from the base; how often it came from the cache.
@@ -35,7 +35,7 @@ def copy(tmp_path):
     """A copy of the package that may be changed; run(code) -> the lines that it prints."""
     site = tmp_path / "site"
     package = site / "arm_kinematics"
-    for module in (arm_kinematics, numba_cache, urdf_model, lab_environment):
+    for module in (arm_kinematics, command_line, disk_cache, urdf_model):
         shutil.copytree(source_of(module), site / module.__name__, ignore=shutil.ignore_patterns("__pycache__"))
 
     def run(code=_POSE_ERROR, **environment):

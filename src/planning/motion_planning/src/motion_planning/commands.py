@@ -6,7 +6,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from lab_environment.options import MOST_SEED, number
+from command_line.options import MOST_SEED, number
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
 from motion_planning.exact import ExactChecker
@@ -50,7 +50,7 @@ def collisions_updater(arguments=None):
         else:
             (options.output or options.srdf).write_text(with_disabled_pairs(text, pairs), encoding="utf-8")
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (ValueError, OSError) as error:
         print("collisions_updater: %s" % error, file=sys.stderr)
         return 1
@@ -80,7 +80,7 @@ def _prepare_one(path):
         prepare(exact)
         left = sphere_model_of(exact).not_kept()
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (ValueError, OSError) as error:
         return "%s: %s" % (path, error)
     if left:

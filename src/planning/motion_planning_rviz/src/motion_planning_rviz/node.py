@@ -22,8 +22,7 @@ from motion_planning_rviz.messages import matrix_of, state_values, tells_joints_
 from motion_planning_rviz.panel import Panel
 from motion_planning_rviz.view import View
 from motion_planning_rviz.worker import Worker
-from rospy_limits.node import limit_ports
-from rospy_start import MissingParameter, end_on_signals, wait_for_param
+from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
 # Wall time to wait for the robot's model, and between two log lines about waiting for move_group [s].
 _DESCRIPTION_TIMEOUT_S, _TOLD_EVERY_S = 60.0, 10.0

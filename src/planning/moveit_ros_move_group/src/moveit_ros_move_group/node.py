@@ -6,6 +6,7 @@ import sys
 
 import rospy
 
+from disk_cache import compiler_pages
 from model_files.resources import ResourceFinder
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
@@ -22,9 +23,7 @@ from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
 from moveit_ros_move_group.ros_control import RosControl
 from moveit_ros_move_group.sensors import Sensors
-from numba_cache import compiler_pages
-from rospy_limits.node import limit_ports
-from rospy_start import MissingParameter, end_on_signals, wait_for_param
+from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
 # Wall time to wait for the robot's model [s].
 _DESCRIPTION_TIMEOUT_S = 60.0

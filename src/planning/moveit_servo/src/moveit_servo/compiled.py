@@ -2,7 +2,7 @@
 """Compilation of the inner loops of this package."""
 from pathlib import Path
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 #: Decorates a function: compiled at its first call, or loaded from the cache if the files have not changed.
 compiled = compiler("moveit_servo", [Path(__file__).with_name(name) for name in ("gaps.py", "quadratic.py")],

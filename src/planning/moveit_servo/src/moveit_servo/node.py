@@ -26,6 +26,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Int8, String
 from std_srvs.srv import Empty, EmptyResponse
 
+from disk_cache import compiler_pages
 from model_files.resources import ResourceFinder
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
@@ -39,10 +40,8 @@ from moveit_servo.servo import Command, Servo, Status
 from moveit_servo.settings import ServoSettings, SettingsError
 from moveit_servo.surroundings import Surroundings
 from moveit_servo.warming import warm_up
-from numba_cache import compiler_pages
-from rospy_limits.node import limit_ports
-from rospy_limits.threads import ThreadFaults, lasting
-from rospy_start import MissingParameter, end_on_signals, wait_for_param
+from rospy_fixes.ports.threads import ThreadFaults, lasting
+from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
 # Wall time to wait for the robot's model, and for all of the arm's joint states until that is complained of [s].
 _DESCRIPTION_TIMEOUT_S, _JOINTS_TIMEOUT_S = 60.0, 10.0

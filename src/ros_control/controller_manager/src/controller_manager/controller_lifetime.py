@@ -23,7 +23,7 @@ from controller_manager_msgs.srv import (
 )
 from std_msgs.msg import Bool
 
-from rospy_limits.node import limit_ports
+from rospy_nodes.start import limit_ports
 from urdf_model import bounds, read_text
 
 # Polling period, and how long a signal may wait [wall s].

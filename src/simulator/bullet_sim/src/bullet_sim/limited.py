@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 
-from lab_environment.priority import as_before, give_way
+from processes.priority import as_before, give_way
 
 #: Limits of a call: processor time [s], additional memory [bytes], and the wall time in which it must get on [s].
 PROCESSOR_S = 4

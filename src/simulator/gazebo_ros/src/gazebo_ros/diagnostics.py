@@ -3,7 +3,7 @@
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from gazebo_ros.pacing import ticks_between
-from rospy_limits.threads import STATUS_NAME
+from rospy_fixes.ports.threads import STATUS_NAME
 from sim_time.stamps import stamp_ns
 
 RATE_HZ = 1.0
@@ -18,7 +18,7 @@ class Diagnostics:
     """Call :meth:`on_tick` after each tick."""
 
     def __init__(self, simulation, faults, threads, ros):
-        """``faults``: :class:`loop_ros.faults.Faults`; ``threads``: :class:`rospy_limits.threads.ThreadFaults`."""
+        """``faults``: :class:`loop_ros.faults.Faults`; ``threads``: :class:`rospy_fixes.ports.threads.ThreadFaults`."""
         self._simulation = simulation
         self._faults = faults
         self._threads = threads

@@ -27,15 +27,15 @@ from gazebo_ros.simulation import Simulation
 from gazebo_ros.spawning import Library, Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
-from lab_environment.single_instance import refusal, running_instance
 from loop_ros.faults import Faults
 from loop_ros.log import LoopLog
 from loop_ros.publisher import PublisherHub
 from loop_ros.request_queue import RequestQueue
 from loop_ros.ros_objects import RosObjects
 from loop_ros.subscriber import SubscriberHub
+from master_calls.single_instance import refusal, running_instance
 from model_files.resources import ResourceFinder, model_folders, model_sizes, plugin_tables, resource_folders
-from rospy_limits.node import limit_ports
+from rospy_nodes.start import limit_ports
 from sdf_model import ModelFolders
 from world_picture import snapshot
 from world_picture.snapshot import SnapshotError

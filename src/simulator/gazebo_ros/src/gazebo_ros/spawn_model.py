@@ -15,10 +15,10 @@ import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import Empty
 
+from command_line.user_files import PIPE_WAIT_S, read_text
 from gazebo_ros import gazebo_interface
 from gazebo_ros.urdf_extras import ExtrasError, unscoped, with_start_configuration
-from lab_environment.simulator_start import SPAWNING
-from lab_environment.user_files import PIPE_WAIT_S, read_text
+from master_calls.simulator_start import SPAWNING
 from model_files.resources import model_folders
 from sdf_model import description_file
 from urdf_model import bounds

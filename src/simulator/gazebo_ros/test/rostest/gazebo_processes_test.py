@@ -14,8 +14,8 @@ import rospy
 import rostest
 from gazebo_msgs.srv import GetWorldProperties
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 from world_picture import snapshot
 
 DEADLINE_S = 60.0

@@ -14,8 +14,8 @@ from xmlrpc.client import ServerProxy
 import rosgraph
 import rostest
 
-from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from processes.ports import free_port
 
 DEADLINE_S = 60.0
 # ROS's own, called by its full path.

@@ -6,8 +6,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from gazebo_ros.diagnostics import MESSAGES, Diagnostics
 from loop_ros.faults import Faults
-from rospy_limits.event_log import EventLog
-from rospy_limits.threads import ThreadFaults
+from rospy_fixes.ports.event_log import EventLog
+from rospy_fixes.ports.threads import ThreadFaults
 
 
 def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():

@@ -12,9 +12,9 @@ import rospkg
 import rospy
 import yaml
 
-from lab_environment.priority import give_way
 from model_files.resources import ResourceFinder
-from rospy_limits.node import limit_ports
+from processes.priority import give_way
+from rospy_nodes.start import limit_ports
 from sensor_renderer.best import best_renderer
 from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter

@@ -16,8 +16,8 @@ import subprocess
 import sys
 import time
 
-from lab_environment.family import with_parent
-from lab_environment.priority import give_way
+from processes.family import with_parent
+from processes.priority import give_way
 
 #: Niceness of programs that draw. Beside programs that take all they get, a group of the lowest priority has 1.5 % of a
 #: processor, and a camera's first picture took a minute; one of this priority has 10 %.

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from lab_environment.family import is_running
 from lab_testing.waiting import wait_until
+from processes.family import is_running
 
 # It counts on one processor, the first of those allowed, and says when it begins.
 SPIN = """

@@ -11,8 +11,8 @@ import rosgraph
 import rosnode
 import rospy
 
-from lab_environment.priority import give_way
-from rospy_limits.node import limit_ports
+from processes.priority import give_way
+from rospy_nodes.start import limit_ports
 from sensor_renderer.priority import DRAWING
 
 _NAME = "gazebo_gui"

@@ -10,8 +10,7 @@ from visualization_msgs.msg import InteractiveMarkerInit, InteractiveMarkerUpdat
 
 from interactive_marker_proxy.mirror import MarkerMirror, moved
 from interactive_marker_proxy.srv import GetInit
-from rospy_limits.node import limit_ports
-from rospy_start import end_on_signals
+from rospy_nodes.start import end_on_signals, limit_ports
 
 
 class Proxy:

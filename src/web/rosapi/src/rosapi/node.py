@@ -11,8 +11,7 @@ import rosservice
 
 from rosapi import msg, queries, srv
 from rosapi.typedefs import definitions
-from rospy_limits.node import limit_ports
-from rospy_start import end_on_signals
+from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge.access import is_token, patterns_of, without_tokens
 from web_bridge.errors import BridgeError
 from web_bridge.ros_graph import message_class, service_class

@@ -6,8 +6,7 @@ import actionlib
 import rospy
 import tf2_ros
 
-from rospy_limits.node import limit_ports
-from rospy_start import end_on_signals
+from rospy_nodes.start import end_on_signals, limit_ports
 from tf2_web_republisher.msg import TFArray, TFSubscriptionAction, TFSubscriptionFeedback
 from tf2_web_republisher.srv import RepublishTFs
 from tf2_web_republisher.watch import Audience, FrameWatch, Schedule, period_of

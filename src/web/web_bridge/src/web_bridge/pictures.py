@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from lab_environment.user_files import check_picture
+from command_line.user_files import check_picture
 from web_bridge.errors import BridgeError
 
 #: Quality of a JPEG, 0 to 100, and compression of a PNG, 0 to 9, where a client does not say them.

@@ -4,8 +4,7 @@ import ssl
 
 import rospy
 
-from rospy_limits.node import limit_ports
-from rospy_start import end_on_signals
+from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge import ros_graph
 from web_bridge.memory import return_large_blocks
 from web_bridge.parameters import ParameterError

@@ -4,7 +4,7 @@ import ssl
 
 from tornado import httpserver, netutil
 
-from lab_environment.hidden_tokens import hide_in_logs
+from rospy_fixes.hidden_tokens import hide_in_logs
 
 #: Connections that are no WebSocket: streams of cameras, files, clients that have not asked for anything yet. They need
 #: no token, so their number and their memory are limited.

@@ -7,8 +7,8 @@ import roslib.message
 
 from baxter_model import ModelError
 from baxter_model.self_collision import spawn_options
+from disk_cache import compiler_pages
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
-from numba_cache import compiler_pages
 
 from . import compiled, effects, individual
 from .errors import HardwareError

@@ -13,7 +13,7 @@ from arm_kinematics.ik import solve_all
 from arm_kinematics.reach import yoshikawa
 from arm_kinematics.target import Target, pose_from_quaternion
 from baxter_model import BASE_FRAME, SIDES, poses, tip_of
-from lab_environment.options import number
+from command_line.options import number
 from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
@@ -55,7 +55,7 @@ def run_command(main):
     try:
         return main()
     except BrokenPipeError:
-        raise  # of the standard output: lab_environment ends the program without a word
+        raise  # of the standard output: rospy_fixes ends the program without a word
     except (KinematicsError, UrdfError, OSError, ValueError) as error:
         print("%s: %s" % (Path(sys.argv[0]).name, error), file=sys.stderr)
         return 1

@@ -24,8 +24,8 @@ from baxter_sim_kinematics.commands import (
     tell,
     with_numbers,
 )
-from lab_environment.options import MOST_WORKERS, number
-from lab_environment.user_files import PIPE_WAIT_S, read_text
+from command_line.options import MOST_WORKERS, number
+from command_line.user_files import PIPE_WAIT_S, read_text
 
 # Of a file of poses.
 MOST_BYTES = 100_000_000

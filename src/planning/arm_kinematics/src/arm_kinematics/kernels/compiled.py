@@ -2,7 +2,7 @@
 """Compile the functions of this package, and keep the result in numba's cache."""
 from pathlib import Path
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 #: Decorates a function: compiled at the first call, or loaded from the cache if these files are unchanged. Division
 #: follows the processor, without a check for zero: a tenth faster, the same bits.

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from disk_cache.compiled import compiler
 from motion_planning.model import kernels as model_kernels
 from motion_planning.model.kernels import fill_frames
-from numba_cache import compiler
 
 compiled = compiler("motion_planning_exact", [Path(__file__), Path(model_kernels.__file__)], nogil=True,
                     error_model="numpy")

@@ -2,7 +2,7 @@
 """Compiled forward kinematics of a whole robot."""
 import math
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 compiled = compiler("motion_planning_model", [__file__], nogil=True, error_model="numpy")
 

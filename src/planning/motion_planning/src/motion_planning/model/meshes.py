@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from disk_cache.compiled import folder
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh
-from numba_cache import folder
 
 
 class MeshUnreadable(PlanningError):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 #: Kinds of solids.
 BOX, CYLINDER, BALL = 0, 1, 2

@@ -2,7 +2,7 @@
 """Compilation of the inner loops of this package, and the cache of compiled code."""
 from pathlib import Path
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 _PACKAGE = Path(__file__).parents[1]
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from disk_cache.compiled import folder
 from motion_planning.errors import PlanningError
 from motion_planning.exact.geometry import bounds_of
 from motion_planning.shapes import TriangleMesh
@@ -25,7 +26,6 @@ from motion_planning.spheres.cover import (
     used_corners,
     voxels,
 )
-from numba_cache import folder
 from urdf_model import Box, Cylinder, Mesh
 
 #: How far a sphere may reach beyond the geometry [m]; for thin geometry, this share of its thinnest half side, ...

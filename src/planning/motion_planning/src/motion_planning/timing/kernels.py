@@ -2,7 +2,7 @@
 """Compiled inner loops: the time-optimal profile, and splines through given points."""
 import numpy as np
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 _compiled = compiler("motion_planning_timing", [__file__], nogil=True)
 _TINY = 1e-12

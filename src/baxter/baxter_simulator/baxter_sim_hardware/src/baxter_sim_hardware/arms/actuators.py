@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_sim_hardware import effects
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 

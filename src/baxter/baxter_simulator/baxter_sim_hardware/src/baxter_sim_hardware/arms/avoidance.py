@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_model import self_collision
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__, self_collision.__file__], error_model="numpy")
 

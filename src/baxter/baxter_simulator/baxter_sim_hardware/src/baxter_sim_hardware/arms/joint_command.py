@@ -13,8 +13,8 @@ from enum import IntEnum
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
-from lab_environment.options import counted
-from numba_cache import compiler
+from command_line.options import counted
+from disk_cache.compiled import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 

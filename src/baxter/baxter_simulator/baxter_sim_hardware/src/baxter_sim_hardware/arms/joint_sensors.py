@@ -11,7 +11,7 @@ import numpy as np
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.individual import DRAWING, drawn
 from baxter_sim_hardware.numbered_random import NumberedRandom
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from numba_cache import compiler
+from disk_cache.compiled import compiler
 
 from .joint_modes import POSITION, RAW_POSITION, VELOCITY
 

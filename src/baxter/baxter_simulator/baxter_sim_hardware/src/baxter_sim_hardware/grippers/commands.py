@@ -5,7 +5,7 @@ import math
 from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.arms.hand_load import read_load
 from baxter_sim_hardware.errors import CommandRefused
-from rospy_limits.json_object import JsonRefused, read_object
+from rospy_nodes.json_object import JsonRefused, read_object
 
 #: Longest name of a sender, which is part of every state message [characters].
 LONGEST_SENDER = 1000
@@ -38,7 +38,7 @@ class Gripper:
     def take(self, command, args, sender, sequence, enabled):
         """One command message.
 
-        args: JSON object (see rospy_limits.json_object) or empty. sender, sequence: a client's mark; commands of ONCE
+        args: JSON object (see rospy_nodes.json_object) or empty. sender, sequence: a client's mark; commands of ONCE
         with the same mark are repetitions of one command, which the SDK sends until it sees the effect. Raises
         CommandRefused for an unknown command, for invalid arguments, and for commands that need power while the robot
         is not enabled.

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Command lines: words, files and waits. Free of ROS."""

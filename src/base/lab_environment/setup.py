@@ -1,5 +1,0 @@
-# SPDX-License-Identifier: BSD-3-Clause
-from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
-
-setup(**generate_distutils_setup(packages=["lab_environment"], package_dir={"": "src"}))

@@ -1,6 +1,0 @@
-# SPDX-License-Identifier: BSD-3-Clause
-from distutils.core import setup
-
-from catkin_pkg.python_setup import generate_distutils_setup
-
-setup(**generate_distutils_setup(packages=["rospy_limits"], package_dir={"": "src"}))
