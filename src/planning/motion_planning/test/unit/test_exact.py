@@ -6,8 +6,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from motion_planning.exact import ExactChecker
-from motion_planning.exact.geometry import plane_overlap
+from motion_planning.exact import ExactChecker, apart
+from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of, plane_overlap
 from motion_planning.model import MeshUnreadable, ModelError, PlanningModel
 from motion_planning.scene import OCTOMAP, AllowedCollisions, Cone, Octree, Scene, TriangleMesh, WorldObject
 from urdf_model import Box, Cylinder, Plane, Sphere
@@ -394,3 +394,57 @@ def test_the_quick_way_finds_what_a_check_of_every_pair_finds(baxter, meshes):
         expected = {(a.name, b.name) for j, (b, second) in enumerate(objects) for a, first in objects[:j]
                     if a.name != b.name and fcl.collide(first, second)}
         assert {(one.a, one.b) for one in exact.contacts(scene, state, most=10_000)} == expected
+
+
+def ball_of_triangles(radius, around=12):
+    """A TriangleMesh of a sphere."""
+    height, turn = np.meshgrid(np.linspace(0.0, math.pi, around), np.linspace(0.0, 2.0 * math.pi, 2 * around))
+    points = radius * np.stack([np.sin(height) * np.cos(turn), np.sin(height) * np.sin(turn), np.cos(height)], axis=-1)
+    k = np.arange(len(points.reshape(-1, 3))).reshape(points.shape[:2])
+    squares = np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return TriangleMesh(points.reshape(-1, 3), np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]))
+
+
+MANY = {"box": Box((0.3, 0.1, 0.2)), "sphere": Sphere(0.15), "cylinder": Cylinder(0.08, 0.4), "cone": Cone(0.15, 0.3),
+        "mesh": ball_of_triangles(0.2), "octree": SHAPES["octree"]}
+
+
+@pytest.mark.parametrize("mine", MANY)
+@pytest.mark.parametrize("other", MANY)
+def test_a_proof_is_right_and_found_where_there_is_room(mine, other):
+    import fcl
+
+    rng = np.random.default_rng(3)
+    stack = apart.stack()
+    forms, fcl_shapes, bounds = [], [], []
+    for shape in (MANY[mine], MANY[other]):
+        bounds.append(bounds_of(shape))
+        kind, nodes = form_of(shape, bounds[-1])
+        forms.append((np.array([kind]), np.array([0]), np.array([len(nodes)]), nodes))
+        fcl_shapes.append(fcl_geometry(shape))
+    proven = needed = 0
+    for _ in range(400):
+        turns = [axis_rotation(axis / np.linalg.norm(axis), angle)
+                 for axis, angle in zip(rng.normal(size=(2, 3)), rng.uniform(-3.0, 3.0, 2), strict=True)]
+        places = [rng.uniform(-0.3, 0.3, 3) for _ in range(2)]
+        there = [fcl.CollisionObject(shape, fcl.Transform(turn, place))
+                 for shape, turn, place in zip(fcl_shapes, turns, places, strict=True)]
+        centres = [place + turn @ bound.centre for place, turn, bound in zip(places, turns, bounds, strict=True)]
+        found = apart.pair_apart(forms[0], 0, turns[0], centres[0], forms[1], 0, turns[1], centres[1], stack)
+        touch = fcl.collide(*there)
+        assert not (found and touch)
+        if not touch and fcl.distance(*there) > 0.02:
+            needed += 1
+            proven += found
+    # A tree of boxes is not searched for longer than FCL would take.
+    assert needed > 20 and proven >= 0.6 * needed
+
+
+def test_what_is_clearly_apart_is_not_asked_about(monkeypatch):
+    """A rod on end beside a corner of a box: the boxes around the two overlap."""
+    scene, exact = slider("cylinder")
+    scene = scene.with_object(thing(Box((0.2, 0.2, 0.2)), 0.19, 0.19))
+    assert exact.distance(scene) == pytest.approx(math.hypot(0.09, 0.09) - 0.1, abs=1e-4)
+    monkeypatch.setattr(exact, "_touches", lambda *pair: pytest.fail("FCL was asked about %s" % (pair[1:],)))
+    assert exact.free(scene)
+    assert exact.first_blocked(scene, np.tile(scene.state.q, (100, 1))) is None

@@ -14,15 +14,17 @@ import numpy as np
 from motion_planning.errors import PlanningError
 from motion_planning.exact import kernels
 from motion_planning.exact.geometry import grown, plane_overlap
-from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part
+from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, seats_of
 from motion_planning.model import ModelError
 from motion_planning.shapes import TriangleMesh
 from urdf_model import Mesh, Plane
 
 #: Number of cached tables of scenes: a scene and its few successors are checked many times.
 _KEPT = 12
-# Number of shapes that are made between two looks at the clock.
+# Number of shapes that are made between two looks at the clock; of postures that are checked at once, the first time
+# and afterwards: where one is in collision, the first ones often are.
 _AT_ONCE = 16
+_FIRST_POSTURES, _POSTURES = 8, 64
 _ANY = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 _ALL = fcl.CollisionRequest(num_max_contacts=50, enable_contact=True)
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True)
@@ -72,10 +74,11 @@ class ExactChecker:
         self.model, self.meshes = model, meshes
         self.warnings = []
         self._geometries = Geometries()
+        self._kinematics, self._seats = seats_of(model.kinematics)
         self._lock = threading.Lock()
         self._tables = OrderedDict()
         self._robot = self._robot_parts(meshes)
-        self._pairs = np.empty((256, 2), dtype=np.int64)
+        self._rows = np.empty((256, 3), dtype=np.int64)
         # Shapes of the robot that no joint moves.
         self._still = frozenset(k for k, part in enumerate(self._robot) if not any(
             joint.movable for joint in model.robot.chain(model.root, part.name)))
@@ -87,10 +90,7 @@ class ExactChecker:
         """
         with self._lock:
             query = self._query(scene, state, group)
-            for i, j in self._near(query):
-                if self._touches(query, i, j):
-                    return False
-        return True
+            return not any(self._touches(query, i, j) for i, j in self._near(query))
 
     def first_blocked(self, scene, postures, group=None):
         """Return the index of the first of ``postures`` that is in collision, None if all are free.
@@ -114,10 +114,16 @@ class ExactChecker:
                              % np.flatnonzero(~np.isfinite(whole).all(axis=1))[0])
         with self._lock:
             query = self._query(scene, None, group)
-            for number, q in enumerate(whole):
-                query.move(q, self._still)
-                if any(self._touches(query, i, j) for i, j in self._near(query)):
-                    return number
+            begin, count = 0, _FIRST_POSTURES
+            while begin < len(whole):
+                placed = -1
+                for number, i, j in self._unproven(query, whole[begin : begin + count]):
+                    if placed != number:
+                        query.move(whole[begin + number], self._still)
+                        placed = number
+                    if self._touches(query, i, j):
+                        return begin + number
+                begin, count = begin + count, _POSTURES
         return None
 
     def contacts(self, scene, state=None, group=None, most=100):
@@ -156,7 +162,7 @@ class ExactChecker:
         best = None
         with self._lock:
             query = self._query(scene, state, group)
-            rows, least = kernels.gaps(query.robot, query.movers.arrays, query.pairs, query.active,
+            rows, least = kernels.gaps(query.robot, query.movers.arrays, query.pairs, query.moving[1],
                                        query.fixed.arrays, query.poses)
             for k in np.argsort(least, kind="stable"):
                 if best is not None and least[k] >= best.distance:
@@ -183,6 +189,7 @@ class ExactChecker:
                 with self._lock:
                     for shape in shapes[begin : begin + _AT_ONCE]:
                         self._geometries.of(shape)
+                        self._geometries.geometry(shape)
         check()
         with self._lock:
             self._query(scene, None, group)
@@ -197,21 +204,27 @@ class ExactChecker:
             raise ModelError("joint values are not all finite: %s" % dict(zip(self.model.variables, q.tolist(),
                                                                               strict=True)))
         movers = self._movers(scene, state)
-        pairs, active, memory = self._pairing(scene, movers, group)
+        pairs, moving, memory = self._pairing(scene, movers, group)
         base = np.array(state.base)
         if not math.isfinite(base.sum()):
             raise ModelError("the pose of link '%s' is not finite: %s" % (self.model.root, base.tolist()))
-        return _Query((self.model.kinematics, q, base), movers, pairs, active,
+        return _Query((self._kinematics, q, base), movers, pairs, moving,
                       self._fixed(scene), scene.allowed, memory)
 
     def _near(self, query):
-        """List of [i, j] that are near each other, as from kernels.near, without allowed pairs."""
-        arguments = query.robot, query.movers.arrays, query.pairs, query.active, query.fixed.arrays, query.poses
-        count = kernels.near(*arguments, self._pairs)
-        if count > len(self._pairs):
-            self._pairs = np.empty((2 * count, 2), dtype=np.int64)
-            count = kernels.near(*arguments, self._pairs)
-        return [row for row in self._pairs[:count].tolist() if not query.may_touch(*row)]
+        """List of [i, j] that may touch, as from kernels.unproven, without allowed pairs."""
+        return [[i, j] for _, i, j in self._unproven(query, query.robot[1][None])]
+
+    def _unproven(self, query, postures):
+        """List of [number of a posture (p, n), i, j], as from kernels.unproven, without allowed pairs."""
+        kinematics, _, base = query.robot
+        arguments = ((kinematics, base), postures, query.movers.arrays, query.pairs, query.moving, query.fixed.arrays,
+                     query.poses)
+        count = kernels.unproven(*arguments, self._rows)
+        if count > len(self._rows):
+            self._rows = np.empty((2 * count, 3), dtype=np.int64)
+            count = kernels.unproven(*arguments, self._rows)
+        return [row for row in self._rows[:count].tolist() if not query.may_touch(*row[1:])]
 
     def _touches(self, query, i, j):
         a, b = query.object(i), query.object(j)
@@ -295,7 +308,8 @@ class ExactChecker:
         bodies = state.attached.values()
         held = [Part(body.id, ATTACHED, self.model.link_index[body.link], shape, body.object.pose @ pose)
                 for body in bodies for shape, pose in body.object.shapes]
-        return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies})
+        return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies},
+                      self._seats)
 
     def _pairing(self, scene, movers, group):
         held = movers, scene.allowed
@@ -303,11 +317,11 @@ class ExactChecker:
                           lambda: self._make_pairing(scene.allowed, movers, group))
 
     def _make_pairing(self, allowed, movers, group):
-        moving = None
+        moving, seats = None, np.arange(len(self._kinematics[0]))
         if group is not None:
             moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
-        active = np.array([moving is None or link in moving for link in movers.arrays[0].tolist()], dtype=bool)
-        return movers.pairs(allowed, moving), active, {}
+            seats = np.array(sorted({self._seats[link][0] for link in moving}), dtype=np.int64)
+        return movers.pairs(allowed, moving), (seats, np.flatnonzero(np.isin(movers.arrays[0], seats))), {}
 
     @staticmethod
     def _fixed_key(scene):
@@ -333,8 +347,8 @@ def _things(scene):
 class _Query:
     """One state in one scene: poses of all bodies, computed on demand."""
 
-    def __init__(self, robot, movers, pairs, active, fixed, allowed, memory):
-        self.robot, self.movers, self.pairs, self.active, self.fixed = robot, movers, pairs, active, fixed
+    def __init__(self, robot, movers, pairs, moving, fixed, allowed, memory):
+        self.robot, self.movers, self.pairs, self.moving, self.fixed = robot, movers, pairs, moving, fixed
         self.poses = np.empty((len(movers.parts), 4, 4))
         self._allowed, self._memory, self._placed = allowed, memory, set()
 
@@ -342,6 +356,7 @@ class _Query:
         """Move the robot to ``q`` (n,); movers in ``still`` keep their poses."""
         self.robot = self.robot[0], q, self.robot[2]
         self._placed &= still
+        kernels.fill_poses(self.robot, self.movers.arrays, self.poses)
 
     def may_touch(self, i, j):
         """Whether mover ``i`` may touch the fixed shape ``j`` < 0; allowed pairs of two movers are excluded before."""
@@ -356,7 +371,7 @@ class _Query:
         return self.movers.parts[j] if j >= 0 else self.fixed.parts[-1 - j]
 
     def geometry(self, j):
-        return self.movers.geometries[j] if j >= 0 else self.fixed.geometries[-1 - j]
+        return self.movers.geometries[j] if j >= 0 else self.fixed.geometry(-1 - j)
 
     def pose(self, j):
         return self.poses[j] if j >= 0 else self.fixed.poses[-1 - j]
@@ -364,7 +379,7 @@ class _Query:
     def object(self, j):
         """The fcl.CollisionObject of a mover or fixed shape at its pose, None for a plane."""
         if j < 0:
-            return None if self.fixed.geometries[-1 - j] is None else self.fixed.object(-1 - j)
+            return self.fixed.object(-1 - j)
         one = self.movers.objects[j]
         if one is not None and j not in self._placed:
             pose = self.poses[j]

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """FCL geometry of shapes, their bounding boxes, and planes without thickness, which FCL does not have."""
+import math
 from typing import NamedTuple
 
 import fcl
 import numpy as np
 
+from motion_planning.exact import apart
 from motion_planning.exact.octree import occupied_tree
 from motion_planning.shapes import Cone, Octree, TriangleMesh
 from urdf_model import Box, Cylinder, Plane, Sphere
 
+_KINDS = {Sphere: apart.SPHERE, Cylinder: apart.CYLINDER, Cone: apart.CONE, Plane: apart.PLANE}
+# The greatest number of triangles or cubes in a leaf of a shape's tree of boxes, and the most levels of such a tree.
+_IN_A_LEAF, _MOST_LEVELS = 4, 14
 #: Half the side of a plane's box [m]: larger than any scene.
 _ENDLESS = 1e6
 
@@ -48,6 +53,35 @@ def bounds_of(shape):
     if isinstance(shape, Plane):
         return Bounds(zero, np.array((_ENDLESS, _ENDLESS, 0.0)), 2.0 * _ENDLESS)
     raise TypeError("%r is not a shape that can collide" % (shape,))
+
+
+def form_of(shape, bounds):
+    """Return (kind, nodes (n, 6)) of a shape with these Bounds, see ``apart``."""
+    if not isinstance(shape, TriangleMesh | Octree):
+        return _KINDS.get(type(shape), apart.BOX), np.array([[0.0, 0.0, 0.0, *bounds.half]])
+    if isinstance(shape, TriangleMesh):
+        corners = shape.vertices[shape.triangles]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+    else:
+        side = 0.5 * shape.boxes[:, 3:]
+        low, high = shape.boxes[:, :3] - side, shape.boxes[:, :3] + side
+    levels = min(_MOST_LEVELS, max(0, math.ceil(math.log2(len(low) / _IN_A_LEAF))))
+    middle, order = low + high, np.arange(len(low))[None]
+    # Each level cuts all groups in half along their longest sides; where they are not equal, one is in both halves.
+    for _ in range(levels):
+        some = middle[order]
+        axis = np.ptp(some, axis=1).argmax(axis=1)
+        along = np.take_along_axis(some, axis[:, None, None], axis=2)[:, :, 0]
+        order = np.take_along_axis(order, np.argsort(along, axis=1, kind="stable"), axis=1)
+        half = (order.shape[1] + 1) // 2
+        order = np.stack([order[:, :half], order[:, -half:]], axis=1).reshape(-1, half)
+    low, high = low[order].min(axis=1), high[order].max(axis=1)
+    found = []
+    while True:
+        found.append(np.concatenate([0.5 * (low + high) - bounds.centre, 0.5 * (high - low)], axis=1))
+        if len(low) == 1:
+            return apart.BOX, np.concatenate(found[::-1])
+        low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
 
 
 def fcl_geometry(shape):

@@ -7,7 +7,7 @@ import fcl
 import numpy as np
 
 from motion_planning.errors import PlanningError
-from motion_planning.exact.geometry import bounds_of, fcl_geometry
+from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of
 
 ROBOT, OBJECT, ATTACHED = "robot", "object", "attached"
 #: Fixed shapes of one chunk: all of them are passed over when the chunk's ball is far away.
@@ -27,36 +27,69 @@ class Part(NamedTuple):
     pose: np.ndarray
 
 
+def seats_of(kinematics):
+    """Return (kinematics, seats) without the fixed joints of ``kinematics``, see ``model.kernels``: of the root and the
+    links behind the other joints alone; for each link the index of the one among them that it moves with, and its pose
+    (4, 4) there."""
+    parents, origins, axes, kinds, variables, factors = kinematics
+    kept, seats, above, ways = [], [], [], []
+    for link, parent in enumerate(parents):
+        seat, pose = (-1, np.eye(4)) if parent < 0 else seats[parent]
+        pose = pose @ origins[link]
+        if parent < 0 or kinds[link]:
+            above.append(seat)
+            ways.append(pose)
+            seat, pose = len(kept), np.eye(4)
+            kept.append(link)
+        seats.append((seat, pose))
+    return (np.array(above, parents.dtype), np.array(ways), axes[kept], kinds[kept], variables[kept],
+            factors[kept]), seats
+
+
 class Geometries:
-    """FCL geometries and bounds of shapes, each made once as long as the shape lives."""
+    """Bounds, forms and FCL geometries of shapes, each made once as long as the shape lives."""
 
     def __init__(self):
-        self._known = WeakKeyDictionary()
+        self._known, self._geometries = WeakKeyDictionary(), WeakKeyDictionary()
 
     def of(self, shape):
-        """Return (FCL geometry or None, Bounds)."""
+        """Return (Bounds, form, see ``form_of``)."""
         entry = self._known.get(shape)
         if entry is None:
-            entry = self._known[shape] = fcl_geometry(shape), bounds_of(shape)
+            bounds = bounds_of(shape)
+            entry = self._known[shape] = bounds, form_of(shape, bounds)
         return entry
+
+    def geometry(self, shape):
+        """Return the FCL geometry of a shape, None for a plane."""
+        if shape not in self._geometries:
+            self._geometries[shape] = fcl_geometry(shape)
+        return self._geometries[shape]
+
+
+def _forms(found):
+    """The forms of ``apart`` for entries of Geometries."""
+    counts = np.array([len(nodes) for _, (_, nodes) in found], dtype=np.int64)
+    return (np.array([kind for _, (kind, _) in found], dtype=np.int64), np.cumsum(counts) - counts, counts,
+            np.concatenate([np.empty((0, 6)), *[nodes for _, (_, nodes) in found]]))
 
 
 class Movers:
     """Shapes that move with the robot."""
 
-    def __init__(self, parts, geometries, touch):
-        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}."""
+    def __init__(self, parts, geometries, touch, seats):
+        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; seats: see ``seats_of``."""
         self.parts, self.touch = parts, touch
         found = [geometries.of(part.shape) for part in parts]
-        self.objects = [None if shape is None else fcl.CollisionObject(shape) for shape, _ in found]
-        self.geometries = [shape for shape, _ in found]
+        self.geometries = [geometries.geometry(part.shape) for part in parts]
+        self.objects = [None if geometry is None else fcl.CollisionObject(geometry) for geometry in self.geometries]
         count = len(parts)
         self.arrays = (
-            np.array([part.link for part in parts], dtype=np.int64),
-            np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4),
-            np.array([bounds.centre for _, bounds in found], dtype=float).reshape(count, 3),
-            np.array([bounds.half for _, bounds in found], dtype=float).reshape(count, 3),
-            np.array([bounds.radius for _, bounds in found], dtype=float))
+            np.array([seats[part.link][0] for part in parts], dtype=np.int64),
+            np.array([seats[part.link][1] @ part.pose for part in parts], dtype=float).reshape(count, 4, 4),
+            np.array([bounds.centre for bounds, _ in found], dtype=float).reshape(count, 3),
+            np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3),
+            np.array([bounds.radius for bounds, _ in found], dtype=float), _forms(found))
 
     def pairs(self, allowed, moving):
         """Return (p, 2) indices of movers that are checked against each other, of two things each.
@@ -106,15 +139,14 @@ class Fixed:
         count = len(parts)
         poses = np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4)
         found = [geometries.of(part.shape) for part in parts]
-        local = np.array([bounds.centre for _, bounds in found], dtype=float).reshape(count, 3)
-        halves = np.array([bounds.half for _, bounds in found], dtype=float).reshape(count, 3)
-        radii = np.array([bounds.radius for _, bounds in found], dtype=float)
+        local = np.array([bounds.centre for bounds, _ in found], dtype=float).reshape(count, 3)
+        halves = np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3)
+        radii = np.array([bounds.radius for bounds, _ in found], dtype=float)
         centres = np.einsum("nab,nb->na", poses[:, :3, :3], local) + poses[:, :3, 3]
         order = _neighbours_together(centres, radii)
         self.parts = [parts[k] for k in order]
-        self.geometries = [found[k][0] for k in order]
         self.poses = poses[order]
-        self._objects = [None] * count
+        self._geometries, self._objects = geometries, [None] * count
         centres, radii = centres[order], radii[order]
         starts = np.append(np.arange(0, count, _CHUNK), count)
         balls = np.empty((len(starts) - 1, 4))
@@ -122,14 +154,19 @@ class Fixed:
             middle = 0.5 * (centres[start:end].min(axis=0) + centres[start:end].max(axis=0))
             reach = np.linalg.norm(centres[start:end] - middle, axis=1) + radii[start:end]
             balls[chunk, :3], balls[chunk, 3] = middle, reach.max()
-        self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves[order], radii, starts, balls)
+        self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves[order], radii, starts, balls,
+                       _forms([found[k] for k in order]))
 
     def object(self, k):
-        """Return the fcl.CollisionObject of shape ``k``, made when it is first needed."""
-        if self._objects[k] is None:
+        """Return the fcl.CollisionObject of shape ``k``, None for a plane; made when it is first needed."""
+        if self._objects[k] is None and self.geometry(k) is not None:
             pose = self.poses[k]
-            self._objects[k] = fcl.CollisionObject(self.geometries[k], fcl.Transform(pose[:3, :3], pose[:3, 3]))
+            self._objects[k] = fcl.CollisionObject(self.geometry(k), fcl.Transform(pose[:3, :3], pose[:3, 3]))
         return self._objects[k]
+
+    def geometry(self, k):
+        """Return the FCL geometry of shape ``k``, None for a plane."""
+        return self._geometries.geometry(self.parts[k].shape)
 
 
 def _neighbours_together(centres, radii):

@@ -123,9 +123,8 @@ def _past_each_other(checker, ways):
 
 def _dense(way):
     """The path (m, j) with points added between its corners."""
-    pieces = []
-    for a, b in itertools.pairwise(way):
-        count = max(1, int(np.ceil(np.linalg.norm(b - a) / _SPACING)))
-        pieces.append(a + (b - a) * (np.arange(count) / count)[:, None])
-    return np.concatenate([*pieces, way[-1:]])
-
+    steps = np.diff(way, axis=0)
+    counts = np.maximum(1, np.ceil(np.linalg.norm(steps, axis=1) / _SPACING)).astype(int)
+    line = np.repeat(np.arange(len(steps)), counts)
+    number = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.concatenate([way[line] + steps[line] * (number / counts[line])[:, None], way[-1:]])

@@ -320,12 +320,7 @@ class _Planning:
         contain the robot: if they are free, so is the robot. Exact geometry checks all other states, and in any case
         every eighth state and each corner.
         """
-        states, corners = [points[:1]], [0]
-        for a, b in zip(points[:-1], points[1:], strict=True):
-            count = max(1, math.ceil(np.linalg.norm(b - a) / self.checker.resolution))
-            states += [a + (b - a) * ((np.arange(count) + 0.5) / count)[:, None], b[None]]
-            corners.append(corners[-1] + count + 1)
-        states = np.concatenate(states)
+        states, corners = _between_checked(points, self.checker.resolution)
         doubtful = ~self.checker.valid(states)
         some = np.zeros(len(states), dtype=bool)
         some[::_SEEN], some[corners] = True, True
@@ -350,3 +345,17 @@ class _Planning:
 
     def _left(self, share):
         return self.search.clock() < self.begin + share * self.search.allowed_time
+
+
+def _between_checked(points, resolution):
+    """Return (states (m, k), indices of the corners): the corners ``points`` of a path, and what lies halfway between
+    the states on its lines that the search has checked, which are at most ``resolution`` apart."""
+    steps = np.diff(points, axis=0)
+    counts = np.maximum(1, np.ceil(np.linalg.norm(steps, axis=1) / resolution)).astype(int)
+    corners = np.concatenate([[0], np.cumsum(counts + 1)])
+    states = np.empty((corners[-1] + 1, points.shape[1]))
+    line = np.repeat(np.arange(len(steps)), counts)
+    number = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
+    states[number + corners[line] + 1] = points[line] + steps[line] * ((number + 0.5) / counts[line])[:, None]
+    states[corners] = points
+    return states, corners

@@ -70,7 +70,7 @@ class SphereModel:
         self._parts, self._spheres, self._fixed = parts, {}, {}
         #: What was made for a key: ``kept(key, make)`` returns ``make()``, made again only when many others have been
         #: asked for since; ``maps`` and ``scenes`` the same for maps of pairs of links, and for tables of whole scenes.
-        self.kept, self.maps, self.scenes = _Kept(_MOST_KEPT), _Kept(_MOST_MAPS), _Kept(_MOST_SCENES)
+        self.kept, self.maps, self.scenes = Kept(_MOST_KEPT), Kept(_MOST_MAPS), Kept(_MOST_SCENES)
 
     @classmethod
     def of(cls, model, meshes, tolerance=TOLERANCE_M):
@@ -114,7 +114,7 @@ class SphereModel:
                 if parts and not _file(cover, parts, fitting(parts, self.tolerance)).exists()]
 
 
-class _Kept:
+class Kept:
     """The last ``most`` things that were made. Any thread may call."""
 
     def __init__(self, most):

@@ -16,7 +16,7 @@ from motion_planning.shapes import Cone, Octree
 from motion_planning.spheres import kernel
 from motion_planning.spheres.cover import ball
 from motion_planning.spheres.pair_maps import pair_map
-from motion_planning.spheres.sphere_model import Patience, object_spheres
+from motion_planning.spheres.sphere_model import Kept, Patience, object_spheres
 from motion_planning.spheres.world_tables import Tree, forest, pyramid, solids_of, tree_of
 from urdf_model import Box, Cylinder, Plane
 
@@ -27,6 +27,8 @@ _FEW_SPHERES = 4
 # Levels of halving that give a held object's greatest number of spheres, 4096: the robot has some hundred.
 _MOST_HALVINGS = 12
 _ENDLESS = Patience()
+# Number of robots with a group that are split at a time.
+_splits = Kept(16)
 
 
 class _Mover(NamedTuple):
@@ -97,8 +99,13 @@ def _baked(sphere_model, group, scene, state, how):
     things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else [])]
     movers = _mover_names(sphere_model.model, group, state)
     # For each object the bodies that may touch it, mostly none.
-    special = [(thing.id, frozenset(name for name, touch in movers
-                                    if thing.id in touch or scene.allowed.allowed(name, thing.id))) for thing in things]
+    named, _ = sphere_model.kept(("named", id(scene.allowed)), lambda: (_named(scene.allowed), scene.allowed))
+    touchers = [mover for mover in movers if mover[1]]
+    anything = [name for name, _ in movers if scene.allowed.defaults.get(name)]
+    special = [(thing.id, frozenset(
+        [name for name, touch in touchers if thing.id in touch]
+        + (anything if thing.id not in named else [name for name, _ in movers if scene.allowed.allowed(name, thing.id)])
+    )) for thing in things]
     special = {name: may for name, may in special if may}
     of_robot = *key, tuple(special.values())
     (robot, remarks), _ = sphere_model.kept(of_robot, lambda: (_robot(sphere_model, group, scene, state,
@@ -109,7 +116,8 @@ def _baked(sphere_model, group, scene, state, how):
     groups, coarse = {}, {}
     for thing in things:
         may = special.get(thing.id, frozenset())
-        allowed = tuple(bool(may) and all(mover.name in may for mover in cluster.movers) for cluster in robot.clusters)
+        allowed = tuple(all(mover.name in may for mover in cluster.movers) for cluster in robot.clusters) if may \
+            else (False,) * len(robot.clusters)
         parts, owners = groups.setdefault(allowed, ([], []))
         parts += [(shape, thing.pose @ pose) for shape, pose in thing.shapes]
         owners += [thing.id] * len(thing.shapes)
@@ -125,19 +133,29 @@ def _baked(sphere_model, group, scene, state, how):
             world), tuple(remarks)
 
 
+def _named(allowed):
+    """The names that an AllowedCollisions says something about."""
+    return frozenset(allowed.defaults).union(*allowed.entries)
+
+
 def _with_tests(robot, stills, places):
     """The complete robot table: the tests of each cluster, objects before the robot itself."""
-    tests = [(robot.branch[c], rank, -robot.depth[c], c, *place)
-             for rank, (still, place) in enumerate(zip(stills, places, strict=True)) if place[1] > place[0]
-             for c in range(len(robot.clusters)) if not still.may[c]]
-    tests.sort()
+    branch, depth = np.array(robot.branch, dtype=np.int64), np.array(robot.depth, dtype=np.int64)
+    found = []
+    for rank, (still, place) in enumerate(zip(stills, places, strict=True)):
+        if place[1] > place[0]:
+            clusters = np.flatnonzero(~np.array(still.may, dtype=bool))
+            found.append(np.column_stack([np.full((len(clusters), 1), rank), clusters,
+                                          np.broadcast_to(place, (len(clusters), 2))]))
+    rank, cluster, *place = np.concatenate([np.empty((0, 4), np.int64), *found]).T
+    order = np.lexsort((cluster, -depth[cluster], rank, branch[cluster]))
+    cluster = cluster[order]
     joints, *rest, skips, joint_branch = robot.arrays
-    branches = []
-    for number in range(max(joint_branch, default=-1) + 1):
-        for keys in (joint_branch, robot.branch, [test[0] for test in tests]):
-            branches += [sum(key < number for key in keys), sum(key <= number for key in keys)]
-    return (joints, *rest, robot.pairs, np.array([test[3:] for test in tests], np.int32).ravel(),
-            np.array(branches, np.int32), skips, *robot.maps)
+    numbers = np.arange(max(joint_branch, default=-1) + 1)
+    ends = [np.searchsorted(keys, numbers, side) for keys in (joint_branch, branch, branch[cluster])
+            for side in ("left", "right")]
+    return (joints, *rest, robot.pairs, np.column_stack([cluster, *(end[order] for end in place)]).astype(
+        np.int32).ravel(), np.column_stack(ends).astype(np.int32).ravel(), skips, *robot.maps)
 
 
 def split(tables):
@@ -146,6 +164,37 @@ def split(tables):
     Empty unless there are at least two, each with its own variables, that together have all of them.
     """
     robot, world = tables
+    return [(indices, ((joints, *robot[1:5], pairs, robot[6], np.ascontiguousarray(row), robot[8], maps, robot[10]),
+                       world))
+            for (indices, joints, pairs, maps), row in zip(_of_robot(robot).parts,
+                                                           robot[7].reshape(-1, kernel.BRANCH), strict=False)]
+
+
+def between(tables):
+    """Return tables of the same robot that know collisions of its branches with each other only."""
+    robot, world = tables
+    rows = robot[7].reshape(-1, kernel.BRANCH).copy()
+    rows[:, 4:] = 0  # no tests
+    return (*robot[:5], _of_robot(robot).between, robot[6][:0], rows.ravel(), robot[8], robot[9][:0],
+            robot[10][:0]), world
+
+
+class _Split(NamedTuple):
+    """What ``split`` and ``between`` need of a robot alone. parts: [(indices, joints, pairs, maps)]; between: the pairs
+    of clusters of different branches; table: the robot's, whose identity is the key."""
+
+    parts: list
+    between: np.ndarray
+    table: tuple
+
+
+def _of_robot(robot):
+    """The _Split of a robot table."""
+    key = tuple(map(id, (robot[0], robot[5], robot[9])))
+    return _splits(key, lambda: _Split(_parts(robot), _between(robot), robot))
+
+
+def _parts(robot):
     joints, pairs, rows = robot[0].reshape(-1, kernel.JOINT), robot[5].reshape(-1, 2), robot[7].reshape(
         -1, kernel.BRANCH)
     if len(rows) < 2:
@@ -163,19 +212,13 @@ def split(tables):
         maps = robot[9].reshape(-1, kernel.MAP)
         maps = maps[np.isin(maps[:, :2], indices).all(axis=1)]
         maps[:, :2] = np.searchsorted(indices, maps[:, :2])
-        found.append((indices, ((alone.ravel(), *robot[1:5], pairs[inside].ravel(), robot[6],
-                                 np.ascontiguousarray(row), robot[8], maps.ravel(), robot[10]), world)))
+        found.append((indices, alone.ravel(), pairs[inside].ravel(), maps.ravel()))
     return found
 
 
-def between(tables):
-    """Return tables of the same robot that know collisions of its branches with each other only."""
-    robot, world = tables
-    rows = robot[7].reshape(-1, kernel.BRANCH).copy()
-    branch = np.searchsorted(rows[:, 3], robot[5], side="right").reshape(-1, 2)
-    pairs = robot[5].reshape(-1, 2)[branch[:, 0] != branch[:, 1]]
-    rows[:, 4:] = 0  # no tests
-    return (*robot[:5], pairs.ravel(), robot[6][:0], rows.ravel(), robot[8], robot[9][:0], robot[10][:0]), world
+def _between(robot):
+    branch = np.searchsorted(robot[7].reshape(-1, kernel.BRANCH)[:, 3], robot[5], side="right").reshape(-1, 2)
+    return robot[5].reshape(-1, 2)[branch[:, 0] != branch[:, 1]].ravel()
 
 
 # -- the robot ----------------------------------------------------------------------------------------------------

@@ -45,17 +45,22 @@ def solids_of(parts, pad=0.0, patience=_ENDLESS, remark=lambda number, how: None
 
     remark(number, how): told how a part is replaced by something coarser than usual.
     """
-    boxes, found = [], []
+    boxes, cylinders, found = [], [], []
     for number, (geometry, pose) in enumerate(parts):
-        if number % _AT_ONCE == 0 or not isinstance(geometry, Box):
+        if number % _AT_ONCE == 0 or not isinstance(geometry, Box | Cylinder):
             patience.check()
         if isinstance(geometry, Box):
             boxes.append((geometry.size, pose))
+        elif isinstance(geometry, Cylinder):
+            cylinders.append((geometry.radius, geometry.length, pose))
         else:
             found.append(_solids(_of_boxes(geometry, patience, partial(remark, number)), pose, pad))
     if boxes:
         sizes, poses = (np.array(column, dtype=float) for column in zip(*boxes, strict=True))
         found.append(_boxes(poses[:, :3, 3], poses[:, :3, :3].transpose(0, 2, 1), 0.5 * sizes + pad))
+    if cylinders:
+        radii, lengths, poses = (np.array(column, dtype=float) for column in zip(*cylinders, strict=True))
+        found.append(_cylinders(poses[:, :3, 3], poses[:, :3, :3].transpose(0, 2, 1), radii + pad, 0.5 * lengths + pad))
     return joined(found)
 
 
@@ -68,6 +73,18 @@ def _boxes(centres, rotations, half):
     numbers[:, 12:15] = np.where(straight[:, None], reach, half)
     return Solids(np.where(straight, kernel.AXIS_BOX, kernel.BOX).astype(np.int32), numbers, centres - reach,
                   centres + reach)
+
+
+def _cylinders(centres, rotations, radii, halves):
+    """The Solids of cylinders: centres (n, 3), rotations (n, 3, 3) from the planning frame, radii and half lengths."""
+    axes = rotations[:, 2]
+    reach = halves[:, None] * np.abs(axes) + radii[:, None] * np.sqrt(np.maximum(0.0, 1.0 - axes**2))
+    numbers = np.zeros((len(centres), kernel.OBJECT), np.float32)
+    numbers[:, :3], numbers[:, 3:12] = centres, rotations.reshape(-1, 9)
+    numbers[:, 12], numbers[:, 14] = radii, halves
+    upright = np.abs(np.abs(axes[:, 2]) - 1.0) < 1e-9
+    return Solids(np.where(upright, kernel.UPRIGHT_CYLINDER, kernel.CYLINDER).astype(np.int32), numbers,
+                  centres - reach, centres + reach)
 
 
 def _of_boxes(geometry, patience, remark):
@@ -99,12 +116,6 @@ def _solids(geometry, pose, pad):
     if isinstance(geometry, Sphere):
         radius = geometry.radius + pad
         return _one(kernel.SPHERE, centre, rotation, (radius, 0.0, 0.0), np.full(3, radius))
-    if isinstance(geometry, Cylinder):
-        radius, half = geometry.radius + pad, 0.5 * geometry.length + pad
-        reach = half * np.abs(rotation[2]) + radius * np.sqrt(np.maximum(0.0, 1.0 - rotation[2] ** 2))
-        upright = abs(abs(rotation[2, 2]) - 1.0) < 1e-9
-        kind = kernel.UPRIGHT_CYLINDER if upright else kernel.CYLINDER
-        return _one(kind, centre, rotation, (radius, 0.0, half), reach)
     corners = _corners(geometry)
     middle, half = 0.5 * (corners[:, 0] + corners[:, 1]), 0.5 * (corners[:, 1] - corners[:, 0]) + pad
     return _boxes(middle @ rotation + centre, np.broadcast_to(rotation, (len(corners), 3, 3)), half)
@@ -181,8 +192,7 @@ def forest(trees, before=None):
 
     before: what this function returned for Trees that come before them.
     """
-    empty = tree_of(joined([]))
-    world, places = before or (_flat([empty]), [])
+    world, places = before or (_flat([_EMPTY]), [])
     nodes_before, objects_before, places, moved = len(world[0]) // 2, len(world[2]), list(places), []
     for tree in trees:
         links = tree.links.copy()
@@ -191,9 +201,12 @@ def forest(trees, before=None):
         moved.append(tree._replace(links=links))
         places.append((nodes_before, nodes_before + len(links)))
         nodes_before, objects_before = nodes_before + len(links), objects_before + len(tree.kinds)
-    return tuple(map(np.concatenate, zip(world, _flat([empty, *moved]), strict=True))), places
+    return tuple(map(np.concatenate, zip(world, _flat([_EMPTY, *moved]), strict=True))), places
 
 
 def _flat(trees):
     links, nodes, kinds, objects = (np.concatenate(arrays) for arrays in zip(*trees, strict=True))
     return links.ravel(), nodes.ravel(), kinds, objects.ravel()
+
+
+_EMPTY = tree_of(joined([]))

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compiled proofs that two shapes are apart: a plane between them, or between all parts of them.
+
+The ``forms`` of shapes: kinds (m,), BOX ... PLANE; firsts, counts (m,) of their nodes; nodes (t, 6): centre, about that
+of the shape's bounds, and half sides of a box along the shape's axes. A box, sphere, cylinder, cone or plane is one
+node. Other shapes are a tree of boxes around their parts, those of node k in nodes 2 k + 1 and 2 k + 2, leaves last.
+"""
+import math
+from pathlib import Path
+
+import numpy as np
+
+from disk_cache.compiled import compiler
+from motion_planning.model import kernels as model_kernels
+
+BOX, SPHERE, CYLINDER, CONE, PLANE = range(5)
+# Shapes that are nearer than this are not apart [m].
+_MARGIN = 1e-6
+# Steps in search of a plane between two convex shapes; pairs of nodes that are looked at; room for those that wait.
+_STEPS, _LOOKS, _ROOM = 24, 200, 128
+
+compiled = compiler("motion_planning_exact", [Path(__file__), Path(__file__).with_name("kernels.py"),
+                                              Path(model_kernels.__file__)], nogil=True, error_model="numpy")
+
+
+@compiled
+def stack():
+    """Return what ``pair_apart`` works in."""
+    return np.empty((_ROOM, 2), np.int64)
+
+
+@compiled
+def pair_apart(one, i, turn_a, place_a, other, j, turn_b, place_b, waiting):
+    """Whether shape i of the forms ``one`` is proven to be apart from shape j of ``other``. turn (3, 3), place (3,): of
+    the bounds' axes and centre. False only means that there is no proof.
+    """
+    kinds_a, firsts_a, counts_a, nodes_a = one
+    kinds_b, firsts_b, counts_b, nodes_b = other
+    waiting[0, 0], waiting[0, 1] = 0, 0
+    count, looks = 1, 0
+    while count:
+        count -= 1
+        a, b = waiting[count, 0], waiting[count, 1]
+        looks += 1
+        if looks > _LOOKS:
+            return False
+        box_a, box_b = nodes_a[firsts_a[i] + a], nodes_b[firsts_b[j] + b]
+        centre_a, centre_b = _moved(turn_a, place_a, box_a), _moved(turn_b, place_b, box_b)
+        ends_a, ends_b = 2 * a + 1 >= counts_a[i], 2 * b + 1 >= counts_b[j]
+        # Many steps for each box of a tree would take longer than a look at its parts.
+        if _convex_apart(kinds_a[i], turn_a, centre_a, box_a[3:], kinds_b[j], turn_b, centre_b, box_b[3:],
+                         _STEPS if ends_a and ends_b else 0):
+            continue
+        if ends_a and ends_b or count + 2 > _ROOM:
+            return False
+        # The larger one gives way to its parts.
+        if ends_b or not ends_a and _size(box_a) >= _size(box_b):
+            waiting[count, 0], waiting[count + 1, 0] = 2 * a + 1, 2 * a + 2
+            waiting[count, 1] = waiting[count + 1, 1] = b
+        else:
+            waiting[count, 0] = waiting[count + 1, 0] = a
+            waiting[count, 1], waiting[count + 1, 1] = 2 * b + 1, 2 * b + 2
+        count += 2
+    return True
+
+
+@compiled
+def _moved(turn, place, box):
+    x, y, z = box[0], box[1], box[2]
+    return (place[0] + turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
+            place[1] + turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
+            place[2] + turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z)
+
+
+@compiled
+def _size(box):
+    return max(box[3], box[4], box[5])
+
+
+@compiled
+def _convex_apart(kind_a, turn_a, centre_a, half_a, kind_b, turn_b, centre_b, half_b, steps):
+    """Whether a plane between two convex shapes is found, in some ``steps`` beyond that of their boxes."""
+    if kind_b == PLANE:
+        return _apart_from_plane(kind_a, turn_a, centre_a, half_a, turn_b, centre_b)
+    if kind_a == PLANE:
+        return _apart_from_plane(kind_b, turn_b, centre_b, half_b, turn_a, centre_a)
+    if not boxes_meet(turn_a, centre_a, half_a, turn_b, centre_b, half_b):
+        return True
+    if kind_a == BOX and kind_b == BOX:
+        return False
+    # Towards the point of all differences of points of the two that is nearest to 0 (Gilbert 1966): as soon as all of
+    # them lie beyond a plane, it is one between the shapes.
+    x, y, z = centre_a[0] - centre_b[0], centre_a[1] - centre_b[1], centre_a[2] - centre_b[2]
+    for _ in range(steps):
+        square = x * x + y * y + z * z
+        if square < 1e-12:
+            return False
+        au, av, aw = _farthest(kind_a, turn_a, half_a, -x, -y, -z)
+        bu, bv, bw = _farthest(kind_b, turn_b, half_b, x, y, z)
+        u = centre_a[0] + au - centre_b[0] - bu
+        v = centre_a[1] + av - centre_b[1] - bv
+        w = centre_a[2] + aw - centre_b[2] - bw
+        if u * x + v * y + w * z > _MARGIN * math.sqrt(square):
+            return True
+        u, v, w = u - x, v - y, w - z
+        length = u * u + v * v + w * w
+        step = -(x * u + y * v + z * w)
+        if step <= 1e-9 * length:
+            return False
+        step = min(1.0, step / length)
+        x, y, z = x + step * u, y + step * v, z + step * w
+    return False
+
+
+@compiled
+def _apart_from_plane(kind, turn, centre, half, plane_turn, plane):
+    x, y, z = plane_turn[0, 2], plane_turn[1, 2], plane_turn[2, 2]
+    height = x * (centre[0] - plane[0]) + y * (centre[1] - plane[1]) + z * (centre[2] - plane[2])
+    u, v, w = _farthest(kind, turn, half, x, y, z)
+    above = height + x * u + y * v + z * w
+    u, v, w = _farthest(kind, turn, half, -x, -y, -z)
+    return height + x * u + y * v + z * w > _MARGIN or above < -_MARGIN
+
+
+@compiled
+def _farthest(kind, turn, half, x, y, z):
+    """The point of a shape, about its centre, that is farthest in direction x, y, z."""
+    if kind == SPHERE:
+        share = half[0] / math.sqrt(x * x + y * y + z * z)
+        return share * x, share * y, share * z
+    u = turn[0, 0] * x + turn[1, 0] * y + turn[2, 0] * z
+    v = turn[0, 1] * x + turn[1, 1] * y + turn[2, 1] * z
+    w = turn[0, 2] * x + turn[1, 2] * y + turn[2, 2] * z
+    up = math.copysign(half[2], w)
+    if kind == BOX:
+        a, b = math.copysign(half[0], u), math.copysign(half[1], v)
+    else:
+        out = math.sqrt(u * u + v * v)
+        share = half[0] / out if out > 0.0 else 0.0
+        a, b = share * u, share * v
+        if kind == CONE:
+            if 2.0 * half[2] * w >= half[0] * out:
+                a, b, up = 0.0, 0.0, half[2]
+            else:
+                up = -half[2]
+    return (turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * up, turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * up,
+            turn[2, 0] * a + turn[2, 1] * b + turn[2, 2] * up)
+
+
+@compiled
+def boxes_meet(turn_a, centre_a, half_a, turn_b, centre_b, half_b):
+    """Whether two boxes overlap or are nearer than a micrometre: no one of 15 axes separates them (Gottschalk 1996).
+
+    All in scalars: an array made here would take longer than the rest.
+    """
+    margin = 1e-6
+    x, y, z = centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]
+    t0, r00, r01, r02 = _along(turn_a, 0, x, y, z, turn_b)
+    s00, s01, s02 = abs(r00) + 1e-9, abs(r01) + 1e-9, abs(r02) + 1e-9
+    a0, a1, a2, b0, b1, b2 = half_a[0], half_a[1], half_a[2], half_b[0], half_b[1], half_b[2]
+    if abs(t0) > a0 + b0 * s00 + b1 * s01 + b2 * s02 + margin:
+        return False
+    t1, r10, r11, r12 = _along(turn_a, 1, x, y, z, turn_b)
+    s10, s11, s12 = abs(r10) + 1e-9, abs(r11) + 1e-9, abs(r12) + 1e-9
+    if abs(t1) > a1 + b0 * s10 + b1 * s11 + b2 * s12 + margin:
+        return False
+    t2, r20, r21, r22 = _along(turn_a, 2, x, y, z, turn_b)
+    s20, s21, s22 = abs(r20) + 1e-9, abs(r21) + 1e-9, abs(r22) + 1e-9
+    if abs(t2) > a2 + b0 * s20 + b1 * s21 + b2 * s22 + margin:
+        return False
+    if (abs(t0 * r00 + t1 * r10 + t2 * r20) > b0 + a0 * s00 + a1 * s10 + a2 * s20 + margin
+            or abs(t0 * r01 + t1 * r11 + t2 * r21) > b1 + a0 * s01 + a1 * s11 + a2 * s21 + margin
+            or abs(t0 * r02 + t1 * r12 + t2 * r22) > b2 + a0 * s02 + a1 * s12 + a2 * s22 + margin):
+        return False
+    # The cross products of an axis of each.
+    return not (abs(t2 * r10 - t1 * r20) > a1 * s20 + a2 * s10 + b1 * s02 + b2 * s01 + margin
+                or abs(t2 * r11 - t1 * r21) > a1 * s21 + a2 * s11 + b2 * s00 + b0 * s02 + margin
+                or abs(t2 * r12 - t1 * r22) > a1 * s22 + a2 * s12 + b0 * s01 + b1 * s00 + margin
+                or abs(t0 * r20 - t2 * r00) > a2 * s00 + a0 * s20 + b1 * s12 + b2 * s11 + margin
+                or abs(t0 * r21 - t2 * r01) > a2 * s01 + a0 * s21 + b2 * s10 + b0 * s12 + margin
+                or abs(t0 * r22 - t2 * r02) > a2 * s02 + a0 * s22 + b0 * s11 + b1 * s10 + margin
+                or abs(t1 * r00 - t0 * r10) > a0 * s10 + a1 * s00 + b1 * s22 + b2 * s21 + margin
+                or abs(t1 * r01 - t0 * r11) > a0 * s11 + a1 * s01 + b2 * s20 + b0 * s22 + margin
+                or abs(t1 * r02 - t0 * r12) > a0 * s12 + a1 * s02 + b0 * s21 + b1 * s20 + margin)
+
+
+@compiled
+def _along(turn_a, axis, x, y, z, turn_b):
+    """What (x, y, z) and the three axes of b are along an axis of a."""
+    u, v, w = turn_a[0, axis], turn_a[1, axis], turn_a[2, axis]
+    return (u * x + v * y + w * z, u * turn_b[0, 0] + v * turn_b[1, 0] + w * turn_b[2, 0],
+            u * turn_b[0, 1] + v * turn_b[1, 1] + w * turn_b[2, 1],
+            u * turn_b[0, 2] + v * turn_b[1, 2] + w * turn_b[2, 2])
