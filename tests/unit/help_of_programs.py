@@ -19,8 +19,8 @@ LIMIT_S = 60.0
 POLL_S = 0.02
 AT_A_TIME = 4
 COMMON = ("actionlib", "arm_kinematics", "baxter_interface", "baxter_sim_kinematics", "bullet_sim", "cv2",
-          "dynamic_reconfigure.server", "gazebo_msgs.srv", "lab_display.show", "motion_planning.pipeline", "moveit_ros_move_group.node", "numpy",
-          "rospy", "tf2_ros", "tornado.web", "visualization_msgs.msg")
+          "dynamic_reconfigure.server", "gazebo_msgs.srv", "lab_display.show", "motion_planning.pipeline",
+          "moveit_ros_move_group.node", "numpy", "rospy", "tf2_ros", "tornado.web", "visualization_msgs.msg")
 
 
 def become(program: str):

@@ -39,27 +39,6 @@ def left(robot):
 
 
 @pytest.fixture(scope="session")
-def kdl_arm(robot):
-    """A function that returns KDL's Python module, and an arm's chain in it."""
-    kdl = pytest.importorskip("PyKDL", reason="python3-pykdl is not installed")
-
-    def build(side):
-        arm = kdl.Chain()
-        for joint in robot.chain("base", side + "_gripper"):
-            rotation, p = joint.origin[:3, :3], joint.origin[:3, 3]
-            offset = kdl.Frame(kdl.Rotation(*rotation.ravel().tolist()), kdl.Vector(*p.tolist()))
-            if joint.type == "fixed":
-                arm.addSegment(kdl.Segment(kdl.Joint(), offset))
-                continue
-            # KDL turns about an axis given in the parent, before the offset's rotation.
-            axis = kdl.Vector(*(rotation @ joint.axis).tolist())
-            arm.addSegment(kdl.Segment(kdl.Joint(joint.name, kdl.Vector(*p.tolist()), axis, kdl.Joint.RotAxis), offset))
-        return kdl, arm
-
-    return build
-
-
-@pytest.fixture(scope="session")
 def six_axes():
     """A desk arm without redundancy: shoulder, elbow and a wrist with an offset; lengths [m] of the order of a
     PROBOT's.

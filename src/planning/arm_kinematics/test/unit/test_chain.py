@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from arm_kinematics import Chain, ChainError, InvalidPosture, wrench_from_torques
+from lab_testing.kdl import kdl_arm
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, rigid
 
@@ -83,8 +84,8 @@ def test_every_link_is_where_plain_multiplication_puts_it(robot, chain, side):
             np.testing.assert_allclose(frame, expected[link], atol=1e-12)
 
 
-def test_tip_is_where_kdl_puts_it(chain, side, kdl_arm):
-    kdl, arm = kdl_arm(side)
+def test_tip_is_where_kdl_puts_it(robot, chain, side):
+    kdl, arm = kdl_arm(robot, "base", side + "_gripper")
     solver, values, frame = kdl.ChainFkSolverPos_recursive(arm), kdl.JntArray(7), kdl.Frame()
     jacobian_solver, jacobian = kdl.ChainJntToJacSolver(arm), kdl.Jacobian(7)
     for q in np.random.default_rng(2).uniform(chain.lower, chain.upper, (200, 7)):

@@ -16,6 +16,7 @@ from arm_kinematics import (
 )
 from arm_kinematics.search import Search
 from baxter_model import JOINTS, MIRROR_SIGNS
+from lab_testing.kdl import kdl_arm
 from urdf_model.transforms import rigid, rotation_angle
 
 NEUTRAL = np.array([0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0])
@@ -51,9 +52,9 @@ def assert_exact(chain, q, pose):
 
 
 @pytest.fixture
-def kdl_solve(chain, side, kdl_arm):
+def kdl_solve(robot, chain, side):
     """KDL's solver as the vendor's simulator sets it up: (pose (4, 4), seed (n,)) to (n,), or None."""
-    kdl, arm = kdl_arm(side)
+    kdl, arm = kdl_arm(robot, "base", side + "_gripper")
 
     def values(q):
         array = kdl.JntArray(len(q))
