@@ -21,6 +21,8 @@ from .joint_motion import DISABLED_GRACE_S, MAKING_ROOM_S, NO_HINDRANCE, STILL_S
 # Longest wait for one state of a robot [s, wall]; one that is present sends 100 a second.
 STATE_TIMEOUT_S = 1.0
 COLLIDES = "it feels a collision: something is in its way"
+SQUEEZED = "its cuff is squeezed: let go of it"
+_CUFF = "robot/digital_io/%s_lower_cuff/state"
 # The robot is asked why nothing happens after so long [s, ROS time].
 ASK_AFTER_S = 1.0
 
@@ -42,6 +44,9 @@ def ask_what_holds(side: str, is_kept_away: bool) -> str:
     avoidance = newest(prefix + "collision_avoidance_state", CollisionAvoidanceState) if is_kept_away else None
     if avoidance is not None and avoidance.collision_object:
         return held_by_avoidance(avoidance.collision_object)
+    cuff = newest(_CUFF % side, DigitalIOState)
+    if cuff is not None and cuff.state == DigitalIOState.PRESSED:
+        return SQUEEZED
     detection = newest(prefix + "collision_detection_state", CollisionDetectionState)
     return COLLIDES if detection is not None and detection.collision_state else ""
 
@@ -130,7 +135,7 @@ class ArmHindrance:
             if self._near:
                 return Hindrance(held_by_avoidance(self._near), not self._by_other_arm or still_s >= MAKING_ROOM_S)
             if self._cuff:
-                return Hindrance("its cuff is squeezed: let go of it")
+                return Hindrance(SQUEEZED)
             return Hindrance(COLLIDES if self._collides else "")
 
     def close(self) -> None:
@@ -147,7 +152,7 @@ class ArmHindrance:
                              queue_size=1),
             rospy.Subscriber(prefix + "collision_detection_state", CollisionDetectionState, self._on_detection,
                              queue_size=1),
-            rospy.Subscriber("robot/digital_io/%s_lower_cuff/state" % self._side, DigitalIOState, self._on_cuff,
+            rospy.Subscriber(_CUFF % self._side, DigitalIOState, self._on_cuff,
                              queue_size=1)]
 
     def _close(self) -> None:

@@ -37,7 +37,7 @@ FILTER_TIME_S = 1.0 / (2.0 * math.pi * 0.2)
 # An arm stands still that has not moved this far [rad] for so long [s], although it is farther than that from its goal.
 # The other arm may still make room: that takes longer.
 STILL_RAD, FAR_RAD = 0.02, 0.05
-STILL_S, MAKING_ROOM_S = 1.5, 5.0
+STILL_S, MAKING_ROOM_S = 0.75, 5.0
 
 
 class SmoothPath:

@@ -32,6 +32,7 @@ from .joint_checks import (
 from .joint_motion import Move, is_far
 from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
+from command_line.options import counted
 
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
@@ -388,6 +389,6 @@ def _numbers(kind, values):
         return values
     values = tuple(values)
     if len(values) != len(kind.__slots__):
-        raise ValueError("%d numbers where %d are due" % (len(values), len(kind.__slots__)))
+        raise ValueError("%s where %d are due" % (counted(len(values), "number"), len(kind.__slots__)))
     return kind(*(require_number(value, "the pose's %s" % axis)
                   for axis, value in zip(kind.__slots__, values, strict=True)))
