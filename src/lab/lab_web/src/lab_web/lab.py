@@ -50,14 +50,14 @@ class Lab:
         self._releases = []
         self._releases_of_silent = []
 
-    def add(self, name, serve, needs_control=True, for_viewers=False):
+    def add(self, name, serve, needs_control=True, for_viewers=False, needs_power=False):
         """An operation beside those of this module: ``serve(client, operation)`` does not wait, and raises RobotError;
         with ``needs_control`` only for the page that has the control, with ``for_viewers`` also for one that may not
-        act.
+        act, with ``needs_power`` only while the robot is enabled.
         """
         def checked(lab, client, operation):
             if needs_control:
-                lab._check(client)
+                lab._check(client, needs_power)
             serve(client, operation)
         self._served[name] = checked
         if for_viewers:
@@ -251,12 +251,15 @@ class Lab:
         side, action = operation.get("side"), operation.get("action")
         if not isinstance(side, str) or not isinstance(action, str):
             raise RobotError("\"side\" and \"action\" must be texts")
-        self._check(client)
+        self._check(client, needs_power=True)
         self._robot.grip(side, action)
 
-    def _check(self, client):
+    def _check(self, client, needs_power=False):
         with self._lock:
-            self._control.check(client, self._clock())
+            if needs_power:
+                self._require_ready(client, is_stream=True)
+            else:
+                self._control.check(client, self._clock())
 
 
 def _joints_of(operation):

@@ -19,10 +19,12 @@ LOST_RAD = 2.0 * LEAD_RAD
 #: A joint that is further behind its set-point than this [rad] is held by something; a free one is by 0.03 s of its
 #: speed, and by 0.15 s of it beside other work on the machine.
 FREE_RAD = 0.5 * LEAD_RAD
-#: A joint stands still that is behind its set-point by more than FREE_RAD, and has not moved this far [rad] for so
+#: A joint that is nearer to its target than this has arrived [rad]; a loaded one sags a little.
+ARRIVED_RAD = 0.03
+#: A joint stands still that is behind its set-point by more than ARRIVED_RAD, and has not moved this far [rad] for so
 #: long [s].
 STILL_RAD, STILL_S = 0.01, 1.5
-#: A joint nearer to its target than this has arrived [rad].
+#: A set-point nearer to its target than this has arrived [rad].
 NEAR_RAD = 1e-4
 
 
@@ -66,7 +68,7 @@ class Standstill:
         ``measured``: {joint: [rad]}.
         """
         behind = {joint: measured[joint] for joint, setpoint in setpoints.items()
-                  if joint in measured and abs(setpoint - measured[joint]) > FREE_RAD}
+                  if joint in measured and abs(setpoint - measured[joint]) > ARRIVED_RAD}
         self._since = {
             joint: since if since[0] <= time_s and abs(position - since[1]) < STILL_RAD else (time_s, position)
             for joint, position in behind.items() for since in [self._since.get(joint, (time_s, position))]}
@@ -168,8 +170,8 @@ class Motion:
         check_not_lost({joint: course.position for joint, course in self._courses.items()}, measured)
         setpoints = {}
         for joint, course in list(self._courses.items()):
-            is_followed = joint in measured and abs(course.position - measured[joint]) <= LEAD_RAD
-            if is_followed and course.step(dt, self.limits[joint]):
+            behind = abs(course.position - measured.get(joint, math.inf))
+            if behind <= LEAD_RAD and course.step(dt, self.limits[joint]) and behind <= ARRIVED_RAD:
                 del self._courses[joint]
             setpoints[joint] = course.position
         return setpoints

@@ -284,6 +284,7 @@ def _equip(pages, robot, faults):
     lab.add("play", lambda client, _operation: play(lab, client, recorder))
     comparison = Comparison(_findings, comparisons, partial(pages.share, "interface"), time.time)
     lab.add("compare", comparison.ask, needs_control=False)
+    lab.add("nod", parts.nod, needs_power=True)
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)

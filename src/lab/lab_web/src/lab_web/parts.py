@@ -32,8 +32,8 @@ class Parts:
         self._screen = rospy.Publisher("/robot/xdisplay", Image, queue_size=1, latch=True)
 
     def operations(self):
-        """{operation: method}, for :meth:`lab_web.lab.Lab.add`."""
-        return {"output": self.output, "sonars": self.sonars, "nod": self.nod, "screen": self.screen}
+        """{operation: method} of those that need no power, for :meth:`lab_web.lab.Lab.add`."""
+        return {"output": self.output, "sonars": self.sonars, "screen": self.screen}
 
     @staticmethod
     def can_press():

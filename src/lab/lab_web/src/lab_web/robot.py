@@ -7,7 +7,6 @@ import time
 import rospy
 from baxter_core_msgs.msg import (
     AssemblyState,
-    CollisionAvoidanceState,
     EndEffectorCommand,
     EndEffectorProperties,
     EndEffectorState,
@@ -18,9 +17,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
 from baxter_interface import RobotEnable
+from baxter_interface.hindrance import ask_what_holds
 from baxter_interface.presence import Presence
 from baxter_model import BASE_FRAME, HEAD_JOINT, SIDES, joint_names, poses, tip_of
-from baxter_model.readiness import held_by_avoidance, why_not_ready
+from baxter_model.readiness import why_not_ready
 from lab_web.lab import RobotError
 from lab_web.motion import limits_of
 from urdf_model import UrdfError, parse_urdf
@@ -33,8 +33,6 @@ ARM_LINKS = {side: (BASE_FRAME, tip_of(side)) for side in SIDES}
 _ACTIONS = {"open": ("go", {"position": EndEffectorState.POSITION_OPEN}),
             "close": ("go", {"position": EndEffectorState.POSITION_CLOSED}), "calibrate": ("calibrate", {})}
 _SENDER = "lab_web"
-# How long the robot may take to say what collision avoidance keeps an arm away from [s].
-_AVOIDANCE_S = 1.0
 # A gripper is told to follow a recording where it has moved by more than this.
 GRIPPER_STEP_PERCENT = 1.0
 
@@ -233,12 +231,5 @@ class Baxter:
 
 def _what_holds(joint):
     side = joint.partition("_")[0]
-    if side in SIDES:
-        try:
-            state = rospy.wait_for_message("/robot/limb/%s/collision_avoidance_state" % side, CollisionAvoidanceState,
-                                           _AVOIDANCE_S)
-        except rospy.ROSException:
-            state = CollisionAvoidanceState()
-        if state.collision_object:
-            return held_by_avoidance(state.collision_object)
-    return "something is in its way, or another program moves it"
+    why = ask_what_holds(side, is_kept_away=True) if side in SIDES else ""
+    return why or "something is in its way, or another program moves it"

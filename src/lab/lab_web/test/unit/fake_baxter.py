@@ -10,7 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import rospy
-from baxter_core_msgs.msg import AnalogOutputCommand, AssemblyState, DigitalOutputCommand, JointCommand
+from baxter_core_msgs.msg import (
+    AnalogOutputCommand,
+    AssemblyState,
+    CollisionAvoidanceState,
+    DigitalOutputCommand,
+    JointCommand,
+)
 from bullet_sim_msgs.srv import AdvanceTicks, AdvanceTicksResponse, Press, PressResponse
 from fake_move_group import FakeMoveGroup
 from gazebo_msgs.msg import ModelState
@@ -44,6 +50,10 @@ class FakeBaxter:
         self._lock = threading.Lock()
         self._joints = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
         self._states = rospy.Publisher("/robot/state", AssemblyState, queue_size=1)
+        self._avoidance = rospy.Publisher("/robot/limb/left/collision_avoidance_state", CollisionAvoidanceState,
+                                          queue_size=1)
+        # What the left arm is too near to; it stands still then.
+        self._near = []
         for side in ("left", "right"):
             rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, self._command, queue_size=1)
         rospy.Subscriber("/robot/set_super_enable", Bool, lambda message: self._switch(message.data, False))
@@ -81,16 +91,19 @@ class FakeBaxter:
         rate, number = rospy.Rate(RATE_HZ), 0
         while not rospy.is_shutdown():
             with self._lock:
+                self._near = rospy.get_param_cached("/fake_baxter/near", [])
                 joints = JointState(name=list(self._positions), position=list(self._positions.values()))
             joints.header.stamp = rospy.Time.from_sec(1.0 + number / RATE_HZ)
             self._joints.publish(joints)
             self._states.publish(self._state)
+            self._avoidance.publish(collision_object=self._near)
             number += 1
             rate.sleep()
 
     def _command(self, message):
         with self._lock:
-            self._positions.update(zip(message.names, message.command, strict=True))
+            if not (self._near and message.names[0].startswith("left")):
+                self._positions.update(zip(message.names, message.command, strict=True))
         self._say("joints", dict(zip(message.names, message.command, strict=True)))
 
     def _switch(self, enabled, stopped):

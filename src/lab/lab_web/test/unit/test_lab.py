@@ -172,6 +172,14 @@ def test_a_joint_that_something_holds_ends_the_motion_with_the_reason(hall):
     assert hall.robot.positions["left_s0"] == 0.0 and len(hall.told) == 1
 
 
+def test_a_small_move_of_a_joint_that_is_held_ends_with_the_reason_too(hall):
+    hall.robot.walls["left_s0"] = START["left_s0"]
+    hall.lab.serve(1, True, {"op": "take"})
+    move(hall, left_s0=START["left_s0"] + 0.05)
+    hall.pass_time(3.0, beats_of=1)
+    assert hall.codes() == ["held"] and not hall.lab.is_moving and hall.rested == []
+
+
 def test_an_arm_stops_when_the_page_goes(hall):
     hall.lab.serve(1, True, {"op": "take"})
     move(hall, left_s0=1.5)
@@ -226,6 +234,20 @@ def test_a_robot_that_is_not_ready_says_why_and_a_motion_ends(hall):
     before = dict(hall.robot.positions)
     hall.pass_time(0.5, beats_of=1)
     assert hall.robot.positions == before and hall.told == [(1, "not_ready", "disabled")]
+
+
+def test_what_needs_power_is_refused_with_the_reason_while_there_is_none(hall):
+    hall.lab.add("nod", lambda *asked: hall.robot.done.append(asked), needs_power=True)
+    hall.lab.serve(1, True, {"op": "take"})
+    hall.robot.why = "not enabled: enable it"
+    grip, nod = {"op": "grip", "side": "left", "action": "open"}, {"op": "nod"}
+    for operation in (grip, nod):
+        hall.lab.serve(1, True, operation)
+    assert hall.told == [(1, "not_ready", "not enabled: enable it")] * 2 and hall.robot.done == []
+    hall.robot.why = ""
+    for operation in (grip, nod):
+        hall.lab.serve(1, True, operation)
+    assert hall.robot.done == [("left", "open"), (1, nod)] and len(hall.told) == 2
 
 
 @pytest.mark.parametrize(("operation", "said"), [

@@ -286,6 +286,23 @@ def test_arms_move_and_parts_follow_and_what_is_missing_is_told(hall):
     wait_until(lambda: hall.subscriptions() == set(), "the server to rest, also after a switch of the robot")
 
 
+def test_an_arm_that_the_robot_holds_is_told_with_its_reason_and_the_command_that_helps(hall):
+    page = hall.drive()
+    try:
+        hall.master.setParam("/fake_baxter/near", ["collision_head_link_2"])
+        begin = lab_arms.posture()["left_s0"]
+
+        def told():
+            if not any("left_s0 stands still" in text for text in page.told()):
+                page.send(op="move", joints={"left_s0": begin + 0.05})
+                return False
+            return True
+        wait_until(told, "the reason", 60.0, interval_s=0.5)
+        assert all(part in page.told()[-1] for part in ("too near to collision_head_link_2", "tuck_arms.py -u"))
+    finally:
+        page.close()
+
+
 def test_the_arms_follow_a_plan_and_the_planners_reasons_are_told(hall):
     page = hall.drive()
     try:
