@@ -250,6 +250,17 @@ def left_on_its_way(run, sides):
     return None
 
 
+def held_back(run, sides):
+    """A Fault for an arm that collision avoidance held, and that has not moved on since, or None."""
+    for side in sides:
+        held = run.recording.held(side)
+        if held and path_length(run.recording.arm(side)[held[0]:]) < STRAY_RAD:
+            return Fault("held", "collision avoidance held the %s arm at %.1f s: it came too near to %s. Lead it "
+                         "round; move_to_joint_positions returns False there, and its log says so"
+                         % (side, run.recording.times[held[0]], ", ".join(held[1])))
+    return None
+
+
 def _last_words(run):
     words = (run.errors.strip() or run.output.strip()).splitlines()
     return "; its last line was: %s" % words[-1][:200] if words else ""
@@ -263,6 +274,7 @@ def diagnose(run, exercise, call, robot, share):
     if share < 0.995:
         foremost = getattr(exercise.task, "foremost", None)
         fault = (foremost and foremost(call, run)
+                 or held_back(run, exercise.sides)
                  or left_on_its_way(run, exercise.sides)
                  or (exercise.task.slip(call, run, robot) if run.recording.records else None)
                  or behaviour(run, exercise.sides, call.limit_s))

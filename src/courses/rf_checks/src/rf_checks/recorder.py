@@ -61,6 +61,7 @@ class Recorder(ModelPlugin):
         self._watch_robot()
         record = {"t": round(time_s, 4), "q": [round(value, 6) for value in self._model.read_joints()[0]],
                   "enabled": self._robot is not None and self._robot.is_enabled, "contacts": self._contacts(),
+                  "held": self._robot.held if self._robot is not None else {},
                   "commands": self._take_commands(), "counts": dict(self._counts), "accepted": dict(self._accepted),
                   "placed": self._placed, "ik": self._take_requests(), **self._more()}
         if self._done:

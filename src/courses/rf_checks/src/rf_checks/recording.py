@@ -39,6 +39,11 @@ class Recording:
         """Whether the robot was ever enabled."""
         return any(record["enabled"] for record in self.records)
 
+    def held(self, side):
+        """(row, names) of the last record in which collision avoidance held an arm away from these links, or None."""
+        rows = [row for row, record in enumerate(self.records) if record["held"].get(side)]
+        return (rows[-1], self.records[rows[-1]]["held"][side]) if rows else None
+
     def contacts(self):
         """Pairs of links that started to touch; those of the first record do not count."""
         first = {tuple(pair) for pair in self.records[0]["contacts"]} if self.records else set()

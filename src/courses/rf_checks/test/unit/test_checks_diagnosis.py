@@ -32,7 +32,7 @@ def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JO
     for k in range(count):
         q = np.zeros(14)
         q[0], q[7] = left * k / count, right * k / count
-        result.append({"t": 0.01 * k, "q": q.tolist(), "enabled": enabled, "contacts": [], "ik": [],
+        result.append({"t": 0.01 * k, "q": q.tolist(), "enabled": enabled, "contacts": [], "held": {}, "ik": [],
                        "commands": [["left", 1, list(names), list(values), "/me", True]] if commands else [],
                        "counts": {"left": commands * k, "right": 0}, "placed": placed if k else 0,
                        "accepted": {"left": k if left else 0, "right": k if right else 0}})
@@ -116,6 +116,20 @@ def test_nothing_is_wrong_with_what_is_right():
     assert diagnosis.behaviour(case, ("left",), 45.0) is None
     # Ten messages a record are 1000 a second, which is not more than that.
     assert not diagnosis.is_flood(records(commands=10).command_counts())
+
+
+def test_an_arm_that_collision_avoidance_held_is_told():
+    def held_in(rows, seconds=2.0, left=0.0):
+        trace = records(seconds, left)
+        for row in rows:
+            trace.records[row]["held"] = {"left": ["collision_head_link_1"], "right": []}
+        return run(trace)
+    fault = diagnosis.held_back(held_in(range(100, 150)), ("left",))
+    assert fault.key == "held" and "left arm at 1.5 s" in fault.sentence
+    assert "too near to collision_head_link_1" in fault.sentence
+    assert diagnosis.held_back(held_in([]), ("left",)) is None
+    assert diagnosis.held_back(held_in([100]), ("right",)) is None
+    assert diagnosis.held_back(held_in(range(10, 20), left=1.0), ("left",)) is None, "it got away"
 
 
 def test_an_arm_left_on_its_way_is_told():

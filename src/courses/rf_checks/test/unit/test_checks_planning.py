@@ -30,7 +30,7 @@ def run_of(call, boxes=(), moves=True, end=None, contacts=()):
     for k in range(200):
         share = k / 199
         records.append({"t": 0.01 * k, "q": (begin + share * (goal - begin)).tolist(), "enabled": True, "contacts": [],
-                        "commands": [], "ik": [], "counts": dict.fromkeys(SIDES, k * moves),
+                        "held": {}, "commands": [], "ik": [], "counts": dict.fromkeys(SIDES, k * moves),
                         "accepted": dict.fromkeys(SIDES, k * moves), "placed": 0})
     records[0]["scene"] = [["thing", pose.ravel().tolist(), list(edges)] for pose, edges in boxes]
     records[150]["contacts"] = [list(pair) for pair in contacts]

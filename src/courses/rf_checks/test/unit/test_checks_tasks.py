@@ -35,7 +35,7 @@ def trace(left=((NEUTRAL,)), right=((NEUTRAL,)), seconds=2.0, ik=(), contacts=()
         place = np.linspace(0.0, len(postures) - 1.0, count)
         columns.append(np.stack([np.interp(place, range(len(postures)), postures[:, k]) for k in range(7)], axis=1))
     rows = np.hstack(columns)
-    records = [{"t": 0.01 * k, "q": row.tolist(), "enabled": True, "contacts": [], "commands": [], "ik": [],
+    records = [{"t": 0.01 * k, "q": row.tolist(), "enabled": True, "contacts": [], "held": {}, "commands": [], "ik": [],
                 "counts": dict.fromkeys(SIDES, k)} for k, row in enumerate(rows)]
     records[-1]["ik"], records[-1]["contacts"] = list(ik), list(contacts)
     return Recording(JOINTS, records)

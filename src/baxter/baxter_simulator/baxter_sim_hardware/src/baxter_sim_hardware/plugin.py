@@ -210,6 +210,11 @@ class BaxterPlugin(ModelPlugin):
         """Whether the arms obey commands."""
         return self._baxter.state.enabled
 
+    @property
+    def held(self):
+        """{side: names of the links that collision avoidance holds that arm away from now}, empty for a free arm."""
+        return dict(self._simulated.guarding.held)
+
     def start_over(self):
         """Disable the robot; release and clear stops; restore the start's speeds and time-outs. The joints stay where
         they are."""

@@ -123,12 +123,14 @@ def test_arms_stop_at_the_field_unless_it_is_suppressed(make_lab, kinds):
     for side in SIDES:
         said, = (line for line in lab.log.lines if line.startswith("%s limb is held by collision avoidance" % side))
         assert "too near to collision_head_link_" in said
+        assert lab.plugin.held[side] and set(lab.plugin.held[side]) <= set(HEAD_GUARDS)
     assert min(gaps) > -2e-3 and np.abs(lab.position - FOLDED).max() > 0.3
     assert np.abs(lab.velocity).max() < 0.02
     # Motion away is free.
     lab.command(POSITION, UNFOLDED)
     lab.run(3.5)
     assert np.abs(lab.position - UNFOLDED).max() < 1e-3 and listed(lab) == set()
+    assert not any(lab.plugin.held.values())
 
 
 def test_velocity_mode_is_slowed_too(make_lab):

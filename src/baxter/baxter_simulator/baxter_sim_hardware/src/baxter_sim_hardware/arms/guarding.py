@@ -32,7 +32,7 @@ class Guarding:
     cuff is.
 
     Attributes: `safety`: `arms.safety.Safety`, or None where collisions are only reported; `warn`: function(time_s,
-    kind, text) for the log.
+    kind, text) for the log; `held`: {side: names of the links that avoidance holds that arm away from now}.
     """
 
     def __init__(self, world, model, baxter, chains, guards, feel, is_squeezed):
@@ -41,7 +41,8 @@ class Guarding:
         self.fields = dict.fromkeys(SIDES, avoidance.FREE)
         self._feel, self._is_squeezed = feel, is_squeezed
         self.suppressions = {side: collision.Suppressions() for side in SIDES}
-        self._held = {side: collision.Held() for side in SIDES}
+        self._watches = {side: collision.Held() for side in SIDES}
+        self.held = dict.fromkeys(SIDES, ())
         self._schedule = Schedule(CHECK_RATE_HZ)
         self.safety, self.warn = None, None
 
@@ -70,10 +71,12 @@ class Guarding:
             self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
             self.fields[side] = self._field(side, time_s)
             self._arms.set_slowing(side, self.fields[side].slowing)
-            if self._held[side].look(time_s, self.fields[side].slowing):
+            is_held = self._watches[side].look(time_s, self.fields[side].slowing)
+            self.held[side] = tuple(_near(self.fields[side])) if is_held else ()
+            if is_held:
                 self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too "
                           "near to %s. Lead it round, or suppress that by limb/%s/%s" % (
-                              side, ", ".join(_near(self.fields[side])), side, collision.AVOIDANCE))
+                              side, ", ".join(self.held[side]), side, collision.AVOIDANCE))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats)
