@@ -12,7 +12,7 @@ import site
 import sys
 
 #: The packages of which modules are amended: rospy_fixes.table has the rows, and is read when one of them is imported.
-AMENDED = ("rospy", "rosgraph", "roslaunch", "actionlib", "catkin", "moveit_msgs")
+AMENDED = ("rospy", "rosgraph", "roslaunch", "actionlib", "catkin", "moveit_msgs", "gazebo_msgs")
 
 #: Folders of the system's programs.
 SYSTEM_FOLDERS = ("/usr/bin/", "/usr/sbin/", "/usr/lib/", "/usr/share/", "/bin/", "/sbin/", "/opt/ros/")

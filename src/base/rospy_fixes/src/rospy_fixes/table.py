@@ -69,8 +69,13 @@ FIXES = (
         "nobody's goal", "ros/actionlib#206", "test_goal_tracking.py"),
     Fix("actionlib.action_client", "lost_goals", EVERYWHERE, "a goal that is cancelled at once is taken for lost",
         "", "test_lost_goals.py"),
-    Fix("moveit_msgs.msg._PositionIKRequest", "former_fields", EVERYWHERE, "programs of ROS Kinetic set a field that "
-        "Noetic lacks", "", "test_former_fields.py"),
+    *(Fix(module, "former_fields", EVERYWHERE, "programs of ROS Kinetic set fields that Noetic lacks, or give "
+          "fields by position", "", "test_former_fields.py") for module in (
+        *("moveit_msgs.msg._" + name for name in (
+            "CollisionObject", "DisplayRobotState", "MotionPlanRequest", "OrientationConstraint", "PlaceLocation",
+            "PositionIKRequest")),
+        "moveit_msgs.srv._GetCartesianPath", "moveit_msgs.srv._GetPlannerParams", "moveit_msgs.srv._SetPlannerParams",
+        "gazebo_msgs.srv._SetLightProperties")),
     Fix("rospy.impl.tcpros_base", "ports.tcpros_server", NODES, "a client that connects and sends nothing blocks all "
         "others", "", "test_handshakes.py"),
     Fix("rospy.impl.tcpros_base", "ports.messages", NODES, "memory of any announced size is reserved",
