@@ -87,7 +87,7 @@ def test_all_fields_of_kinetic_by_position(name, fields, capsys):
     told = capsys.readouterr().err
     assert told.count("\n") <= 1 and (class_name in told or class_name in former_fields.FIELDS)  # once in a process
     with pytest.raises(TypeError):
-        message(*values[:-1])
+        message(*values, *values)
 
 
 def test_every_class_is_in_the_table():
