@@ -10,6 +10,7 @@ import math
 
 from baxter_interface.joint_checks import limb_joint_names
 from baxter_model import SIDES
+from command_line.options import counted
 from command_line.user_files import PIPE_WAIT_S, read_text
 
 #: An hour of both arms at 100 Hz has a quarter of it.
@@ -89,8 +90,8 @@ def parse(stream, path):
             time_s, *values = (float(value) for value in line)
             row = dict(zip(names, values, strict=True))
         except ValueError:
-            raise BadRecording("%s, line %d: expected %d numbers, got %r"
-                               % (path, number, len(names) + 1, ",".join(line))) from None
+            raise BadRecording("%s, line %d: expected %s, got %r"
+                               % (path, number, counted(len(names) + 1, "number"), ",".join(line))) from None
         if not all(map(math.isfinite, (time_s, *values))):
             raise BadRecording("%s, line %d: every number must be finite" % (path, number))
         if times_s and time_s <= times_s[-1]:

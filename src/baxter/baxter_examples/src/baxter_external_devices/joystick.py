@@ -5,6 +5,8 @@ import threading
 import rospy
 from sensor_msgs.msg import Joy
 
+from command_line.options import counted
+
 from .controls import CONTROLLERS, ButtonEvents, StickEvents
 
 
@@ -66,9 +68,10 @@ class Joystick:
                     for name, control in controls.items():
                         events[name].update(control.read(message.axes, message.buttons))
             except IndexError:
-                rospy.logwarn_throttle(5.0, "/joy has %d axes and %d buttons, which does not fit %s: is another "
+                rospy.logwarn_throttle(5.0, "/joy has %s and %s, which does not fit %s: is another "
                                             "controller plugged in?"
-                                            % (len(message.axes), len(message.buttons), type(self).__name__))
+                                            % (counted(len(message.axes), "axis", "axes"),
+                                               counted(len(message.buttons), "button"), type(self).__name__))
 
 
 class XboxController(Joystick):

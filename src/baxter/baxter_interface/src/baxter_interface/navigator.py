@@ -5,11 +5,11 @@ from baxter_core_msgs.msg import NavigatorState
 
 from baxter_dataflow import Signal
 from baxter_model import SIDES
+from command_line.options import counted
 
 from . import startup
 from .digital_io import DigitalIO
 from .wheel import wheel_steps
-from command_line.options import counted
 
 LOCATIONS = (*SIDES, *("torso_%s" % side for side in SIDES))
 # By their place in NavigatorState: pressing the wheel, the button above it, the button below it.
@@ -89,7 +89,8 @@ class Navigator:
     def _on_state(self, message):
         if len(message.buttons) < BUTTON_COUNT or len(message.lights) <= OUTER:
             rospy.logwarn_throttle(5.0, "navigator %s: a state with %s and %s is ignored: 3, 2 are due"
-                                        % (self._id, counted(len(message.buttons), "button"), counted(len(message.lights), "light")))
+                                        % (self._id, counted(len(message.buttons), "button"),
+                                           counted(len(message.lights), "light")))
             return
         before, self._last = self._last, message
         if before is None:

@@ -22,6 +22,7 @@ from baxter_interface import Limb
 from baxter_interface.goal_loop import SHORTEST_GOAL_S, start
 from baxter_interface.hindrance import ask_what_holds
 from baxter_interface.joint_limits import read_joint_limits
+from command_line.options import counted
 from joint_trajectory import (
     ErrorCode,
     Limits,
@@ -211,8 +212,8 @@ class JointTrajectoryActionServer:
         if before is not None:
             before.set_canceled(text="another goal took its place")
         if replacement.late_s > 0.0:
-            rospy.logwarn("%s arm: %d of %d points are left out: the first was due %.3f s ago", self._limb.name,
-                          replacement.dropped, len(command.times), replacement.late_s)
+            rospy.logwarn("%s arm: %d of %s are left out: the first was due %.3f s ago", self._limb.name,
+                          replacement.dropped, counted(len(command.times), "point"), replacement.late_s)
 
     def _cancel(self, handle):
         if self._motion.goal is not None and self._motion.goal == handle:

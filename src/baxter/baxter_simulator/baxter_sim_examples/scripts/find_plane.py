@@ -15,6 +15,7 @@ from baxter_interface.programs import ProgramFailed, run
 from baxter_sim_examples.hand_senses import Eyes
 from baxter_sim_examples.planes import NoPlane, fit_plane
 from baxter_sim_examples.scene import MIDDLE_M
+from command_line.options import counted
 
 # The points in this square around the middle of the arm's reach are looked at [m].
 AROUND_M = 0.3
@@ -35,9 +36,9 @@ def look():
     x, y = MIDDLE_M
     height = (plane.distance - plane.normal[0] * x - plane.normal[1] * y) / plane.normal[2]
     above = plane.height(points)
-    print("table: height %.4f, tilted by %.2f degrees, %d points; on it: %d points" % (
-        height, math.degrees(math.acos(min(1.0, plane.normal[2]))), plane.inliers.sum(),
-        ((above > ABOVE_M[0]) & (above < ABOVE_M[1])).sum()))
+    print("table: height %.4f, tilted by %.2f degrees, %s; on it: %s" % (
+        height, math.degrees(math.acos(min(1.0, plane.normal[2]))), counted(plane.inliers.sum(), "point"),
+        counted(((above > ABOVE_M[0]) & (above < ABOVE_M[1])).sum(), "point")))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy as np
 
 from baxter_lab import Arm, Mode
 from baxter_sim_hardware.arms.endpoint import joint_velocities
+from command_line.options import counted
 from urdf_model.transforms import axis_rotation
 
 #: What 1 means of joint_delta [rad], and of osc_pose [m], [rad] about an axis of `base`: as robosuite's controllers.
@@ -92,5 +93,5 @@ def checked(action: Sequence[float], size: int) -> np.ndarray:
     """(size,) an action, clipped to -1 … 1. Raises ValueError for another size and for NaN."""
     action = np.asarray(action, dtype=float)
     if action.shape != (size,) or np.isnan(action).any():
-        raise ValueError("an action is %d numbers from -1 to 1; found %s" % (size, action))
+        raise ValueError("an action is %s from -1 to 1; found %s" % (counted(size, "number"), action))
     return np.clip(action, -1.0, 1.0)

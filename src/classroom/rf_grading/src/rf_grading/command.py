@@ -10,7 +10,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from command_line.options import MOST_SEED, MOST_WORKERS, number, seconds
+from command_line.options import MOST_SEED, MOST_WORKERS, counted, number, seconds
 from command_line.user_files import read_file
 from lab_batch import JobError, Spec
 from lab_batch.keeping import default_memory_bytes
@@ -145,8 +145,9 @@ class _Grading:
                 _fail("the submissions are not compared with each other: %s" % reading.unforeseen(error))
                 pairs = []
             todo = [task for task in tasks.values() if task.key not in ledger.verdicts]
-            print("%d submissions, %d programs; %d have their verdict already, %d to judge; results in %s" % (
-                len(sent), sum(len(entry.keys) for entry in entries), len(tasks) - len(todo), len(todo), self._out),
+            print("%s, %s; %d have their verdict already, %d to judge; results in %s" % (
+                counted(len(sent), "submission"), counted(sum(len(entry.keys) for entry in entries), "program"),
+                len(tasks) - len(todo), len(todo), self._out),
                 flush=True)
             name = options.assignment or archives.stem(self._folder.name)
             try:

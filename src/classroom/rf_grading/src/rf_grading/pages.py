@@ -6,6 +6,7 @@ import shlex
 import statistics
 from urllib.parse import quote
 
+from command_line.options import counted
 from rf_grading import drawing
 from rf_grading.formats import plain
 from rf_grading.results import GRADED, NOT_GRADED, POINTS, held_back
@@ -132,8 +133,9 @@ def overview(results, seconds, feedback_of):
     the student's page."""
     graded = [row.points for row in results.rows if row.points is not None]
     conditions = ", ".join("%s %s" % one for one in results.conditions.items())
-    parts = ["<p>%d submissions, %d graded; %s; version %s%s.</p>" % (
-        len(results.rows), sum(row.status == GRADED for row in results.rows), _text(conditions), _text(results.version),
+    parts = ["<p>%s, %d graded; %s; version %s%s.</p>" % (
+        counted(len(results.rows), "submission"), sum(row.status == GRADED for row in results.rows),
+        _text(conditions), _text(results.version),
         "" if seconds is None else "; this start took %.0f s" % seconds)]
     if graded:
         parts.append("<p>Mean %.1f of %g points, median %.1f.</p>" % (

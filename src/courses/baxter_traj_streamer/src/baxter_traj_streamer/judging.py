@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from command_line.options import counted
 from joint_trajectory import Trajectory
 
 from .curve import fastest, has_positions_only, interpolate, joined
@@ -57,8 +58,8 @@ def judge(joint_names, points, limits, measured, settings):
     if not points:
         raise GoalRefused("empty", "the trajectory has no points; give it at least one")
     if len(points) > settings.max_points:
-        raise GoalRefused("too_long", "the trajectory has %d points; at most %d are accepted (max_points)" % (
-            len(points), settings.max_points), value=len(points), limit=settings.max_points)
+        raise GoalRefused("too_long", "the trajectory has %s; at most %d are accepted (max_points)" % (
+            counted(len(points), "point"), settings.max_points), value=len(points), limit=settings.max_points)
     for index, point in enumerate(points):
         _judge_numbers(index, point, names)
     times = np.array([point[0] for point in points], dtype=float)

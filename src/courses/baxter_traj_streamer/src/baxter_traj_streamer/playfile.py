@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from command_line.options import counted
 from command_line.user_files import PIPE_WAIT_S, read_text
 
 from .errors import GoalRefused
@@ -102,8 +103,8 @@ def check(playfiles, limits, settings):
 
 def _numbers(fields, source, line):
     if len(fields) != _COLUMNS:
-        raise PlayfileError("%s, line %d has %d numbers, expected %d: %s, arrival time" % (
-            source, line, len(fields), _COLUMNS, ", ".join(JOINTS)))
+        raise PlayfileError("%s, line %d has %s, expected %d: %s, arrival time" % (
+            source, line, counted(len(fields), "number"), _COLUMNS, ", ".join(JOINTS)))
     row = []
     for field, name in zip(fields, (*JOINTS, "arrival time"), strict=True):
         try:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from baxter_model import joint_names
+from command_line.options import counted
 from rf_checks.measures import pose_error
 from urdf_model.transforms import matrix_from_quaternion, rotation_angle
 
@@ -162,8 +163,8 @@ def command_slip(commands):
             return "repeated_names", ("the joint command names %s more than once and misses %s; %s"
                                       % (" and ".join(repeated), " and ".join(missing) or "none", SHEET_NAMES))
         if len(names) != len(values):
-            return "lengths", ("the joint command has %d names and %d values; each joint needs one of each"
-                               % (len(names), len(values)))
+            return "lengths", ("the joint command has %s and %s; each joint needs one of each"
+                               % (counted(len(names), "name"), counted(len(values), "value")))
     # Use the farthest of all commands, since records contain only some of them.
     value, name = max(((value, name) for _, _, names, values in commands
                        for name, value in zip(names, values, strict=True)), key=lambda pair: abs(pair[0]),

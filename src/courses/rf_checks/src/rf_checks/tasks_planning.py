@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from baxter_model import joint_names, poses
+from command_line.options import counted
 from rf_checks import measures
 from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import Call, motion_criteria, postures
@@ -119,8 +120,8 @@ class PlanAround:
             return None
         end = "; the arm ran into it" if _touched(run.recording) else ""
         if len(told) > MOST_BOXES:
-            return Fault("too_many_boxes", "move_group was told of %d boxes%s: one stands there, with the numbers on "
-                         "the command line" % (len(told), end))
+            return Fault("too_many_boxes", "move_group was told of %s%s: one stands there, with the numbers on "
+                         "the command line" % (counted(len(told), "box", "boxes"), end))
         if not told:
             return Fault("no_box", "move_group was told of no box, so it plans as if nothing stood there%s: "
                          "PlanningSceneInterface().add_box(NAME, POSE, SIZE) before you plan" % end)

@@ -10,6 +10,7 @@ import re
 import numpy as np
 
 from baxter_model import SIDES
+from command_line.options import counted
 from rf_checks import measures, slips
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
@@ -82,7 +83,8 @@ class TfListener:
                                       default=(np.inf, np.inf))
             share = min(ramp(distance, *OFF_M), ramp(angle, *OFF_RAD))
             none = ("the last matrix printed is not this" if len(call.expected) == 1 else
-                    "none of the last %d matrices printed is this" % len(call.expected)) if found else "none printed"
+                    "none of the last %s printed is this"
+                    % counted(len(call.expected), "matrix", "matrices")) if found else "none printed"
             text = none if share == 0.0 else (
                 "as it is" if share == 1.0 else "%.1f mm and %.3f rad off" % (1000 * distance, angle))
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))

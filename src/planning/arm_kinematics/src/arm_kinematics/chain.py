@@ -6,6 +6,7 @@ import numpy as np
 
 from arm_kinematics import kernels
 from arm_kinematics.errors import ChainError, InvalidPosture
+from command_line.options import counted
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
@@ -117,10 +118,11 @@ class Chain:
         try:
             q = np.array(values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InvalidPosture("joint values must be %d numbers, got %r" % (len(self), values), values) from None
+            raise InvalidPosture("joint values must be %s, got %r" % (counted(len(self), "number"), values),
+                                 values) from None
         if q.shape != (len(self),):
-            raise InvalidPosture("expected %d joint values (%s), got an array of shape %s"
-                                 % (len(self), ", ".join(self.joint_names), q.shape), values)
+            raise InvalidPosture("expected %s (%s), got an array of shape %s"
+                                 % (counted(len(self), "joint value"), ", ".join(self.joint_names), q.shape), values)
         # The sum of the squares is finite unless a value is not, or is impossibly large.
         if not math.isfinite(q.dot(q)) and not all(map(math.isfinite, q.tolist())):
             bad = ["%s = %s" % pair for pair in zip(self.joint_names, q, strict=True) if not math.isfinite(pair[1])]
@@ -134,7 +136,8 @@ class Chain:
         Raises InvalidPosture when the lists differ in length, or a joint of the chain is missing, repeated, not finite.
         """
         if len(names) != len(positions):
-            raise InvalidPosture("%d joint names but %d positions" % (len(names), len(positions)), positions)
+            raise InvalidPosture("%s but %s" % (counted(len(names), "joint name"),
+                                                counted(len(positions), "position")), positions)
         missing = [name for name in self.joint_names if name not in names]
         if missing:
             raise InvalidPosture("no value for %s; expected the joints %s, got %s"

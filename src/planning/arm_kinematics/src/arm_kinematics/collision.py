@@ -8,6 +8,7 @@ import numpy as np
 from arm_kinematics.chain import Chain
 from arm_kinematics.errors import Attempt, NoSolution, Reason
 from arm_kinematics.search import Collection, IkResult
+from command_line.options import counted
 
 # Number of solutions checked between two searches; the first ones are mostly free.
 _CHUNK = 6
@@ -85,6 +86,6 @@ def first_free(search, found, checker):
     (link_a, link_b, with_world), times = touches.most_common(1)[0]
     reason = Reason.WORLD_COLLISION if with_world else Reason.SELF_COLLISION
     raise NoSolution(
-        search.target.pose, reason, "%s touches %s in %d of the %d postures that reach the pose, and none of them is "
-        "clear; move the target or turn it" % (link_a, link_b, times, sum(touches.values())),
+        search.target.pose, reason, "%s touches %s in %d of the %s that reach the pose, and none of them is "
+        "clear; move the target or turn it" % (link_a, link_b, times, counted(sum(touches.values()), "posture")),
         Attempt(found.q, search.chain.fk(found.q), found.residual_m, found.residual_rad), pair=(link_a, link_b))

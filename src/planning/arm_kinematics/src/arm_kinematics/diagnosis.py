@@ -10,6 +10,7 @@ from arm_kinematics.budget import MAX_ITERATIONS, MAX_STARTS
 from arm_kinematics.errors import Attempt, NoSolution, Reason
 from arm_kinematics.kernels import Rows
 from arm_kinematics.search import Collection
+from command_line.options import counted
 
 # If the pose error stays above this without limits, more iterations will not help [m or rad].
 _CLEARLY_OFF = 1e-4
@@ -78,9 +79,9 @@ def explain(search, found):
                                 "move it into the workspace")
         raise _out_of_reach(search, "the arm does not get there even without its joint limits; move the target into "
                             "the workspace")
-    raise _failure(search, Reason.NOT_CONVERGED, "%d starts came close but none within the tolerance; the target is at "
+    raise _failure(search, Reason.NOT_CONVERGED, "%s came close but none within the tolerance; the target is at "
                    "the edge of the workspace or near a singularity, move it a little or try another seed"
-                   % found.starts, (found.q, found.residual_m, found.residual_rad))
+                   % counted(found.starts, "start"), (found.q, found.residual_m, found.residual_rad))
 
 
 def _budget(search, starts):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arm_kinematics.reach import ReachError
+from command_line.options import counted
 from urdf_model.transforms import rigid, rpy_matrix
 
 # Places times poses, and poses of a task: more take minutes and gigabytes.
@@ -65,8 +66,8 @@ def table_poses(width_m, depth_m, step_m, rotations):
         raise ReachError("a table has a positive width and depth, got %g and %g m" % (width_m, depth_m))
     counts = [max(2, math.ceil(size / step_m) + 1) for size in (depth_m, width_m)]
     if math.prod(counts) * len(rotations) > _MOST_POSES:
-        raise ReachError("a table of %g by %g m with a point every %g m has %d poses; take a larger step"
-                         % (width_m, depth_m, step_m, math.prod(counts) * len(rotations)))
+        raise ReachError("a table of %g by %g m with a point every %g m has %s; take a larger step"
+                         % (width_m, depth_m, step_m, counted(math.prod(counts) * len(rotations), "pose")))
     xs, ys = (np.linspace(-0.5 * size, 0.5 * size, count)
               for size, count in zip((depth_m, width_m), counts, strict=True))
     return np.array([rigid(rotation, (x, y, 0.0)) for x in xs for y in ys for rotation in rotations])
@@ -80,8 +81,8 @@ def best_places(reach_map, poses, region, most=10):
     """
     places = math.prod(region.shape) * len(region.yaws)
     if places * len(poses) > _MOST_LOOKUPS:
-        raise ReachError("%d places and %d poses are too many; take a larger step or a smaller region"
-                         % (places, len(poses)))
+        raise ReachError("%s and %s are too many; take a larger step or a smaller region"
+                         % (counted(places, "place"), counted(len(poses), "pose")))
     positions = region.positions()
     share, found = reach_map.share, []
     for yaw in region.yaws:

@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from command_line.options import counted
+
 #: Levels of an octomap, from the cube around everything to the smallest.
 OCTREE_DEPTH = 16
 
@@ -35,7 +37,7 @@ class TriangleMesh:
             raise ValueError("a mesh needs vertices (n, 3) and triangles (m, 3), got %s and %s"
                              % (vertices.shape, triangles.shape))
         if not len(triangles):
-            raise ValueError("the mesh has %d vertices and no triangles" % len(vertices))
+            raise ValueError("the mesh has %s and no triangles" % counted(len(vertices), "vertex", "vertices"))
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise ValueError("triangles of the mesh name vertices %d to %d, but it has %d"
                              % (triangles.min(), triangles.max(), len(vertices)))

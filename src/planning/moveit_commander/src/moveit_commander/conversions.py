@@ -4,6 +4,7 @@ import io
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, Vector3
 
+from command_line.options import counted
 from urdf_model.transforms import (
     matrix_from_quaternion,
     pose_matrix,
@@ -47,7 +48,7 @@ def list_to_pose(pose_list):
         turn = quaternion_from_matrix(pose_matrix(rpy=values[3:])).tolist()
     else:
         raise MoveItCommanderException("a pose is x, y, z and either a quaternion (7 values) or roll, pitch, yaw (6); "
-                                       "got %d values" % len(values))
+                                       "got %s" % counted(len(values), "value"))
     return Pose(Point(*values[:3]), Quaternion(*turn))
 
 

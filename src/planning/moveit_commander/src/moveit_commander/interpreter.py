@@ -7,6 +7,7 @@ from pathlib import Path
 import rosgraph
 from geometry_msgs.msg import PoseStamped
 
+from command_line.options import counted
 from urdf_model import bounds, read_text
 
 from .conversions import list_to_pose
@@ -292,7 +293,8 @@ class MoveGroupCommandInterpreter:
             name, index = cell[1], int(cell[2])
             values = self._values(name)
             if index >= len(values):
-                raise MoveItCommanderException("'%s' has %d values; there is no [%d]" % (name, len(values), index))
+                raise MoveItCommanderException("'%s' has %s; there is no [%d]" % (name, counted(len(values), "value"),
+                                                                                  index))
             values[index] = float(value)
         elif value.startswith("["):
             values = [float(number) for number in re.findall(_NUMBER, value)]

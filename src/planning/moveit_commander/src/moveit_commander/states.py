@@ -2,6 +2,7 @@
 """moveit_msgs/RobotState and the core's states."""
 from moveit_msgs.msg import RobotState
 
+from command_line.options import counted
 from motion_planning.model import ModelError
 from urdf_model.transforms import rpy_from_matrix
 
@@ -12,8 +13,8 @@ from .exception import MoveItCommanderException
 def named_positions(joints):
     """Return {joint: position} of a sensor_msgs/JointState. Raises MoveItCommanderException for unequal lists."""
     if len(joints.name) != len(joints.position):
-        raise MoveItCommanderException("the joint state has %d names and %d positions"
-                                       % (len(joints.name), len(joints.position)))
+        raise MoveItCommanderException("the joint state has %s and %s"
+                                       % (counted(len(joints.name), "name"), counted(len(joints.position), "position")))
     return dict(zip(joints.name, joints.position, strict=True))
 
 

@@ -10,6 +10,7 @@ from moveit_msgs.msg import (
 from sensor_msgs.msg import JointState
 
 from arm_kinematics import NoSolution, solve
+from command_line.options import counted
 from urdf_model.transforms import rpy_from_matrix, rpy_matrix
 
 from . import states
@@ -119,8 +120,9 @@ class Targeting(Tunable):
         """Remember joint values, those of now unless some are given, under a name."""
         values = list(values) if values is not None else self.get_current_joint_values()
         if len(values) != self.get_variable_count():
-            raise MoveItCommanderException("group '%s' has %d joints, got %d values"
-                                           % (self._group.name, self.get_variable_count(), len(values)))
+            raise MoveItCommanderException("group '%s' has %s, got %s"
+                                           % (self._group.name, counted(self.get_variable_count(), "joint"),
+                                              counted(len(values), "value")))
         self._remembered[name] = values
 
     def get_remembered_joint_values(self):
@@ -148,7 +150,7 @@ class Targeting(Tunable):
     def set_rpy_target(self, rpy, end_effector_link=""):
         """Set the orientation of a link to reach, [roll, pitch, yaw]."""
         if len(rpy) != 3:
-            raise MoveItCommanderException("expected roll, pitch and yaw, got %d values" % len(rpy))
+            raise MoveItCommanderException("expected roll, pitch and yaw, got %s" % counted(len(rpy), "value"))
         turn = np.eye(4)
         turn[:3, :3] = rpy_matrix(*rpy)
         self._set_part(ORIENTATION, end_effector_link, orientation=pose_of(turn).orientation)
@@ -156,13 +158,13 @@ class Targeting(Tunable):
     def set_orientation_target(self, q, end_effector_link=""):
         """Set the orientation of a link to reach, a quaternion [x, y, z, w]."""
         if len(q) != 4:
-            raise MoveItCommanderException("expected a quaternion x, y, z, w, got %d values" % len(q))
+            raise MoveItCommanderException("expected a quaternion x, y, z, w, got %s" % counted(len(q), "value"))
         self._set_part(ORIENTATION, end_effector_link, orientation=list_to_pose([0.0, 0.0, 0.0, *q]).orientation)
 
     def set_position_target(self, xyz, end_effector_link=""):
         """Set the position of a link to reach, [x, y, z]; any orientation will do."""
         if len(xyz) != 3:
-            raise MoveItCommanderException("expected x, y, z, got %d values" % len(xyz))
+            raise MoveItCommanderException("expected x, y, z, got %s" % counted(len(xyz), "value"))
         self._set_part(POSITION, end_effector_link, position=list_to_pose([*xyz, 0.0, 0.0, 0.0]).position)
 
     def _set_part(self, kind, link, **part):

@@ -2,6 +2,7 @@
 """Target joint values of a group. No ROS needed; angles in rad, lengths in m."""
 import numpy as np
 
+from command_line.options import counted
 from motion_planning.model import ModelError
 
 from .exception import MoveItCommanderException
@@ -38,8 +39,9 @@ class JointTarget:
         if len(values) != len(names):
             names = self._group.joints
         if len(values) != len(names):
-            raise MoveItCommanderException("group '%s' has %d joints (%s), got %d values" % (
-                self._group.name, len(self._group.valued_joints), ", ".join(self._group.valued_joints), len(values)))
+            raise MoveItCommanderException("group '%s' has %s (%s), got %s" % (
+                self._group.name, counted(len(self._group.valued_joints), "joint"),
+                ", ".join(self._group.valued_joints), counted(len(values), "value")))
         self.set_by_name(dict(zip(names, values, strict=True)), tolerance)
 
     def set_by_name(self, values, tolerance):

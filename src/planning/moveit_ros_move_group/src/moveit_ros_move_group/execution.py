@@ -9,6 +9,7 @@ import rospy
 from moveit_msgs.msg import MoveItErrorCodes
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from command_line.options import counted
 from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
 from moveit_ros_move_group.handles import TICK_S
 
@@ -247,11 +248,12 @@ def _flaw(trajectory):
             ", ".join(trajectory.joint_names) or "missing")
     for i, point in enumerate(trajectory.points, 1):
         if len(point.positions) != count:
-            return "point %d of the trajectory has %d positions for %d joints" % (i, len(point.positions), count)
+            return "point %d of the trajectory has %s for %s" % (i, counted(len(point.positions), "position"),
+                                                                 counted(count, "joint"))
         for name in ("velocities", "accelerations", "effort"):
             given = len(getattr(point, name))
             if given not in (0, count):
-                return "point %d of the trajectory has %d %s for %d joints" % (i, given, name, count)
+                return "point %d of the trajectory has %d %s for %s" % (i, given, name, counted(count, "joint"))
         numbers = (*point.positions, *point.velocities, *point.accelerations, *point.effort)
         if not all(map(math.isfinite, numbers)):
             return "point %d of the trajectory holds a number that is not finite" % i

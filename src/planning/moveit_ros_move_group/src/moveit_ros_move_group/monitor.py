@@ -11,6 +11,7 @@ import tf2_ros
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneWorld
 from sensor_msgs.msg import JointState
 
+from command_line.options import counted
 from motion_planning.errors import PlanningError
 from motion_planning.scene import Scene
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
@@ -214,8 +215,9 @@ class SceneMonitor:
 
     def _on_joint_state(self, message):
         if len(message.name) != len(message.position):
-            rospy.logwarn_throttle(30.0, "a joint state on %s has %d names but %d positions; it is left out"
-                                   % (self.joint_state_topic, len(message.name), len(message.position)))
+            rospy.logwarn_throttle(30.0, "a joint state on %s has %s but %s; it is left out"
+                                   % (self.joint_state_topic, counted(len(message.name), "name"),
+                                      counted(len(message.position), "position")))
             return
         stamp = message.header.stamp
         with self._lock:

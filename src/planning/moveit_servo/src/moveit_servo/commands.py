@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from command_line.options import counted
 from moveit_servo.settings import UNITLESS
 
 if TYPE_CHECKING:
@@ -63,7 +64,8 @@ class Commands:
         if not np.isfinite(values).all():
             raise CommandIgnored("joint velocities are not finite: %s" % values.tolist())
         if len(values) < len(names):
-            raise CommandIgnored("a joint command has %d names but %d velocities" % (len(names), len(values)))
+            raise CommandIgnored("a joint command has %s but %s" % (counted(len(names), "name"),
+                                                                    counted(len(values), "velocitie")))
         scale = settings.joint_scale if settings.command_in_type == UNITLESS else 1.0
         wanted, foreign = np.zeros(len(self.joints)), []
         for name, value in zip(names, values, strict=False):

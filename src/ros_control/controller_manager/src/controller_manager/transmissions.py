@@ -9,6 +9,8 @@ from typing import Any
 
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
 
+from command_line.options import counted
+
 from .errors import HardwareError
 from .interfaces import EFFORT, POSITION, VELOCITY
 from .limits import SoftLimits
@@ -123,7 +125,8 @@ def _transmission(element: Any, where: str, warnings: _Warnings) -> list[Control
     else:
         used = joints[:1]
         if len(joints) > 1:
-            warnings.add(where, "of %d joints only the first one, '%s', is used" % (len(joints), joints[0].get("name")))
+            warnings.add(where, "of %s only the first one, '%s', is used" % (
+                counted(len(joints), "joint"), joints[0].get("name")))
     # A joint has the actuator at its place in the list; more joints than actuators share the last one.
     pairs = [(joint, actuators[min(number, len(actuators) - 1)]) for number, joint in enumerate(used)]
     controlled = [found for joint, actuator in pairs

@@ -15,6 +15,7 @@ from control_msgs.msg import (
 from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateResponse
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from command_line.options import counted
 from controller_manager import EFFORT, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
 from joint_trajectory import (
@@ -210,8 +211,9 @@ class JointTrajectoryController(Controller):
         replacement = self._follower.accept(command, now, self._position, handle, tolerances)
         self._began = now if start_time is None else start_time
         if replacement is not None and replacement.late_s > 0.0:
-            self.log.warn("%s: %d of %d points of a trajectory are left out: the first was due %.6f s ago"
-                          % (self.context.namespace, replacement.dropped, len(message.points), replacement.late_s))
+            self.log.warn("%s: %d of %s of a trajectory are left out: the first was due %.6f s ago"
+                          % (self.context.namespace, replacement.dropped, counted(len(message.points), "point"),
+                             replacement.late_s))
 
     def _conclude(self, verdict):
         handle = self._follower.goal

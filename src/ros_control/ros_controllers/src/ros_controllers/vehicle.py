@@ -7,6 +7,7 @@ from geometry_msgs.msg import Quaternion, TransformStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
+from command_line.options import counted
 from controller_manager import Controller, ControllerError
 from ros_controllers.speed_limits import read_speed_limits
 from ros_controllers.wheel_odometry import WheelOdometry
@@ -121,8 +122,9 @@ class VehicleController(Controller):
     def _take_command(self, message, time_s):
         wanted = message.linear.x, message.angular.z
         if self._one_sender and self._commands.senders() > 1:
-            self.log.error_throttle(1.0, "%s: %d nodes publish commands and allow_multiple_cmd_vel_publishers is "
-                                    "false: it stops" % (self.context.resolve("cmd_vel"), self._commands.senders()))
+            self.log.error_throttle(1.0, "%s: %s publish commands and allow_multiple_cmd_vel_publishers is "
+                                    "false: it stops" % (self.context.resolve("cmd_vel"),
+                                                         counted(self._commands.senders(), "node")))
             self._wanted = (0.0, 0.0)
             return
         if not all(map(math.isfinite, wanted)):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from command_line.options import counted
 from urdf_model import bounds
 
 from .body import BASE, Body
@@ -288,7 +289,7 @@ class Model(Body):
         Raises BulletSimError out of bounds.
         """
         if len(index) != len(position):
-            raise BulletSimError("%d joints but %d positions" % (len(index), len(position)))
+            raise BulletSimError("%s but %s" % (counted(len(index), "joint"), counted(len(position), "position")))
         if not np.dot(position, position) <= _SURELY_FINE:
             for i, value in zip(index, position, strict=True):
                 within(bounds.JOINT_POSITION, value, "the position of joint '%s'" % self.joint_names[i])

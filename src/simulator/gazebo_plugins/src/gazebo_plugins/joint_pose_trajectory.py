@@ -5,6 +5,7 @@ from gazebo_msgs.srv import SetJointTrajectory, SetJointTrajectoryResponse
 from trajectory_msgs.msg import JointTrajectory
 
 from bullet_sim import BulletSimError, Pose
+from command_line.options import counted
 from gazebo_ros.convert import pose_from_msg
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.urdf_extras import unscoped
@@ -112,8 +113,8 @@ class JointPoseTrajectory(ModelPlugin):
         points = []
         for number, point in enumerate(trajectory.points):
             if len(point.positions) != len(names):
-                return ("point %d has %d positions for %d joints; send one for each"
-                        % (number, len(point.positions), len(names)))
+                return ("point %d has %s for %s; send one for each"
+                        % (number, counted(len(point.positions), "position"), counted(len(names), "joint")))
             try:
                 positions = np.array(bounds.JOINT_POSITION.check(point.positions, "point %d" % number), dtype=float)
             except ValueError as error:

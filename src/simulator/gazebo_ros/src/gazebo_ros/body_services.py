@@ -29,6 +29,7 @@ from gazebo_msgs.srv import (
 )
 
 from bullet_sim import BulletSimError, Pose
+from command_line.options import counted
 from gazebo_ros import dragging
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
@@ -105,7 +106,8 @@ class BodyServices:
             self._log.warn_throttle(5.0, "/gazebo/drag: %s" % error)
             return
         if target not in self._drags and len(self._drags) >= _MOST_DRAGS:
-            self._log.warn_throttle(5.0, "/gazebo/drag: %d links are pulled already, expected less" % len(self._drags))
+            self._log.warn_throttle(5.0, "/gazebo/drag: %s are pulled already, expected less"
+                                    % counted(len(self._drags), "link"))
             return
         self._drags.ask(target, dragging.Drag(grip, end, time.monotonic()))
 

@@ -2,6 +2,7 @@
 """The status of /gazebo on /diagnostics: messages and requests that failed, threads and plugins that failed."""
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from command_line.options import counted
 from gazebo_ros.pacing import ticks_between
 from rospy_fixes.ports.threads import STATUS_NAME
 from sim_time.stamps import stamp_ns
@@ -65,5 +66,6 @@ def _status_of(hosted):
     values = [KeyValue("failures", str(hosted.failures)), KeyValue("newest", hosted.last_error)]
     if hosted.has_failed:
         return DiagnosticStatus(DiagnosticStatus.ERROR, name, "failed; a reset revives it", _HARDWARE, values)
-    return DiagnosticStatus(DiagnosticStatus.WARN, name, "works again, after %d failures" % hosted.failures, _HARDWARE,
+    return DiagnosticStatus(DiagnosticStatus.WARN, name, "works again, after %s" % counted(hosted.failures, "failure"),
+                            _HARDWARE,
                             values)

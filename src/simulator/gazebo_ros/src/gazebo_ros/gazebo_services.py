@@ -32,6 +32,7 @@ from geometry_msgs.msg import Vector3
 from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_sim import BulletSimError
+from command_line.options import counted
 from gazebo_ros.body_services import BodyServices
 from gazebo_ros.changes import Changes
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg
@@ -252,8 +253,8 @@ class GazeboServices:
         try:
             model = self._entities.model(request.model_name)
             if len(names) != len(positions):
-                raise ValueError("%d joint names but %d positions; give one position for each joint"
-                                 % (len(names), len(positions)))
+                raise ValueError("%s but %s; give one position for each joint"
+                                 % (counted(len(names), "joint name"), counted(len(positions), "position")))
             self._put_joints(model, [unscoped(model.name, name) for name in names], positions)
         except (UnknownEntity, BulletSimError, ValueError) as error:
             return SetModelConfigurationResponse(False, "SetModelConfiguration: %s" % error)

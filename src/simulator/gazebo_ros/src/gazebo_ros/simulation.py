@@ -8,6 +8,7 @@ import time
 import traceback
 from concurrent.futures import Future
 
+from command_line.options import counted
 from gazebo_ros.pacing import LATE_S, Pacer
 from loop_ros.faults import SURVIVED, described
 
@@ -193,7 +194,7 @@ class Simulation:
         if not self.paused:
             raise AdvanceRefused("the world is running; call /gazebo/pause_physics first")
         if self._advance is not None:
-            raise AdvanceRefused("another advance is under way (%d ticks left)" % self._advance.remaining)
+            raise AdvanceRefused("another advance is under way (%s left)" % counted(self._advance.remaining, "tick"))
         if not timeout_s >= 0.0:
             raise AdvanceRefused("timeout_s is %r, expected 0 or a positive number of seconds" % (timeout_s,))
         heard = self._deliveries()
@@ -246,7 +247,8 @@ class Simulation:
     def _advance_turn(self):
         advance = self._advance
         if not self.paused:
-            self._end_advance(AdvanceRefused("the world was unpaused with %d ticks left" % advance.remaining))
+            self._end_advance(AdvanceRefused(
+                "the world was unpaused with %s left" % counted(advance.remaining, "tick")))
             return
         if advance.awaited:
             counts = self._deliveries()

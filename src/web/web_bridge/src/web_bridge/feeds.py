@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from typing import NamedTuple
 
+from command_line.options import counted
 from web_bridge.errors import BridgeError
 from web_bridge.frames import cbor, json_text, packed_png, split
 
@@ -103,8 +104,8 @@ class ClientFeed:
         """A subscription; one of the same name is replaced. Raises BridgeError for one too many."""
         with self._lock:
             if name not in self._wishes and len(self._wishes) >= MOST_OF_A_TOPIC:
-                raise BridgeError("this client has %d subscriptions to %s already; unsubscribe from those that are not "
-                                  "needed any more" % (len(self._wishes), self._topic))
+                raise BridgeError("this client has %s to %s already; unsubscribe from those that are not "
+                                  "needed any more" % (counted(len(self._wishes), "subscription"), self._topic))
             self._wishes[name] = wish
             self._join()
 

@@ -16,6 +16,7 @@ import sys
 
 import cbor2
 
+from command_line.options import counted
 from web_bridge.errors import FieldError, shown
 
 _TYPE = re.compile(r"([^\[]+)(?:\[(\d*)\])?\Z")
@@ -166,8 +167,9 @@ class Reader:
             return message
         if isinstance(values, list | tuple):
             if len(values) > len(message.__slots__):
-                _pass_over("%d values for %s, which has %d fields"
-                           % (len(values), message._type, len(message.__slots__)), unread)
+                _pass_over("%s for %s, which has %s"
+                           % (counted(len(values), "value"), message._type,
+                              counted(len(message.__slots__), "field")), unread)
             values = dict(zip(message.__slots__, values, strict=False))
         self._lay(message, values, "", unread)
         return message
@@ -198,7 +200,7 @@ class Reader:
         else:
             raise FieldError("%s is %s; a list is expected (%s)" % (path, shown(value), slot_type))
         if length and len(found) != length:
-            raise FieldError("%s has %d elements; %d are expected" % (path, len(found), length))
+            raise FieldError("%s has %s; %d are expected" % (path, counted(len(found), "element"), length))
         return found
 
     def _many(self, base, values, path, unread):

@@ -9,6 +9,7 @@ from sensor_msgs import point_cloud2
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, Range
 
 from baxter_dataflow import wait_for
+from command_line.options import counted
 from urdf_model.transforms import matrix_from_quaternion, rigid
 
 from .looking import View
@@ -77,7 +78,7 @@ def _next_messages(topic, kind, count=1):
     subscriber = rospy.Subscriber(topic, kind, messages.append)
     try:
         wait_for(lambda: len(messages) >= count, TIMEOUT_S,
-                 timeout_msg="fewer than %d messages came on %s in %.0f s" % (count, topic, TIMEOUT_S))
+                 timeout_msg="fewer than %s came on %s in %.0f s" % (counted(count, "message"), topic, TIMEOUT_S))
     finally:
         subscriber.unregister()
     return messages[:count]

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from command_line.options import counted
+
 from .pick_and_place import Spot, start_angles, tool_down
 from .scene import BLOCK_SIZE_M
 from .tagged import BLOCK_TAG, BLOCK_TAG_M
@@ -99,8 +101,8 @@ def table_height(sensor_m, readings):
     those of its readings [m] that are near their median. Raises NotSeen where fewer than five say something."""
     heard = [reading for reading in readings if reading < _NOTHING_M]
     if len(heard) < _LEAST_READINGS:
-        raise NotSeen("the range sensor at %.2f m sees no table: %d of %d readings have an echo" % (
-            sensor_m, len(heard), len(readings)))
+        raise NotSeen("the range sensor at %.2f m sees no table: %d of %s have an echo" % (
+            sensor_m, len(heard), counted(len(readings), "reading")))
     heard = np.array(heard)
     return sensor_m - float(heard[np.abs(heard - np.median(heard)) < _OUTLIER_M].mean())
 

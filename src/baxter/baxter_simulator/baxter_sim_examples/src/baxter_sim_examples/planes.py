@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from command_line.options import counted
+
 # So often a plane is fitted at most; a few times are usual.
 _MOST_FITS = 20
 
@@ -33,7 +35,7 @@ def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
     points = np.asarray(points, dtype=float)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 3:
-        raise NoPlane("%d points are too few for a plane; expected 3 or more" % len(points))
+        raise NoPlane("%s are too few for a plane; expected 3 or more" % counted(len(points), "point"))
     random = np.random.default_rng(seed)
     best = None
     for three in random.integers(len(points), size=(tries, 3)):
@@ -46,7 +48,7 @@ def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
         if best is None or inliers.sum() > best.sum():
             best = inliers
     if best is None or best.sum() < 3:
-        raise NoPlane("no three of the %d points span a plane" % len(points))
+        raise NoPlane("no three of the %s span a plane" % counted(len(points), "point"))
     # Fitted again to the points near the fitted plane: a plane through three noisy points is tilted, and so are the
     # borders of the points near it.
     for _ in range(_MOST_FITS):

@@ -13,7 +13,7 @@ from arm_kinematics.ik import solve_all
 from arm_kinematics.reach import yoshikawa
 from arm_kinematics.target import Target, pose_from_quaternion
 from baxter_model import BASE_FRAME, SIDES, poses, tip_of
-from command_line.options import number
+from command_line.options import counted, number
 from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
@@ -133,7 +133,7 @@ def ik():
 def _ik(parser, options):
     expected = 3 if options.position_only else 6 if options.rpy else 7
     if len(options.pose) != expected:
-        parser.error("expected %d numbers for the pose, got %d" % (expected, len(options.pose)))
+        parser.error("expected %s for the pose, got %d" % (counted(expected, "number"), len(options.pose)))
     position, turn = options.pose[:3], options.pose[3:]
     if options.position_only:
         target = rigid(np.eye(3), position)

@@ -4,6 +4,7 @@ import enum
 from typing import NamedTuple
 
 from arm_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
+from command_line.options import counted
 
 
 class SeedMode(enum.IntEnum):
@@ -81,7 +82,8 @@ class SeedPolicy:
         if not names and not positions:
             if demanded:
                 raise InvalidSeed("seed_mode USER needs one seed_angles entry with the limb's joints for each pose, "
-                                  "this one has none (%d seeds for %d poses)" % (len(request.given), request.poses))
+                                  "this one has none (%s for %s)" % (counted(len(request.given), "seed"),
+                                                                     counted(request.poses, "pose")))
             return None
         try:
             return self._chain.posture_by_name(list(names), list(positions))

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from command_line.options import counted
 from motion_planning.errors import PlanningError
 from motion_planning.kinematics import ik
 from motion_planning.pipeline import Code, PlanningFailure
@@ -52,8 +53,8 @@ def _posture(query, goal):
     if foreign:
         raise _bad("joint '%s' of the goal is not in group '%s'" % (foreign[0], group.name))
     if query.planner_id != "PTP" and len(wanted) != len(group.joints):
-        raise _bad("the goal names %d joints; %s needs all %d of group '%s'"
-                   % (len(wanted), query.planner_id, len(group.joints), group.name))
+        raise _bad("the goal names %s; %s needs all %d of group '%s'"
+                   % (counted(len(wanted), "joint"), query.planner_id, len(group.joints), group.name))
     state = query.scene.state.with_joints(wanted)
     beyond = model.beyond_limits(state.q, 1e-9, [model.index[joint] for joint in wanted])
     if beyond:

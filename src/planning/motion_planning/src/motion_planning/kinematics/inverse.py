@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 
+from command_line.options import counted
 from motion_planning.kinematics.limb import KinematicsFailure, NoIkSolution, limbs_of
 from motion_planning.model import Group, ModelError, State
 
@@ -71,7 +72,8 @@ def _search(model, start, problem, accept, progress):
             if clock() >= deadline:
                 break
         if clock() >= deadline:
-            raise NoIkSolution("%d solutions were found and refused, the nearest because %s" % (tried, refusal), True)
+            raise NoIkSolution("%s were found and refused, the nearest because %s" % (counted(tried, "solution"),
+                                                                                      refusal), True)
         around = generator.uniform(model.bounds[:, 0], model.bounds[:, 1])
 
 

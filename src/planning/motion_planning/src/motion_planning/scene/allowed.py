@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from command_line.options import counted
 from motion_planning.model.planning_model import pair_of
 
 
@@ -40,8 +41,9 @@ class AllowedCollisions:
         Raises ValueError for lists that do not fit each other.
         """
         if len(matrix) != len(names) or any(len(row) != len(names) for row in matrix):
-            raise ValueError("an allowed-collision matrix of %d names needs %d rows of %d values, got rows of %s"
-                             % (len(names), len(names), len(names), sorted({len(row) for row in matrix}) or "nothing"))
+            raise ValueError("an allowed-collision matrix of %s needs %s of %s, got rows of %s"
+                             % (counted(len(names), "name"), counted(len(names), "row"), counted(len(names), "value"),
+                                sorted({len(row) for row in matrix}) or "nothing"))
         if len(default_names) != len(default_values):
             raise ValueError("%d default names but %d default values" % (len(default_names), len(default_values)))
         # Only the upper half is read: senders fill both.

@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from command_line.options import counted
 from motion_planning.model import PlanningModel, State
 from motion_planning.scene.allowed import AllowedCollisions
 from motion_planning.scene.objects import OCTOMAP, AttachedBody, SceneError, WorldObject
@@ -90,8 +91,8 @@ class Scene:
         there = self._object(name)
         if shape_poses is not None:
             if len(shape_poses) != len(there.shapes):
-                raise SceneError("object '%s' has %d shapes, but %d poses were given to move them to"
-                                 % (name, len(there.shapes), len(shape_poses)))
+                raise SceneError("object '%s' has %s, but %s were given to move them to"
+                                 % (name, counted(len(there.shapes), "shape"), counted(len(shape_poses), "pose")))
             shapes = tuple((shape, pose) for (shape, _), pose in zip(there.shapes, shape_poses, strict=True))
             there = replace(there, shapes=shapes)
         return replace(self, objects={**self.objects, name: there.at(pose)})

@@ -4,6 +4,7 @@ import rospy
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPositionFK, GetPositionFKResponse, GetPositionIK, GetPositionIKResponse
 
+from command_line.options import counted
 from motion_planning.constraints import holder
 from motion_planning.errors import PlanningError
 from motion_planning.kinematics import ik
@@ -57,8 +58,8 @@ class Kinematics:
         if request.pose_stamped_vector:
             links, poses = list(request.ik_link_names), request.pose_stamped_vector
             if len(links) != len(poses):
-                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "%d poses but %d ik_link_names; name a link for "
-                                   "each" % (len(poses), len(links)))
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "%s but %s; name a link for "
+                                   "each" % (counted(len(poses), "pose"), counted(len(links), "ik_link_name")))
         else:
             links, poses = [request.ik_link_name or group.tip], [request.pose_stamped]
             if links == [None]:

@@ -5,6 +5,7 @@ import math
 from geometry_msgs.msg import Pose, Quaternion
 from moveit_msgs.msg import OrientationConstraint
 
+from command_line.options import counted
 from motion_planning.constraints import (
     ConstraintSet,
     JointTarget,
@@ -135,7 +136,7 @@ def _visibility(message, scene, reader, remarks):
     if abs(message.target_radius) <= _NO_RADIUS:
         raise _LeftOut("a visibility constraint has a target without radius")
     if message.cone_sides < _LEAST_SIDES:
-        remarks.append("a cone of sight has %d sides; %d are taken" % (message.cone_sides, _LEAST_SIDES))
+        remarks.append("a cone of sight has %s; %d are taken" % (counted(message.cone_sides, "side"), _LEAST_SIDES))
     seen = reader.frame(scene, target.header.frame_id) @ matrix_of(target.pose, "the visibility's target")
     # The sensor moves with the robot: its frame is looked up in each state.
     return VisibilityTarget(abs(message.target_radius), seen, matrix_of(sensor.pose, "the visibility's sensor"),

@@ -6,6 +6,7 @@ import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, Vector3
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 
+from command_line.options import counted
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Sphere
@@ -69,8 +70,8 @@ def shape_of(primitive):
                            % kind)
     sizes = sizes[:needed[kind]]
     if len(sizes) < needed[kind] or not all(math.isfinite(size) and size > 0.0 for size in sizes):
-        raise MessageError("a solid primitive of type %d needs %d sizes above 0, got %s"
-                           % (kind, needed[kind], list(primitive.dimensions)))
+        raise MessageError("a solid primitive of type %d needs %s above 0, got %s"
+                           % (kind, counted(needed[kind], "size"), list(primitive.dimensions)))
     if kind == SolidPrimitive.BOX:
         return Box(tuple(sizes))
     if kind == SolidPrimitive.SPHERE:

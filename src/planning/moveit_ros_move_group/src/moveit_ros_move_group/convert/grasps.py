@@ -7,6 +7,7 @@ import rospy
 from moveit_msgs.msg import Grasp, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from command_line.options import counted
 from motion_planning.manipulation import Candidate, Translation
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
 
@@ -75,8 +76,8 @@ def posture_of(trajectory, model, what):
         return {}
     end = trajectory.points[-1].positions
     if len(end) != len(trajectory.joint_names):
-        raise MessageError("%s: a posture has %d positions for %d joints"
-                           % (what, len(end), len(trajectory.joint_names)))
+        raise MessageError("%s: a posture has %s for %s"
+                           % (what, counted(len(end), "position"), counted(len(trajectory.joint_names), "joint")))
     unknown = [name for name in trajectory.joint_names if name not in model.robot.joints]
     if unknown:
         raise MessageError("%s: a posture names joint '%s', unknown to robot '%s'" % (what, unknown[0], model.name))

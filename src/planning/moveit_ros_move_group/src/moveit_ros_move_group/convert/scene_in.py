@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from moveit_msgs.msg import CollisionObject
 
+from command_line.options import counted
 from motion_planning.errors import PlanningError
 from motion_planning.scene import AllowedCollisions, Scene, SceneError, WorldObject, check_object
 from moveit_ros_move_group.convert.geometry import (
@@ -232,8 +233,8 @@ def state_over(scene, message, reader):
     model, state = scene.model, scene.state
     joints = message.joint_state
     if len(joints.name) != len(joints.position):
-        raise MessageError("the robot state has %d joint names but %d positions"
-                           % (len(joints.name), len(joints.position)))
+        raise MessageError("the robot state has %s but %s"
+                           % (counted(len(joints.name), "joint name"), counted(len(joints.position), "position")))
     bad = [name for name, value in zip(joints.name, joints.position, strict=True) if not math.isfinite(value)]
     if bad:
         raise MessageError("the robot state's value of joint '%s' is not finite" % bad[0])
@@ -241,8 +242,8 @@ def state_over(scene, message, reader):
                                if name in model.index})
     multi = message.multi_dof_joint_state
     if len(multi.joint_names) != len(multi.transforms):
-        raise MessageError("the robot state has %d multi-DOF joints but %d transforms"
-                           % (len(multi.joint_names), len(multi.transforms)))
+        raise MessageError("the robot state has %d multi-DOF joints but %s"
+                           % (len(multi.joint_names), counted(len(multi.transforms), "transform")))
     for name, transform in zip(multi.joint_names, multi.transforms, strict=True):
         if model.virtual_joint is not None and name == model.virtual_joint.name:
             frame = reader.frame(scene, multi.header.frame_id)
@@ -277,7 +278,7 @@ def _object_of(message, frame):
                                         ("meshes", message.meshes, message.mesh_poses, mesh_shape_of),
                                         ("planes", message.planes, message.plane_poses, plane_shape_of)):
         if len(poses) > len(items):
-            raise MessageError("%d %s but %d poses" % (len(items), kind, len(poses)))
+            raise MessageError("%d %s but %s" % (len(items), kind, counted(len(poses), "pose")))
         for i, item in enumerate(items):
             pose = matrix_of(poses[i], "the pose of a shape") if i < len(poses) else np.eye(4)
             shape = convert(item)
@@ -286,7 +287,8 @@ def _object_of(message, frame):
                 pose = pose @ inner
             shapes.append((shape, pose))
     if len(message.subframe_names) != len(message.subframe_poses):
-        raise MessageError("%d subframes but %d poses" % (len(message.subframe_names), len(message.subframe_poses)))
+        raise MessageError("%s but %s" % (counted(len(message.subframe_names), "subframe"),
+                                          counted(len(message.subframe_poses), "pose")))
     subframes = {name: matrix_of(pose, "subframe '%s'" % name)
                  for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)}
     pose = matrix_of(message.pose, "its pose")

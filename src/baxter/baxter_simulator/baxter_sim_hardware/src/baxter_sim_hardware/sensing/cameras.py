@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_sim_hardware.errors import HardwareError
+from command_line.options import counted
 from sensor_renderer.pinhole import Pinhole
 
 ARRAY = (1280, 800)
@@ -151,8 +152,8 @@ class Rack:
         """Open or reopen a camera; returns the :class:`CaptureSettings` in force. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.available():
-            raise CameraRefused(errno.ENODEV, "%s has no power: %s are open, and only %d cameras can be; close one"
-                                % (name, " and ".join(self.open), self._most_open))
+            raise CameraRefused(errno.ENODEV, "%s has no power: %s are open, and only %s can be; close one"
+                                % (name, " and ".join(self.open), counted(self._most_open, "camera")))
         self.open[name] = settings.checked()
         return self.open[name]
 
