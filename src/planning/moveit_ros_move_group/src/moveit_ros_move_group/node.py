@@ -13,7 +13,16 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group import settings, tuning
-from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pick_place, planners, scene, sequence
+from moveit_ros_move_group.capabilities import (
+    cartesian,
+    frames,
+    kinematics,
+    motion,
+    pick_place,
+    planners,
+    scene,
+    sequence,
+)
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
 from moveit_ros_move_group.failures import Failures
@@ -38,10 +47,11 @@ get_planning_scene, apply_planning_scene, clear_octomap, query_planner_interface
 set_planner_params, plan_sequence_path, execute_kinematic_path, ~save_map, ~load_map; by the capabilities.
 Subscribes: joint_states, planning_scene, collision_object, attached_collision_object, planning_scene_world,
 trajectory_execution_event, and the sensors' topics. Publishes: ~monitored_planning_scene, ~display_planned_path,
-~display_contacts, ~display_octomap, ~display_grasp_markers, ~failures.
+~display_contacts, ~display_octomap, ~display_grasp_markers, ~failures, and /tf by the capability TfPublisher.
 Parameters: ~robot_description (the name of the URDF's), ~controller_list, ~moveit_controller_manager,
 ~ros_control_namespace, ~initial, ~allow_trajectory_execution, ~planning_pipelines, ~default_planning_pipeline,
-~capabilities, ~disable_capabilities, ~sensors, ~octomap_frame, ~octomap_resolution [m], ~max_range [m],
+~capabilities, ~disable_capabilities, ~planning_scene_frame_publishing_rate [Hz], ~planning_scene_tf_prefix,
+~sensors, ~octomap_frame, ~octomap_resolution [m], ~max_range [m],
 ~trajectory_execution/..., ~plan_execution/..., ~planning_scene_monitor/..., ~planning_scene_monitor_options/...
 """
 
@@ -107,13 +117,12 @@ def _capabilities(context, wanted, description, may_execute):
         "ApplyPlanningSceneService": lambda: scene.ApplyScene(context),
         "ClearOctomapService": lambda: scene.ClearOctomap(context),
         "MoveGroupExecuteService": lambda: motion.ExecuteService(context),
+        "TfPublisher": lambda: frames.TfPublisher(context),
     }
     served = {"move_group/" + name: make for name, make in offered.items()}
     served.update({"pilz_industrial_motion_planner/MoveGroupSequence" + kind: make for kind, make in (
         ("Action", lambda: sequence.SequenceAction(context, planner, may_execute)),
         ("Service", lambda: sequence.SequenceService(context, planner)))})
-    for name in sorted(wanted & set(settings.OTHER_CAPABILITIES) - set(served)):
-        rospy.logwarn("capability '%s' is known but not served here; it is left out", name)
     made = [make() for name, make in served.items() if name in wanted]
     move_action = next((one for one in made if isinstance(one, motion.MoveAction)), None)
     return made + tuning.servers(context.executor, context.monitor, move_action)

@@ -19,7 +19,7 @@ DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupQueryPlannersService", "move_group/MoveGroupStateValidationService",
     "move_group/MoveGroupGetPlanningSceneService", "move_group/ApplyPlanningSceneService",
     "move_group/ClearOctomapService")
-# Known names; of these the node serves the one for known trajectories and those for sequences.
+# Those that are served when a parameter asks for them.
 OTHER_CAPABILITIES = ("move_group/MoveGroupExecuteService", "move_group/TfPublisher",
                       "pilz_industrial_motion_planner/MoveGroupSequenceAction",
                       "pilz_industrial_motion_planner/MoveGroupSequenceService")

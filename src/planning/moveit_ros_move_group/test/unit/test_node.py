@@ -71,12 +71,6 @@ def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
     assert len([line for line in node.logged if "some_package/Cooking" in line]) == 1
 
 
-def test_a_known_capability_that_is_not_served_is_named_too(monkeypatch):
-    monkeypatch.setattr(settings, "OTHER_CAPABILITIES", (*settings.OTHER_CAPABILITIES, "move_group/Juggling"))
-    node = node_of(monkeypatch, capabilities="move_group/Juggling")
-    assert len([line for line in node.logged if "move_group/Juggling" in line]) == 1
-
-
 def test_a_cartesian_path_begins_whenever_it_is_sent(monkeypatch):
     """With a stamp a controller would leave out what was due before it came."""
     node = node_of(monkeypatch)
