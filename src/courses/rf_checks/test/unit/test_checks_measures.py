@@ -126,7 +126,7 @@ NOTES = ["right_s0", "right_e1", "right_e1", "right_w0", "right_w1", "right_w1"]
 
 @pytest.mark.parametrize(("names", "values", "key", "words"), [
     (NOTES, [0.1] * 7, "repeated_names", ["right_e1", "right_w1", "right_s1", "right_e0", "push_back"]),
-    (["right_s0"], [0.1, 0.2], "lengths", ["1 names", "2 values"]),
+    (["right_s0"], [0.1, 0.2], "lengths", ["1 name", "2 values"]),
     (["left_s0", "left_s1"], [45.0, -30.0], "degrees", ["left_s0", "45.0", "radians"]),
 ])
 def test_slips_of_a_command_are_named(names, values, key, words):

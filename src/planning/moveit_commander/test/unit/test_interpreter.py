@@ -169,5 +169,5 @@ def test_messages_as_lists_and_back():
     assert stamped.header.frame_id == "base" and stamped.pose.position.x == 0.1
     assert conversions.matrix_of(Pose())[0, 0] == 1.0
     for wrong in ([], [1.0], [0.0] * 8):
-        with pytest.raises(MoveItCommanderException, match="got %d values" % len(wrong)):
+        with pytest.raises(MoveItCommanderException, match="got %d value" % len(wrong)):
             conversions.list_to_pose(wrong)

@@ -46,7 +46,7 @@ def test_one_joint_at_a_time_begins_at_the_default_state(arm):
     (("shoulder", [0.1, 0.2]), "expected one value"),
     (([0.1, 0.5], 1.0), "joint values alone"), (([0.1, math.nan],), "nan"),
     ((JointState(name=["toe"], position=[0.0]),), "no joint 'toe'"),
-    ((JointState(name=["elbow"], position=[]),), "1 names and 0 positions"), ((Pose(), 3.0), "link's name")])
+    ((JointState(name=["elbow"], position=[]),), "1 name and 0 positions"), ((Pose(), 3.0), "link's name")])
 def test_bad_joint_targets_are_refused_and_change_nothing(arm, arguments, text):
     arm.set_joint_value_target([0.3, 0.7])
     with pytest.raises(MoveItCommanderException, match=text):

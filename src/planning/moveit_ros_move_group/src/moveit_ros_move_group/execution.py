@@ -250,10 +250,11 @@ def _flaw(trajectory):
         if len(point.positions) != count:
             return "point %d of the trajectory has %s for %s" % (i, counted(len(point.positions), "position"),
                                                                  counted(count, "joint"))
-        for name in ("velocities", "accelerations", "effort"):
+        for name, one in (("velocities", "velocity"), ("accelerations", "acceleration"), ("effort", "effort")):
             given = len(getattr(point, name))
             if given not in (0, count):
-                return "point %d of the trajectory has %d %s for %s" % (i, given, name, counted(count, "joint"))
+                return "point %d of the trajectory has %s for %s" % (i, counted(given, one, name),
+                                                                     counted(count, "joint"))
         numbers = (*point.positions, *point.velocities, *point.accelerations, *point.effort)
         if not all(map(math.isfinite, numbers)):
             return "point %d of the trajectory holds a number that is not finite" % i

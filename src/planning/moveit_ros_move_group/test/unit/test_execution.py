@@ -218,7 +218,7 @@ def test_one_that_never_ends_is_stopped():
 
 
 @pytest.mark.parametrize("change, sentence", [
-    ({"velocities": [1.0]}, "1 velocities for 2 joints"), ({"positions": [1.0]}, "1 positions for 2 joints"),
+    ({"velocities": [1.0]}, "1 velocity for 2 joints"), ({"positions": [1.0]}, "1 position for 2 joints"),
     ({"accelerations": [1.0, float("nan")]}, "not finite"), ({"time_from_start": rospy.Duration(0)}, "have to grow")])
 def test_flaws_of_trajectories_are_named(change, sentence):
     outcome = Lab().executor.execute(trajectory(1.0, **change))

@@ -74,7 +74,7 @@ def test_a_direction_turns_with_the_hand_in_a_frame_that_does(scene):
     (lambda g: setattr(g.pre_grasp_approach.direction.vector, "x", math.nan), "finite"),
     (lambda g: setattr(g, "grasp_quality", math.inf), "quality is inf"),
     (lambda g: setattr(g, "grasp_posture", posture(0.1, names=("tail",))), "joint 'tail', unknown to robot 'crane'"),
-    (lambda g: setattr(g, "grasp_posture", posture(0.1, 0.2)), "2 positions for 1 joints"),
+    (lambda g: setattr(g, "grasp_posture", posture(0.1, 0.2)), "2 positions for 1 joint"),
     (lambda g: setattr(g, "grasp_posture", posture(math.nan)), "not finite")])
 def test_what_cannot_be_understood(scene, change, match):
     message = grasp()

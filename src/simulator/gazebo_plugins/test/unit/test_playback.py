@@ -63,7 +63,7 @@ def test_the_service_does_the_same_and_says_what_is_wrong(make):
     assert positions(lab.run(0.01)) == pytest.approx((1.0, 0.0), abs=1e-6)
     assert lab.model.base_pose().position == pytest.approx((3.0, 0.0, 0.0), abs=1e-6)
     for wrong, text in (({"model_name": "leg"}, "not 'leg'"),
-                        ({"joint_trajectory": trajectory([((1.0,), 0)])}, "1 positions for 2 joints"),
+                        ({"joint_trajectory": trajectory([((1.0,), 0)])}, "1 position for 2 joints"),
                         ({"joint_trajectory": trajectory([((float("nan"), 0.0), 0)])}, "point 0 is"),
                         ({"joint_trajectory": trajectory([], joints=("nose",))}, "none of the joints nose"),
                         ({"joint_trajectory": trajectory([], frame="moon")}, "frame_id is 'moon'")):

@@ -79,7 +79,7 @@ def test_what_is_not_given_keeps_its_default_and_headers_are_stamped():
 def test_arguments_may_be_a_list_or_nothing():
     assert read(SetBoolRequest(), [True]).data is True
     assert read(SetBoolRequest(), None).data is False
-    with pytest.raises(FieldError, match="2 values for std_srvs/SetBoolRequest, which has 1 fields"):
+    with pytest.raises(FieldError, match="2 values for std_srvs/SetBoolRequest, which has 1 field"):
         read(SetBoolRequest(), [True, False])
 
 
@@ -128,7 +128,7 @@ def test_a_header_alone_is_stamped_as_one_inside_of_a_message():
     (JointState(), {"position": [1.0, "b"]}, "position[1] is 'b'"),
     (JointState(), {"header": {"stamp": {"secs": "x"}}}, "header.stamp.secs is 'x'"),
     (PointCloud2(), {"fields": [{"name": 3}]}, "fields[0].name is 3"),
-    (CameraInfo(), {"K": [1.0]}, "K has 1 elements; 9 are expected"),
+    (CameraInfo(), {"K": [1.0]}, "K has 1 element; 9 are expected"),
     (Image(), {"data": "a"}, "data is no base64 text"),
     (Image(), {"data": [300]}, "data[0] is 300; uint8 goes from 0 to 255"),
     (Image(), {"data": 3}, "base64 text or a list of numbers"),

@@ -86,7 +86,7 @@ def test_diagnosis_of_the_pose_ends_the_tries(policy, reason):
 
 def test_user_mode_without_a_seed_says_how_many_there_are(policy):
     request = SeedRequest(SeedMode.USER, [SEED], 2)
-    with pytest.raises(InvalidSeed, match=r"this one has none \(1 seeds for 2 poses\)"):
+    with pytest.raises(InvalidSeed, match=r"this one has none \(1 seed for 2 poses\)"):
         policy.answer(request, 1, np.eye(4), lambda seed: None, [])
 
 
