@@ -20,6 +20,8 @@ UNDER_WAY_S = 0.3
 BRAKING_S, BRAKING_RAD, END_S = 0.5, 0.1, 2.5
 # A holding joint moves by no more than this [rad; m] in this time.
 STILL, HOLD_S = 1e-3, 0.3
+# Rest is looked for after each of these times [s].
+LOOK_S = 0.05
 
 
 def stream(mode, values):
@@ -166,10 +168,19 @@ def farthest(lab, before):
     return float(np.abs(joints(lab) - before).max())
 
 
+def run_until(lab, condition, limit_s):
+    """Until ``condition(joints before the last LOOK_S)``, or for so long."""
+    end_s, met = lab.world.time_s + limit_s, False
+    while not met and lab.world.time_s < end_s:
+        before = joints(lab)
+        lab.run(LOOK_S)
+        met = condition(before)
+
+
 def assert_rests(lab, brakes, what):
     """``brakes``: whether it must be near where it was interrupted."""
     here = joints(lab)
-    lab.run(BRAKING_S if brakes else END_S)
+    run_until(lab, lambda before: farthest(lab, before) < 0.1 * STILL, BRAKING_S if brakes else END_S)
     if brakes:
         assert farthest(lab, here) < BRAKING_RAD, "%s: moved on" % what
     here = joints(lab)
@@ -193,7 +204,7 @@ def test_nothing_moves_after_an_interruption_until_a_new_command(one_lab, motion
     assert_rests(lab, True, "%s, %s, enabled again" % (motion, interruption))
     goal = lab.position + 0.05 * np.sign(WAY)
     lab.command(POSITION, goal)
-    lab.run(1.0)
+    run_until(lab, lambda before: np.abs(lab.position - goal).max() < 1e-3, 1.0)
     assert np.abs(lab.position - goal).max() < 2e-3
 
 
