@@ -193,6 +193,12 @@ RVIZ, CAMERAS = {"config", "rviz_config"}, {"kinect", "xtion", "camera_link_pose
     ("move_group.launch", {"debug", "info", "allow_trajectory_execution", "fake_execution", "max_safe_path_cost",
                            "jiggle_fraction", "publish_monitored_planning_scene", "planner"} | CAMERAS),
     ("planning_context.launch", CONTEXT | {"robot_description"}),
+    ("planning_pipeline.launch", {"pipeline"}), ("ompl_planning_pipeline.launch", set()),
+    ("chomp_planning_pipeline.launch", set()), ("fake_moveit_controller_manager.launch", set()),
+    ("trajectory_execution.launch", {"moveit_controller_manager", "moveit_manage_controllers"}),
+    ("baxter_moveit_controller_manager.launch", {"moveit_controller_manager", "controller_manager_name",
+                                                 "use_controller_manager"}),
+    ("sensor_manager.launch", CAMERAS | {"moveit_sensor_manager"}), ("baxter_moveit_sensor_manager.launch", CAMERAS),
     ("moveit_rviz.launch", RVIZ | {"debug"}),
     ("baxter_grippers.launch", CONTEXT | RVIZ | CAMERAS),
     ("demo_baxter.launch", CONTEXT | RVIZ | CAMERAS | {"planner", "debug"}),
@@ -216,6 +222,23 @@ def test_the_planning_server_alone_has_all_that_it_waits_for_but_the_robot():
     assert any(key.startswith("/move_group/planning_pipelines/pilz") for key in values)
     assert parameters("baxter_planning_execution.launch", "left_tip_name:=left_wrist")[
         "/robot_description_semantic"].count("left_wrist") > values["/robot_description_semantic"].count("left_wrist")
+
+
+@pytest.mark.parametrize(("name", "arguments"), [
+    ("move_group.launch", ("kinect:=true",)), ("baxter_planning_execution.launch", ("xtion:=true",)),
+    ("sensor_manager.launch", ("kinect:=true",)), ("baxter_moveit_sensor_manager.launch", ("xtion:=true",))])
+def test_a_camera_is_where_the_vendors_files_say(name, arguments):
+    assert parameters(name, *arguments)["/move_group/octomap_frame"] == "camera_link"
+    (camera,) = (node for node in load(name, *arguments).nodes if "camera" in node.name)
+    assert camera.args.split() == ["0.15", "0.075", "0.5", "0.0", "0.7854", "0.0", "torso", "camera_link"]
+    assert "/move_group/octomap_frame" not in parameters(name)
+
+
+def test_who_asks_for_chomp_gets_ompl_beside_it():
+    values = parameters("demo_baxter.launch", "planner:=chomp", "rviz:=false")
+    assert values["/move_group/default_planning_pipeline"] == "chomp"
+    assert values["/move_group/planning_pipelines/chomp/planning_plugin"] == "chomp_interface/CHOMPPlanner"
+    assert values["/move_group/planning_pipelines/ompl/planning_plugin"] == "ompl_interface/OMPLPlanner"
 
 
 @pytest.mark.parametrize(("name", "plugin"), [("demo_kinect.launch", "PointCloud"),

@@ -80,7 +80,7 @@ def pipelines(groups):
         found["ompl"] = _pipeline("ompl", rospy.get_param("~", {}), groups)
     usual = rospy.get_param("~default_planning_pipeline", "")
     if usual not in found:
-        first = next(iter(found))
+        first = next((name for name, pipeline in found.items() if not pipeline.industrial), next(iter(found)))
         if usual:
             complaints.append("there is no pipeline '%s' for default_planning_pipeline; '%s' is taken" % (usual, first))
         usual = first

@@ -51,3 +51,15 @@ def test_the_controller_manager_says_where_controllers_come_from(monkeypatch, ma
     monkeypatch.setattr(ros_control, "_service_names", lambda: ["/x/controller_manager/list_controllers", "/y"])
     assert controllers_at_present([])() == []
     assert services == (asked or [])
+
+
+def test_a_default_pipeline_that_is_not_built_in_gives_way_to_ompl(monkeypatch):
+    tree = {"~planning_pipelines": {
+        "chomp": {"planning_plugin": "chomp_interface/CHOMPPlanner"},
+        "pilz": {"planning_plugin": "pilz_industrial_motion_planner::CommandPlanner"},
+        "z": {"planning_plugin": "ompl_interface/OMPLPlanner"}}, "~default_planning_pipeline": "chomp"}
+    monkeypatch.setattr(settings.rospy, "get_param", lambda name, usual=None: tree.get(name, usual))
+    found, usual, complaints = settings.pipelines([])
+    assert set(found) == {"pilz", "z"} and usual == "z"
+    assert any("CHOMPPlanner is not built in" in text for text in complaints)
+    assert any("there is no pipeline 'chomp'" in text and "'z' is taken" in text for text in complaints)
