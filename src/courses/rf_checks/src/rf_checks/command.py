@@ -3,16 +3,15 @@
 import argparse
 import contextlib
 import os
-import re
 import shutil
 import signal
 import sys
-import tempfile
 from pathlib import Path
 
 import rospkg
 
 from command_line.options import MOST_SEED, did_you_mean, number, seconds
+from disk_cache.files import draft_of
 from lab_web import page_files
 from processes import isolation
 from processes.isolation import NotIsolated
@@ -24,8 +23,6 @@ from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import WhichRobot
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
-# Of a report: its name, and what tempfile puts behind it.
-_DRAFT = re.compile(r"\..+\.(json|xml|csv|html|py)-[a-z0-9_]{8}")
 
 
 def _listing():
@@ -142,24 +139,8 @@ def start(name):
 
 def write_report(path, text):
     """Replace a file by one with `text`, atomically. A link of that name is replaced, not followed."""
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.absolute().parent, prefix=".%s-" % path.name,
-                                     delete=False) as draft:
-        draft.write(text)
-    os.chmod(draft.name, 0o666 & ~_umask())
-    os.replace(draft.name, path)
-
-
-def remove_drafts(folder):
-    """Remove what write_report has left in a folder (Path) where it was killed. Raises OSError."""
-    for path in folder.glob(".*"):
-        if _DRAFT.fullmatch(path.name) and path.is_file() and not path.is_symlink():
-            path.unlink()
-
-
-def _umask():
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    with draft_of(path) as draft:
+        draft.write_text(text, encoding="utf-8")
 
 
 def main(argv=None):

@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lab_web.page_files import replace_text
+from disk_cache.files import replace_text
 from processes import keeper
 
 #: The kernel that the labs' notebooks name.

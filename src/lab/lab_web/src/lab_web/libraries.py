@@ -17,6 +17,8 @@ import tarfile
 import urllib.request
 from pathlib import Path
 
+from disk_cache.files import cache_home
+
 _TIMEOUT_S = 300.0
 
 
@@ -26,8 +28,7 @@ class LibrariesError(Exception):
 
 def kept_in():
     """The folder of fetched libraries: ``$XDG_CACHE_HOME/lab_web``, by default ``~/.cache/lab_web``."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "lab_web"
+    return cache_home() / "lab_web"
 
 
 def fetched(page, parent=None, run=subprocess.run, tell=print):

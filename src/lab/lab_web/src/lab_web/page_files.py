@@ -8,9 +8,10 @@ import contextlib
 import os
 import re
 import socket
-import tempfile
 from pathlib import Path
 from urllib.parse import urlsplit
+
+from disk_cache.files import replace_text
 
 _CONNECT_S = 1.0
 
@@ -59,10 +60,3 @@ def write_result(text):
 
 def _address_file(master_uri):
     return folder() / ("address-" + re.sub(r"[^\w.-]+", "_", master_uri))
-
-
-def replace_text(path, text):
-    """Write a file (Path) that only the user can read; nobody finds half of it. Raises OSError."""
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as draft:
-        draft.write(text)
-    os.replace(draft.name, path)

@@ -3,7 +3,6 @@
 import json
 import math
 import multiprocessing
-import os
 import signal
 import zipfile
 from dataclasses import asdict, dataclass
@@ -14,6 +13,7 @@ import numpy as np
 
 from arm_kinematics.errors import KinematicsError
 from arm_kinematics.reach_search import search_cells
+from disk_cache.files import draft_of
 from urdf_model.transforms import matrix_from_quaternion
 
 # Cells that are computed, saved and counted together: about a second of work. Postures of neighbouring cells help each
@@ -200,9 +200,8 @@ class _Parts:
                                  "delete it" % (self._folder, other[0], kept[other[0]]))
         else:
             # Written under another name and then renamed, like the parts: an existing file is complete.
-            unfinished = self._folder / (".settings.%d.json" % os.getpid())
-            unfinished.write_text(json.dumps(wanted, indent=1) + "\n")
-            unfinished.rename(note)
+            with draft_of(note) as unfinished:
+                unfinished.write_text(json.dumps(wanted, indent=1) + "\n")
 
     def load(self, sizes):
         """Return {first cell: PartValues} of the complete parts of ``sizes`` {first cell: cells}."""
@@ -219,9 +218,8 @@ class _Parts:
         return values
 
     def save(self, first, values):
-        unfinished = self._folder / (".%07d.%d.npz" % (first, os.getpid()))
-        np.savez(unfinished, reached=np.packbits(values.reached, axis=1), manipulability=values.manipulability)
-        unfinished.rename(self._path(first))
+        with draft_of(self._path(first)) as unfinished:
+            np.savez(unfinished, reached=np.packbits(values.reached, axis=1), manipulability=values.manipulability)
 
     def _path(self, first):
         return self._folder / ("%07d.npz" % first)

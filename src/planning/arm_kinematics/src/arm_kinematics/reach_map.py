@@ -2,9 +2,7 @@
 """A reachability map as data, and its files."""
 import csv
 import math
-import os
 import zipfile
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import numpy as np
 
 from arm_kinematics.reach import ReachError
 from command_line.user_files import check_file
+from disk_cache.files import draft_of
 from urdf_model.transforms import quaternion_from_matrix
 
 # Rows that are written to HDF5 at a time.
@@ -63,7 +62,7 @@ class ReachMap:
     def write(self, path):
         """Write ``path`` (.npz), complete or not at all. Raises OSError."""
         count = len(self.rotations)
-        with _complete(path) as unfinished:
+        with draft_of(path) as unfinished:
             np.savez_compressed(unfinished, share=self.share, manipulability=self.manipulability, lower=self.lower,
                                 upper=self.lower + self.cell_m * np.array(self.shape), cell_m=self.cell_m,
                                 orientations=count, rotations=self.rotations, base=self.base, tip=self.tip,
@@ -128,7 +127,7 @@ class ReachMap:
         quaternions = np.array([quaternion_from_matrix(rotation) for rotation in self.rotations])
         flat = self.reached.reshape(-1, len(self.rotations))
         centres = self.centres.reshape(-1, 3).astype(np.float32)
-        with _complete(path) as unfinished, h5py.File(unfinished, "w") as file:
+        with draft_of(path) as unfinished, h5py.File(unfinished, "w") as file:
             poses = file.create_dataset("Poses/poses_dataset", (0, 10), "float32", maxshape=(None, 10),
                                         chunks=(4096, 10))
             step = max(1, _ROWS // len(self.rotations))
@@ -150,7 +149,7 @@ class ReachMap:
         """
         import h5py
 
-        with _complete(path) as unfinished, h5py.File(unfinished, "w") as file:
+        with draft_of(path) as unfinished, h5py.File(unfinished, "w") as file:
             data = file.create_dataset("Capability/capability_dataset", data=self.capabilities())
             data.attrs["Resolution"] = np.array([self.cell_m], dtype="float32")
 
@@ -193,15 +192,6 @@ def _quaternions_to(axes):
     turns = np.column_stack((np.zeros(len(axes)), -axes[:, 2], axes[:, 1], 1.0 + axes[:, 0]))
     turns[axes[:, 0] < -1.0 + 1e-9] = 0.0, 0.0, 1.0, 0.0
     return turns / np.linalg.norm(turns, axis=1)[:, None]
-
-
-@contextmanager
-def _complete(path):
-    """The path of a draft that becomes the file at ``path`` when it is complete."""
-    path = Path(path)
-    draft = path.with_name(".%s.%d%s" % (path.stem, os.getpid(), path.suffix))
-    yield draft
-    draft.rename(path)
 
 
 @dataclass(frozen=True, eq=False)

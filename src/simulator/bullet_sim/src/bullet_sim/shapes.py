@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from disk_cache.files import cache_home, draft_of, spare_folder, try_room
 from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, check_file, read_file
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
@@ -19,7 +20,6 @@ from .gathered import Part, corners, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
-from .room import spare_folder, try_room
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
@@ -44,8 +44,7 @@ class MeshCache:
     def __init__(self, folder=None, warn=LOG.warning):
         """``warn(text)`` is called for meshes that are simplified, and once for a folder that cannot be written."""
         self._warn = warn
-        base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
+        self.folder = Path(folder or cache_home() / "bullet_sim" / "meshes")
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
     def wavefront(self, path, planes=(), hollow=True, part=WHOLE):
@@ -85,10 +84,8 @@ class MeshCache:
         if not target.exists():
             text = "\n".join(lines()) + "\n"
             target = self._folder_with_room(len(text)) / target.name
-            with _draft_folder(target.parent) as draft:
-                part = Path(draft) / "gathered"
-                part.write_text(text, encoding="ascii")
-                os.replace(part, target)
+            with draft_of(target) as draft:
+                draft.write_text(text, encoding="ascii")
         return str(target)
 
     def _folder_with_room(self, size):
@@ -115,8 +112,7 @@ class MeshCache:
         target = self._folder_with_room(int(np.clip(_GROWTH * os.stat(path).st_size, *_ROOM))) / name
         if target.exists():
             return target
-        with _draft_folder(target.parent) as draft:
-            copy = Path(draft) / "mesh"
+        with draft_of(target) as copy:
             try:
                 remark = MESHES.call(to_wavefront, str(path), str(copy), planes, part)
             except LimitError as error:
@@ -124,15 +120,9 @@ class MeshCache:
             hull = Path(str(copy) + ".hull")
             if hull.exists():
                 os.replace(hull, target.with_suffix(".hull.obj"))
-            os.replace(copy, target)
         if remark:
             self._warn("mesh %s: %s" % (path, remark))
         return target
-
-
-def _draft_folder(folder):
-    """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
-    return tempfile.TemporaryDirectory(dir=str(folder), prefix="part_")
 
 
 @contextlib.contextmanager

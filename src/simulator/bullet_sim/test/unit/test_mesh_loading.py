@@ -99,7 +99,7 @@ def test_what_is_hostile_is_refused_with_its_reason(tmp_path, cache, name, make,
     make(tmp_path / name)
     with pytest.raises(BulletSimError, match=message):
         cache.wavefront(tmp_path / name)
-    assert not [file for file in (tmp_path / "cache").glob("*") if file.name.startswith("part_")]
+    assert not [file for file in (tmp_path / "cache").glob("*") if file.name.startswith(".draft-")]
 
 
 @pytest.mark.parametrize("name", ["http://example.org/a.stl", "https://example.org/a.dae"])

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes simplified for software rendering: split by colour, in levels of detail, cached on disk. ROS-free."""
-import contextlib
 import hashlib
 import json
 import os
 import re
 import shutil
 import tempfile
-import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +13,7 @@ import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
 from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
-from bullet_sim.room import spare_folder, try_room
+from disk_cache.files import DRAFT, remove_drafts, spare_folder, try_room
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
@@ -32,7 +30,7 @@ _PROCESS = LimitedProcess(**LIMITS)
 _VERSION = 13
 _FOLDER = "drawings"
 # Names of folders that are being written begin so; nothing is written to one that is older than this [s].
-_DRAFT, _ABANDONED_S = "tmp", 3600.0
+_ABANDONED_S = 3600.0
 # Room that a mesh's levels and its picture may need [bytes].
 _ROOM = 8_000_000
 # The files with the materials of a Wavefront file.
@@ -134,8 +132,8 @@ class DrawingCache:
             self._folder = spare_folder("bullet_gazebo_drawings")
             if (self._folder / key / name).exists():
                 return self._folder / key / name
-        _remove_drafts(self._folder)
-        draft = Path(tempfile.mkdtemp(prefix=_DRAFT, dir=self._folder))
+        remove_drafts(self._folder, _ABANDONED_S)
+        draft = Path(tempfile.mkdtemp(prefix=DRAFT, dir=self._folder))
         try:
             (self._process or _PROCESS).call(write, path, str(draft), *arguments)
         except LimitError:
@@ -150,14 +148,6 @@ class DrawingCache:
                 return draft / name
             shutil.rmtree(draft, ignore_errors=True)  # another process has made it
         return target / name
-
-
-def _remove_drafts(folder):
-    """Remove what programs have left that were killed while they simplified."""
-    for draft in folder.glob(_DRAFT + "*"):
-        with contextlib.suppress(OSError):
-            if time.time() - draft.stat().st_mtime > _ABANDONED_S:
-                shutil.rmtree(draft, ignore_errors=True)
 
 
 def _digest(path, content):

@@ -3,10 +3,11 @@
 import contextlib
 import hashlib
 import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
+
+from disk_cache.files import cache_home, draft_of
 
 #: This variable names a folder as :func:`cache_folder` has them, which is only read: results of another user.
 READY = "BULLET_GAZEBO_READY"
@@ -17,8 +18,7 @@ _FOLDER = "results"
 
 def cache_folder(name):
     """The path of a folder below ``$XDG_CACHE_HOME/bullet_gazebo``, by default ``~/.cache/bullet_gazebo``."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "bullet_gazebo" / name
+    return cache_home() / "bullet_gazebo" / name
 
 
 def existing(folder, name, cache):
@@ -32,8 +32,7 @@ def existing(folder, name, cache):
 
 
 def open_to_all(path):
-    """Let all users read a new file or folder, which tempfile makes for its own user alone: it may be another user's
-    :data:`READY`."""
+    """Let all users read a new file or folder, whatever the umask: it may be another user's :data:`READY`."""
     os.chmod(path, 0o755 if os.path.isdir(path) else 0o644)
 
 
@@ -65,22 +64,16 @@ class ResultCache:
 
     def _write(self, path, result):
         self._folder.mkdir(parents=True, exist_ok=True)
-        number, draft = tempfile.mkstemp(dir=self._folder, prefix=".draft")
-        try:
-            with os.fdopen(number, "wb") as file:
-                np.save(file, result, allow_pickle=False)
+        with draft_of(path) as draft:
+            np.save(draft, result, allow_pickle=False)
             open_to_all(draft)
-            os.replace(draft, path)
-        except BaseException:
-            os.unlink(draft)
-            raise
         self._make_room()
 
     def _make_room(self):
         used_at = []
-        for entry in os.scandir(self._folder):
+        for entry in self._folder.glob("*.npy"):
             with contextlib.suppress(FileNotFoundError):  # another process makes room as well
-                used_at.append((entry.stat().st_mtime_ns, entry.path))
+                used_at.append((entry.stat().st_mtime_ns, entry))
         # A tenth at once, so that the next ones find room.
         if len(used_at) > MOST_KEPT:
             for _, path in sorted(used_at)[:len(used_at) - MOST_KEPT + MOST_KEPT // 10]:

@@ -71,12 +71,12 @@ def test_without_room_in_the_cache_a_mesh_is_drawn_all_the_same(tmp_path, monkey
 def test_what_killed_programs_have_left_in_the_cache_is_removed_later(tmp_path):
     folder, path = tmp_path / "cache", tmp_path / "plain.DAE"
     path.write_text(COLLADA, encoding="utf-8")
-    for name, age_s in (("tmp_killed", 3700.0), ("tmp_at_work", 10.0)):
+    for name, age_s in ((".draft-killed", 3700.0), (".draft-at_work", 10.0)):
         (folder / name).mkdir(parents=True)
         then = time.time() - age_s
         os.utime(folder / name, (then, then))
     part, = drawing.DrawingCache(folder).parts(path)
-    assert {one.name for one in folder.iterdir()} == {"tmp_at_work", Path(part.path).parent.name}
+    assert {one.name for one in folder.iterdir()} == {".draft-at_work", Path(part.path).parent.name}
 
 
 def test_two_programs_that_make_the_same_leave_one_result(tmp_path):

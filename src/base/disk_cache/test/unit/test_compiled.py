@@ -68,10 +68,10 @@ def test_a_temporary_folder_that_others_can_write_is_not_trusted(places, tmp_pat
     source, environment = places
     for name in ("package/__pycache__", "home"):
         (tmp_path / name).write_text("a file is in the way")
-    (tmp_path / "tmp" / ("some-%d" % os.getuid())).mkdir()
-    (tmp_path / "tmp" / ("some-%d" % os.getuid())).chmod(0o777)
+    (tmp_path / "tmp" / ("some_%d" % os.getuid())).mkdir()
+    (tmp_path / "tmp" / ("some_%d" % os.getuid())).chmod(0o777)
     last = Path(folder("some", [source], environment)).parent
-    assert last.name != "some-%d" % os.getuid() and stat.S_IMODE(last.stat().st_mode) == 0o700
+    assert last.name != "some_%d" % os.getuid() and stat.S_IMODE(last.stat().st_mode) == 0o700
 
 
 def test_functions_are_compiled_into_their_folder_and_nothing_else_is(tmp_path, monkeypatch):
