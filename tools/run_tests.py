@@ -111,6 +111,10 @@ def main(arguments: list[str]) -> int:
     # In a script's background job Ctrl-C is ignored, also by every child; but tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(ROOT)
+    # Some machines of continuous integration set it. A run starts a thousand Python programs, which would all compile
+    # the same modules.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     # Workers import the plugin, tests import the tools.
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), os.environ.get("PYTHONPATH")]))
     try:

@@ -283,7 +283,7 @@ ENVIRONMENT = {"PYTHONPATH": f"{ROOT / 'tools'}:{os.environ.get('PYTHONPATH', ''
 
 def run_pytest(folder, *words):
     """The output of a run of the files in a folder."""
-    files = sorted(str(path) for path in folder.rglob("*") if path.name.startswith("test_") or path.suffix == ".test")
+    files = sorted(str(path) for pattern in ("test_*.py", "*.test") for path in folder.rglob(pattern))
     return subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.plugin", "-c", ROOT / "pytest.ini",
                            "--rootdir", folder, *words, *files], capture_output=True, text=True, cwd=folder,
                           env={**os.environ, **ENVIRONMENT, "LC_ALL": "C.UTF-8"})
@@ -331,6 +331,31 @@ def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):
     assert order() == sorted(order())
     assert order("--shuffle=1") == order("--shuffle=1") != order("--shuffle=2")
     assert sorted(order("--shuffle=1")) == order()
+
+
+COLLECTED = """import os
+with open(os.environ["PYTEST_XDIST_WORKER"] + ".txt", "a") as stream:
+    stream.write(__name__ + "\\n")
+def test_one(): pass
+"""
+
+
+def test_each_worker_begins_its_collection_with_other_files(tmp_path):
+    for name in "abcdef":
+        (tmp_path / f"test_{name}.py").write_text(COLLECTED)
+    done = run_pytest(tmp_path, "-n3", "--dist=loadscope")
+    assert done.stdout.splitlines()[-1].startswith("6 passed, 0 failed")
+    firsts = [(tmp_path / f"gw{number}.txt").read_text().split()[0] for number in range(3)]
+    assert firsts == ["test_a", "test_c", "test_e"]
+
+
+def test_modules_are_compiled_once_for_all_programs_of_a_run(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONPATH"):
+        monkeypatch.setenv(name, "1")
+    assert run_tests.main(["no_such_package"]) == 2
+    assert "PYTHONDONTWRITEBYTECODE" not in os.environ and not sys.dont_write_bytecode
 
 
 def test_a_run_that_is_ended_leaves_no_process(tmp_path, fake_rostest):
