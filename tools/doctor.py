@@ -6,8 +6,11 @@ import os
 import sys
 from pathlib import Path
 
-from lab_doctor.checks import Level, examine
-from lab_doctor.probe import gather
+# It also runs where nothing has been built yet.
+sys.path.append(str(Path(__file__).resolve().parents[1] / "src/base/master_calls/src"))
+
+from lab_doctor.checks import Level, examine  # noqa: E402
+from lab_doctor.probe import gather  # noqa: E402
 
 # The questions of probe.gather, in the words of users.
 QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "master": "the ROS master",

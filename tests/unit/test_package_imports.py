@@ -126,8 +126,8 @@ def test_a_package_below_imports_none_above():
     """The lowest packages, and packages that a physical robot must not need."""
     product = {(package, needed) for package, file, needed in uses() if not is_in_tests(file)}
     assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
-    for low, below in (("loop_ros", {"rospy_fixes", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),
-                       ("model_files", {"urdf_model"})):
+    for low, below in (("loop_ros", {"rospy_fixes", "sim_time"}), ("model_files", {"urdf_model"}),
+                       ("world_picture", {"bullet_sim", "disk_cache", "urdf_model"})):
         assert {needed for package, needed in product if package == low} & set(PACKAGES) == below
     viewers = {"sensor_renderer", "lab_display"}
     assert {pair for pair in product if pair[0] in viewers and pair[1] == "gazebo_ros"} == set()

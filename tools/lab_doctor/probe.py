@@ -11,11 +11,11 @@ import struct
 import subprocess
 import threading
 import time
-import xmlrpc.client
 from email.utils import parsedate_to_datetime
 from pathlib import Path
 from urllib.parse import urlparse
 
+import master_calls
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import (
     Controller,
@@ -147,8 +147,8 @@ def find_masters(uri: str) -> list[OtherMaster]:
     for port in sorted(master_ports(done.stdout, _command_line) - {urlparse(uri).port}):
         other = f"http://localhost:{port}"
         try:
-            publishers = dict(_proxy(other).getSystemState(CALLER_ID)[2][0])
-        except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError):
+            publishers = dict(master_calls.proxy(other, CALL_TIMEOUT_S).getSystemState(CALLER_ID)[2][0])
+        except master_calls.NO_ANSWER:
             continue
         found.append(OtherMaster(other, any(publishers.get(topic) for topic in SIMULATOR_TOPICS)))
     return found
@@ -179,26 +179,15 @@ def resolve(name: str) -> tuple[str | None, bool]:
     return address, True
 
 
-class _Transport(xmlrpc.client.Transport):
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = CALL_TIMEOUT_S
-        return connection
-
-
-def _proxy(uri):
-    return xmlrpc.client.ServerProxy(uri, transport=_Transport())
-
-
 def ask_master(uri: str) -> Master:
     """Facts from the master at uri. Raises TimeoutError if it accepts connections and does not answer."""
-    master = _proxy(uri)
+    master = master_calls.proxy(uri, CALL_TIMEOUT_S)
     try:
         _, _, (publishers, _, _) = master.getSystemState(CALLER_ID)
         code, _, use_sim_time = master.getParam(CALLER_ID, "/use_sim_time")
     except TimeoutError:
         raise
-    except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError) as error:
+    except master_calls.NO_ANSWER as error:
         return Master(error=str(error) or type(error).__name__)
     by_topic = dict(publishers)
     simulators = {node for topic in SIMULATOR_TOPICS for node in by_topic.get(topic, [])}
@@ -216,10 +205,10 @@ def ask_master(uri: str) -> Master:
 def _node_state(master, node):
     try:
         _, _, node_uri = master.lookupNode(CALLER_ID, node)
-        _proxy(node_uri).getPid(CALLER_ID)
+        master_calls.proxy(node_uri, CALL_TIMEOUT_S).getPid(CALLER_ID)
     except TimeoutError:
         return "slow"
-    except (OSError, xmlrpc.client.Error, http.client.HTTPException):
+    except master_calls.NO_ANSWER:
         return "dead"
     return "alive"
 
@@ -229,7 +218,7 @@ def find_deaf_nodes(uri: str, patience_s: float = DEAF_S) -> list[str]:
 
     Each is asked for one of its services, as a client asks.
     """
-    services = _proxy(uri).getSystemState(CALLER_ID)[2][2]
+    services = master_calls.proxy(uri, CALL_TIMEOUT_S).getSystemState(CALLER_ID)[2][2]
     of_node = {node: service for service, nodes in services for node in nodes}
     questions = {node: lambda node=node, service=service: _greet(uri, node, service, patience_s)
                  for node, service in sorted(of_node.items())}
@@ -239,7 +228,7 @@ def find_deaf_nodes(uri: str, patience_s: float = DEAF_S) -> list[str]:
 
 def _greet(uri, node, service, patience_s):
     """ "deaf", or None where the node answers, or is not there, or is too slow in all."""
-    master = _proxy(uri)
+    master = master_calls.proxy(uri, CALL_TIMEOUT_S)
     address = urlparse(master.lookupService(CALLER_ID, service)[2])
     fields = (b"callerid=" + CALLER_ID.encode(), b"md5sum=*", b"probe=1", b"service=" + service.encode())
     header = b"".join(struct.pack("<I", len(field)) + field for field in fields)
@@ -285,7 +274,7 @@ def listen(root: Path, uri: str) -> Topics:
 
     Raises OSError without a master: rospy would wait for one.
     """
-    _proxy(uri).getPid(CALLER_ID)
+    master_calls.proxy(uri, CALL_TIMEOUT_S).getPid(CALLER_ID)
     script = root / "tools" / "lab_doctor" / "listen.py"
     command = [shutil.which("python3") or "python3", str(script)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
@@ -296,7 +285,7 @@ def listen(root: Path, uri: str) -> Topics:
 
 def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
     """Facts from a move_group, gathered by a process that has ROS; None if none runs. Raises TimeoutError, OSError."""
-    services = dict(_proxy(uri).getSystemState(CALLER_ID)[2][2])
+    services = dict(master_calls.proxy(uri, CALL_TIMEOUT_S).getSystemState(CALLER_ID)[2][2])
     name, nodes = next(((name, nodes) for name, nodes in sorted(services.items()) if name.endswith("/" + SCENE_SERVICE)
                         and nodes), ("", []))
     if not nodes:

@@ -3,16 +3,35 @@
 
 ROS's own clients wait for ever for a stopped program that still accepts connections.
 """
+from __future__ import annotations
+
+import http.client
+import xml.parsers.expat
 import xmlrpc.client
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import rosgraph
+
+#: All errors of a call: nobody there, not XML-RPC, an error response.
+NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError, ValueError)
 
 
-def proxy(uri, answer_s):
-    """An XML-RPC client; each of its calls raises TimeoutError after `answer_s` [s] without an answer."""
+def proxy(uri: str, answer_s: float) -> xmlrpc.client.ServerProxy:
+    """An XML-RPC client; each of its calls raises TimeoutError after ``answer_s`` [s] without an answer."""
     return xmlrpc.client.ServerProxy(uri, transport=_Transport(answer_s))
 
 
-def master(caller, uri, answer_s):
-    """A ``rosgraph.Master`` at `uri`, with the caller id `caller`; its calls time out as those of proxy()."""
+def value(answer: Any) -> Any:
+    """The value in a ROS answer (code, text, value). Raises ValueError for a refusal."""
+    code, text, found = answer
+    if code != 1:
+        raise ValueError(text)
+    return found
+
+
+def master(caller: str, uri: str, answer_s: float) -> rosgraph.Master:
+    """A ``rosgraph.Master`` at ``uri``, with the caller id ``caller``; its calls time out as those of proxy()."""
     import rosgraph  # imported late: most callers need only a proxy
 
     found = rosgraph.Master(caller, uri)
@@ -21,11 +40,11 @@ def master(caller, uri, answer_s):
 
 
 class _Transport(xmlrpc.client.Transport):
-    def __init__(self, answer_s):
+    def __init__(self, answer_s: float) -> None:
         super().__init__()
         self._answer_s = answer_s
 
-    def make_connection(self, host):
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
         connection = super().make_connection(host)
         connection.timeout = self._answer_s
         return connection

@@ -7,10 +7,7 @@ A simulator is starting if:
 - the simulator's node is registered and does not publish /clock yet;
 - a node is spawning a model: gazebo_ros's spawn_model registers as a publisher of SPAWNING meanwhile.
 """
-import http.client
 import socket
-import xml.parsers.expat
-import xmlrpc.client
 from urllib.parse import urlparse
 
 import master_calls
@@ -22,8 +19,6 @@ CLOCK = "/clock"
 SPAWNING = "/gazebo/spawning"
 # Longest wait for one answer [s].
 ANSWER_TIMEOUT_S = 2.0
-# All errors of a call: nobody there, not XML-RPC, an error response.
-NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError, ValueError)
 
 
 class SimulatorDied(OSError):
@@ -42,7 +37,7 @@ class StartWatch:
         """Return the names of starting processes and nodes; raises SimulatorDied if one of them has ended."""
         try:
             graph = Graph(self._uri, self._caller)
-        except NO_ANSWER as error:
+        except master_calls.NO_ANSWER as error:
             if self._is_known:
                 raise SimulatorDied("the simulator ended while it was waited for: the ROS master at %s is gone (%s). "
                                     "Its terminal says why; start it again" % (self._uri, error)) from error
@@ -79,38 +74,31 @@ class Graph:
         self._caller = caller
         self._master = master_calls.proxy(uri, ANSWER_TIMEOUT_S)
         self.published, subscribed, services = (
-            dict(part) for part in _value(self._master.getSystemState(caller)))
+            dict(part) for part in master_calls.value(self._master.getSystemState(caller)))
         self.nodes = {node for part in (self.published, subscribed, services) for nodes in part.values()
                       for node in nodes}
 
     def processes(self):
         """Names of the processes that every roslaunch of this master runs now, with a leading slash."""
         try:
-            launches = _value(self._master.getParam(self._caller, "/roslaunch/uris"))
-        except NO_ANSWER:
+            launches = master_calls.value(self._master.getParam(self._caller, "/roslaunch/uris"))
+        except master_calls.NO_ANSWER:
             return
         for uri in launches.values() if isinstance(launches, dict) else ():
             # An ended roslaunch leaves its parameter behind.
             try:
-                running, _ended = _value(master_calls.proxy(uri, ANSWER_TIMEOUT_S).list_processes())
+                running, _ended = master_calls.value(master_calls.proxy(uri, ANSWER_TIMEOUT_S).list_processes())
                 names = ["/" + name.rpartition("-")[0] for name, _starts in running]
-            except (*NO_ANSWER, TypeError):
+            except (*master_calls.NO_ANSWER, TypeError):
                 continue
             yield from names
 
     def is_alive(self, node):
         """Whether the node's registered address accepts connections: the node may be too busy to answer."""
         try:
-            address = urlparse(_value(self._master.lookupNode(self._caller, node)))
+            address = urlparse(master_calls.value(self._master.lookupNode(self._caller, node)))
             socket.create_connection((address.hostname, address.port), timeout=ANSWER_TIMEOUT_S).close()
-        except NO_ANSWER:
+        except master_calls.NO_ANSWER:
             return False
         return True
 
-
-def _value(answer):
-    """The value in a ROS answer (code, text, value). Raises ValueError for a refusal."""
-    code, text, value = answer
-    if code != 1:
-        raise ValueError(text)
-    return value

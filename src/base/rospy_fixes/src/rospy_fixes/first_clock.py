@@ -118,7 +118,7 @@ def _master_answers():
 
     try:
         master_calls.proxy(rosgraph.get_master_uri(), simulator_start.ANSWER_TIMEOUT_S).getPid("/first_clock")
-    except simulator_start.NO_ANSWER:
+    except master_calls.NO_ANSWER:
         return False
     return True
 
@@ -170,5 +170,5 @@ def _wait(rospy):
 def _is_published(rospy, topic):
     try:
         return topic in dict(rospy.get_published_topics())
-    except simulator_start.NO_ANSWER:
+    except master_calls.NO_ANSWER:
         return False

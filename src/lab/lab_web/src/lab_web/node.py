@@ -51,6 +51,7 @@ from loop_ros.faults import Faults
 from master_calls.simulator_start import SimulatorDied, StartWatch
 from processes import ports
 from rospy_fixes.ports.threads import lasting
+from processes.memory import return_large_blocks
 from rospy_nodes.rest import Demand
 from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge import ros_graph
@@ -59,7 +60,6 @@ from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
 from web_bridge.errors import shown
 from web_bridge.loop_thread import LoopThread
-from web_bridge.memory import return_large_blocks
 from web_bridge.serving import Serving
 from web_bridge.session import Bridge
 from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer

@@ -13,12 +13,12 @@ import rospy
 import yaml
 
 from model_files.resources import ResourceFinder
+from processes.memory import keep_freed_memory
 from processes.priority import give_way
 from rospy_nodes.start import limit_ports
 from sensor_renderer.best import best_renderer
 from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter
-from sensor_renderer.memory import keep_freed_memory
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
 from sensor_renderer.priority import DRAWING

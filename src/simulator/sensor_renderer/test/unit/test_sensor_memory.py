@@ -9,7 +9,7 @@ import pytest
 PROGRAM = """
 import io, resource
 from sensor_msgs.msg import PointCloud2
-from sensor_renderer.memory import keep_freed_memory
+from processes.memory import keep_freed_memory
 if %r:
     keep_freed_memory()
 cloud = PointCloud2(data=bytes(16 * 640 * 480))

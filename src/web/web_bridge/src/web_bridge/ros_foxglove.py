@@ -3,13 +3,14 @@
 import os
 import threading
 import time
-from xmlrpc.client import Error, ServerProxy, Transport
+from xmlrpc.client import Error
 
 import rosgraph
 import rospkg
 import rospy
 from rospy.impl.paramserver import get_param_server_cache
 
+import master_calls
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType
 from web_bridge.foxglove.catalogue import GraphState
 from web_bridge.ros_graph import PROBE, RosGraph, address_of, handshake, message_class, service_class
@@ -91,25 +92,14 @@ class FoxgloveGraph(RosGraph):
         request = {"topic": topic, "type": "*", "md5sum": "*"}
         for node in dict(self._ask("getSystemState")[0]).get(topic, ()):
             try:
-                with ServerProxy(self._ask("lookupNode", node), _Impatient()) as proxy:
-                    code, _, protocol = proxy.requestTopic(rospy.get_name(), topic, [["TCPROS"]])
-                if code != 1 or len(protocol) != 3:
-                    continue
-                header = _header(tuple(protocol[1:]), request, _PROBE_S)
-            except (OSError, Error, BridgeError, ValueError):
+                with master_calls.proxy(self._ask("lookupNode", node), _PROBE_S) as proxy:
+                    _, host, port = master_calls.value(proxy.requestTopic(rospy.get_name(), topic, [["TCPROS"]]))
+                header = _header((host, port), request, _PROBE_S)
+            except (*master_calls.NO_ANSWER, BridgeError, TypeError):
                 continue
             if header.get("type") == type_name and header.get("message_definition"):
                 return header["message_definition"], header.get("md5sum", "*")
         raise error
-
-
-class _Impatient(Transport):
-    """XML-RPC with a deadline: a node may hang."""
-
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = _PROBE_S
-        return connection
 
 
 def _header(address, request, timeout_s):

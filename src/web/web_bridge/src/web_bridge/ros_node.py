@@ -4,9 +4,9 @@ import ssl
 
 import rospy
 
+from processes.memory import return_large_blocks
 from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge import ros_graph
-from web_bridge.memory import return_large_blocks
 from web_bridge.parameters import ParameterError
 from web_bridge.serving import listen
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Freed messages go back to the system, also where small objects came after them."""
+"""Freed memory goes back to the system, or is used again."""
 import subprocess
 import sys
 
@@ -7,7 +7,7 @@ import sys
 PROGRAM = """
 import sys
 from pathlib import Path
-from web_bridge.memory import return_large_blocks
+from processes.memory import return_large_blocks
 
 def resident_mb():
     line, = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmRSS:")]
