@@ -294,7 +294,7 @@ CORNERS = np.array([(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0
 TETRAHEDRON = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
 
 
-def straight(reacher, constraints, start, goal):
+def straight(reacher, start, goal, constraints):
     """Whether the constraints are planned as the straight motion, with 2 mrad to spare."""
     scene, exact = reacher
     search = Search(exact, 1, PATIENCE_S, time.monotonic, constraints=constraints)
@@ -302,24 +302,23 @@ def straight(reacher, constraints, start, goal):
     return path.length <= float(np.linalg.norm(goal - start)) + 2e-3
 
 
-@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "cone", "mesh"])
-def test_a_region_of_any_size_may_be_used_up_to_its_edge(reacher, kind):
-    """A hand just above the bottom of a large box: the straight motion keeps to it, so nothing else is planned."""
-    model, choose, looked = reacher[0].model, np.random.default_rng(5), 0
-    for number in range(60):
+KINDS, SIZES = ("box", "sphere", "cylinder", "cone", "mesh"), (0.3, 0.6, 1.0, 2.0, 4.0, 20.0)
+
+
+def motions_in_region(model, kind, size, choose):
+    """Endlessly (start, goal, ConstraintSet): the straight motion keeps to a region that goes no further than it."""
+    while True:
         start = choose.uniform(-1.5, 1.5, 6)
         goal = start + choose.uniform(-0.6, 0.6, 6)
         points = np.array([model.frame_of(q, "l5")[:3, 3] for q in np.linspace(start, goal, 60)])
-        region = region_around(points, kind, (0.3, 0.6, 1.0, 2.0, 4.0, 20.0)[number % 6], choose)
+        region = region_around(points, kind, size, choose)
         if region is not None:
-            looked += 1
-            assert straight(reacher, ConstraintSet(positions=[PositionTarget("l5", [region])]), start, goal), number
-    assert looked > 20
+            yield start, goal, ConstraintSet(positions=[PositionTarget("l5", [region])])
 
 
-def test_a_wide_tolerance_may_be_used_up_to_its_edge(reacher):
-    model, choose, looked = reacher[0].model, np.random.default_rng(6), 0
-    for number in range(60):
+def motions_in_tolerance(model, choose):
+    """Endlessly (start, goal, ConstraintSet): the straight motion turns as far as the tolerances go."""
+    while True:
         start = choose.uniform(-1.0, 1.0, 6)
         goal = start + choose.uniform(-0.3, 0.3, 6)
         turns = [model.frame_of(q, "l5")[:3, :3] for q in np.linspace(start, goal, 60)]
@@ -327,10 +326,43 @@ def test_a_wide_tolerance_may_be_used_up_to_its_edge(reacher):
         free = OrientationTarget("l5", wanted, (math.pi,) * 3)
         angles = np.abs([free.angles(wanted.T @ turn) for turn in turns]).max(axis=0)
         if angles[1] < 1.2 and angles.max() < 2.5:
-            looked += 1
-            target = OrientationTarget("l5", wanted, tuple(angles + 2e-3))
-            assert straight(reacher, ConstraintSet(orientations=[target]), start, goal), number
-    assert looked > 15
+            yield start, goal, ConstraintSet(orientations=[OrientationTarget("l5", wanted, tuple(angles + 2e-3))])
+
+
+def assert_straight_within_a_second(reacher, motions):
+    straight(reacher, *next(motions))  # compiled code is loaded
+    for number, motion in enumerate(itertools.islice(motions, 100)):
+        begin = time.process_time()
+        assert straight(reacher, *motion), number
+        assert time.process_time() - begin < 1.0, number
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_region_of_any_size_may_be_used_up_to_its_edge(reacher, kind):
+    """A hand just above the bottom of a large box: the straight motion keeps to it, so nothing else is planned."""
+    choose = np.random.default_rng(5)
+    for size in SIZES:
+        for start, goal, constraints in itertools.islice(motions_in_region(reacher[0].model, kind, size, choose), 5):
+            assert straight(reacher, start, goal, constraints), size
+
+
+def test_a_wide_tolerance_may_be_used_up_to_its_edge(reacher):
+    for start, goal, constraints in itertools.islice(
+            motions_in_tolerance(reacher[0].model, np.random.default_rng(6)), 20):
+        assert straight(reacher, start, goal, constraints)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hundred_regions_of_each_shape_and_size(reacher, kind, size):
+    assert_straight_within_a_second(
+        reacher, motions_in_region(reacher[0].model, kind, size, np.random.default_rng(8)))
+
+
+@pytest.mark.long
+def test_a_hundred_tolerances(reacher):
+    assert_straight_within_a_second(reacher, motions_in_tolerance(reacher[0].model, np.random.default_rng(9)))
 
 
 def test_a_goal_for_two_links_of_one_arm_is_sampled(reacher):
