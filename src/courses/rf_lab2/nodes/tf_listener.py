@@ -10,6 +10,7 @@ import tf2_ros
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition
+from command_line.options import did_you_mean
 from rf_lab2.poses import homogeneous_matrix, rotation_matrix
 
 # The lab's exercise.
@@ -33,9 +34,11 @@ def parse_arguments(argv):
 def transform_known(buffer, target, source):
     """Condition: tf knows the pose of `source` in `target`."""
     def explain():
-        return "%s (known frames: %s)" % (
-            buffer.can_transform_core(target, source, rospy.Time())[1],
-            ", ".join(sorted(line.split()[1] for line in buffer.all_frames_as_string().splitlines())) or "none")
+        known = sorted(line.split()[1] for line in buffer.all_frames_as_string().splitlines())
+        slips = [did_you_mean(frame, known) for frame in (target, source) if frame.strip("/") not in known]
+        return "%s%s (known frames: %s)" % (
+            buffer.can_transform_core(target, source, rospy.Time())[1].rstrip("."), "".join(slips),
+            ", ".join(known) or "none")
 
     return Condition("the transform %s -> %s" % (target, source),
                      lambda: bool(buffer.can_transform_core(target, source, rospy.Time())[0]), explain)

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One line about a wait. Free of ROS."""
+from __future__ import annotations
+
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 # Shortest time between two lines on a stream that is not a terminal [s].
 AGAIN_AFTER_S = 30.0
@@ -14,7 +18,7 @@ class WaitingLine:
     Attribute `again_after_s`: shortest time between two permanent lines [s].
     """
 
-    def __init__(self, stream=None, again_after_s=AGAIN_AFTER_S, now=time.monotonic):
+    def __init__(self, stream: Any = None, again_after_s: float = AGAIN_AFTER_S, now: Callable = time.monotonic) -> None:
         self.again_after_s = again_after_s
         self._stream = stream
         self._now = now
@@ -22,7 +26,7 @@ class WaitingLine:
         self._shown = ""
         self._last = ""
 
-    def say(self, what, waited_s):
+    def say(self, what: str, waited_s: float) -> None:
         """Show that the program has waited for `what` for `waited_s` [s]; may be called at any rate."""
         stream = sys.stderr if self._stream is None else self._stream
         if stream.isatty():
@@ -37,7 +41,14 @@ class WaitingLine:
             stream.flush()
             self._said_at_s, self._last = self._now(), what
 
-    def end(self):
+    def note(self, text):
+        """Write a line that stays, such as a reason for the wait."""
+        self.end()
+        stream = sys.stderr if self._stream is None else self._stream
+        stream.write(text + "\n")
+        stream.flush()
+
+    def end(self) -> None:
         """The wait is over: erase the line from the terminal."""
         if self._shown:
             stream = sys.stderr if self._stream is None else self._stream

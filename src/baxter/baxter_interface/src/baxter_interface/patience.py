@@ -9,6 +9,8 @@ from dataclasses import dataclass
 # A wait that is shorter than this prints nothing [s].
 FIRST_NOTICE_S = 1.0
 POLL_S = 0.05
+# A wait that is longer says what was found so far [s].
+REASON_AFTER_S = 5.0
 # Period of the checks whether the awaited thing is starting [s].
 LOOK_EVERY_S = 1.0
 
@@ -39,7 +41,7 @@ class Condition:
 
     Attributes:
         what: its name, in "waiting for <what>". is_met: returns whether it is there. explain: returns what was found
-        instead and what would be right; called once, after the wait has failed.
+        instead and what would be right; called once in a long wait, and after it has failed.
     """
 
     what: str
@@ -63,18 +65,22 @@ def wait_in_order(conditions, timeout_s, line=None, is_coming=lambda: False, is_
     look_at_s = begin_s + LOOK_EVERY_S
     try:
         for condition in conditions:
+            reason_at_s = begin_s + REASON_AFTER_S
             while not condition.is_met():
                 if is_shutdown():
                     raise OSError(errno.ESHUTDOWN, "ROS is shutting down; was waiting for %s" % condition.what)
                 if now() >= min(look_at_s, deadline_s):
                     if is_coming():
-                        deadline_s = now() + timeout_s
+                        deadline_s, reason_at_s = now() + timeout_s, now() + REASON_AFTER_S
                     look_at_s = now() + LOOK_EVERY_S
                 if now() >= deadline_s:
                     raise OSError(errno.ETIMEDOUT, "waited %.0f s for %s: %s"
                                   % (now() - begin_s, condition.what, condition.explain()))
                 if line and now() - begin_s >= FIRST_NOTICE_S:
                     line.say(condition.what, now() - begin_s)
+                    if now() >= reason_at_s:
+                        line.note("still waiting for %s: %s" % (condition.what, condition.explain()))
+                        reason_at_s = float("inf")
                 sleep(POLL_S)
     finally:
         if line:

@@ -124,11 +124,14 @@ def test_ticker_refuses_a_rate_of_nothing():
 
 class FakeLine:
     def __init__(self):
-        self.shown, self.ended = [], 0
+        self.shown, self.ended, self.notes = [], 0, []
 
     def say(self, what, waited_s):
         if what not in self.shown:
             self.shown.append(what)
+
+    def note(self, text):
+        self.notes.append(text)
 
     def end(self):
         self.ended += 1
@@ -161,6 +164,18 @@ def test_vain_wait_says_what_was_found_and_all_conditions_share_the_time():
     assert caught.value.errno == errno.ETIMEDOUT
     assert clock.slept_s == pytest.approx(30.0, abs=0.06)
     assert line.ended == 1
+
+
+def test_a_long_wait_says_why_long_before_it_ends():
+    clock, line = FakeClock(), FakeLine()
+    patient(clock, [Condition("time", lambda: clock.slept_s > 8.0, lambda: "paused at %.0f s" % clock.slept_s)], line)
+    assert line.notes == ["still waiting for time: paused at 5 s"]
+
+
+def test_what_is_on_its_way_is_no_reason():
+    clock, line = FakeClock(), FakeLine()
+    patient(clock, [Condition("a robot", lambda: clock.slept_s > 20.0, str)], line, is_coming=lambda: True)
+    assert line.notes == []
 
 
 def test_the_time_limit_does_not_run_while_what_is_waited_for_is_on_its_way():

@@ -3,6 +3,7 @@
 """move_baxter.py and tf_listener.py as students call them."""
 import ast
 import os
+import signal
 import subprocess
 import unittest
 
@@ -169,6 +170,14 @@ class TfListenerTest(unittest.TestCase):
             "Rotation matrix:", "[[ 1.  0.  0.]", " [ 0. -1.  0.]", " [ 0.  0. -1.]]",
             "Homogeneous matrix:", "[[ 1.   0.   0.   0. ]", " [ 0.  -1.   0.   0. ]", " [ 0.   0.  -1.   0.5]",
             " [ 0.   0.   0.   1. ]]"])
+
+    def test_a_slip_in_a_frame_is_answered_while_it_waits(self):
+        with subprocess.Popen(["rosrun", "rf_lab2", "tf_listener.py", "base", "left_hnad"], stderr=subprocess.PIPE,
+                              text=True) as listener:
+            lines = iter(listener.stderr.readline, "")
+            self.assertTrue(any("did you mean left_hand?" in line for line in lines))
+            listener.send_signal(signal.SIGINT)
+            listener.communicate(timeout=DEADLINE_S)
 
     def test_pairs_of_the_lab_are_the_default(self):
         result = run("tf_listener.py", "--once")
