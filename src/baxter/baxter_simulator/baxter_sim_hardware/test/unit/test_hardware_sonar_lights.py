@@ -21,6 +21,8 @@ from world_picture.drawing import DrawingCache
 from world_picture.shared_picture import PictureWriter
 
 BAXTER = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxter.urdf"
+# The lights are read from the picture.
+HEARD = ()
 PINHOLE = Pinhole.from_field_of_view(240, 160, 0.6, 0.05, 5.0)
 RED, GREEN, YELLOW = (255, 0, 0), (0, 255, 0), (255, 200, 40)
 
