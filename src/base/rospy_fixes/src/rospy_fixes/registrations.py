@@ -6,6 +6,7 @@ even read, such as one with a control character, is tried for ever, and a master
 end: from then on the node makes no topic, no service and no connection. Here a registration that the master refuses
 ends with a line in the log. One that gets no answer is tried for DEADLINE_S, then again and again by a thread, and
 those that come meanwhile with it. A node that starts before its master still waits for it in its first registration.
+A node that ends takes its leave of the master within ANSWER_S, or goes without.
 """
 import contextlib
 import functools
@@ -57,7 +58,7 @@ def _keeps_statistics():
 
 def _amend_registrations(registration):
     manager, kinds = registration.RegManager, registration.Registration
-    added, removed = manager.reg_added, manager.reg_removed
+    added, removed, ended = manager.reg_added, manager.reg_removed, manager.cleanup
     methods = {kinds.PUB: "Publisher", kinds.SUB: "Subscriber", kinds.SRV: "Service"}
 
     @functools.wraps(added)
@@ -74,7 +75,16 @@ def _amend_registrations(registration):
             return
         _late(self, registration).withdraw(methods[kind], name, data)
 
-    manager.reg_added, manager.reg_removed = reg_added, reg_removed
+    @functools.wraps(ended)
+    def cleanup(self, reason):
+        leave = threading.Thread(target=ended, args=(self, reason), name="last registrations", daemon=True)
+        leave.start()
+        leave.join(ANSWER_S)
+        if leave.is_alive():
+            _late(self, registration).say("this program ends, but the ROS master at %s does not answer: it still "
+                                          "lists it (rosnode cleanup)" % self.master_uri)
+
+    manager.reg_added, manager.reg_removed, manager.cleanup = reg_added, reg_removed, cleanup
 
 
 class _Registrar:
@@ -103,12 +113,12 @@ class _Registrar:
             except _NO_ANSWER as error:
                 if not self._has_answered and not is_told:
                     is_told = True
-                    self._say("the ROS master at %s does not answer (%s); this program waits for it"
+                    self.say("the ROS master at %s does not answer (%s); this program waits for it"
                               % (self._manager.master_uri, error))
                 if not self._has_answered or time.monotonic() < end_s:
                     time.sleep(RETRY_S)
                     continue
-                self._say("%s: the ROS master at %s does not answer (%s); it is asked again and again"
+                self.say("%s: the ROS master at %s does not answer (%s); it is asked again and again"
                           % (what[1], self._manager.master_uri, error))
             with self._lock:
                 self._late.append(what)
@@ -175,9 +185,9 @@ class _Registrar:
         try:
             getattr(self._proxy(), "unregister" + method)(self._rospy.get_caller_id(), name, address)
         except (*_REFUSALS, *_NO_ANSWER) as error:
-            self._say("%s is still registered, the ROS master does not answer: %s" % (ascii(name)[1:-1], error))
+            self.say("%s is still registered, the ROS master does not answer: %s" % (ascii(name)[1:-1], error))
 
-    def _say(self, line):
+    def say(self, line):
         """Write to the log file and the terminal alone: for a line on /rosout, rospy may ask the master for a parameter
         first, and wait for its answer without end.
         """

@@ -142,6 +142,15 @@ def test_what_is_registered_is_withdrawn(node, master):
     assert master.calls == [("registerPublisher", "/talk"), ("unregisterPublisher", "/talk")]
 
 
+def test_a_node_ends_beside_a_master_that_says_nothing(node, master):
+    master.answers.clear()
+    node.publish("/talk")  # the master still answers the one that it waits for
+    ending = threading.Thread(target=node.cleanup, args=("end",), daemon=True)
+    ending.start()
+    wait_until(lambda: not ending.is_alive(), "the end")
+    assert any("does not answer: it still lists it" in line for line in node.lines)
+
+
 def test_a_subscriber_does_not_ask_a_silent_master_for_its_statistics(node, master, monkeypatch):
     statistics = SimpleNamespace(SubscriberStatisticsLogger=type("Logger", (), {}))
     registrations.amend(statistics)
