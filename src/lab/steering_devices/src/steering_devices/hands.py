@@ -11,11 +11,12 @@ from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Int8, String
 
 from baxter_interface import Gripper
-from moveit_servo.settings import UNITLESS
 
 if TYPE_CHECKING:
     from steering_devices.steering import Steering
 
+# Of a servo's parameter command_in_type: a twist's 1 means its own full speed.
+UNITLESS = "unitless"
 # Twists of zero that end a motion.
 _MAX_STOPS = 5
 
@@ -23,7 +24,7 @@ _MAX_STOPS = 5
 class Hand:
     """One servo and its gripper. name: of the servo's node; reason: why it holds back, "" if it does not."""
 
-    def __init__(self, name: str, gripper: str) -> None:
+    def __init__(self, name: str, gripper: str = "") -> None:
         self.name, self.reason, self.status = name, "", 0
         # A device may be started before the servo whose parameters these are.
         self._linear = rospy.get_param("~linear_speed", 0.2)
@@ -32,6 +33,11 @@ class Hand:
         self._twists = rospy.Publisher(name + "/delta_twist_cmds", TwistStamped, queue_size=1, tcp_nodelay=True)
         self._kept = [rospy.Subscriber(name + "/status", Int8, self._on_status, queue_size=1),
                       rospy.Subscriber(name + "/status_reason", String, self._on_reason, queue_size=1)]
+
+    def close(self) -> None:
+        """Steer no longer; the hand must rest."""
+        for end in (*self._kept, self._twists):
+            end.unregister()
 
     def _on_status(self, message: Int8) -> None:
         self.status = message.data

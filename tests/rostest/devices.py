@@ -90,5 +90,5 @@ def _read(end, screen):
 
 
 if __name__ == "__main__":
-    rospy.init_node("devices_rostest")
-    rostest.rosrun("steering_devices", "devices", DevicesTest, sys.argv)
+    rospy.init_node("devices")
+    rostest.rosrun("workspace_tests", "devices", DevicesTest, sys.argv)
