@@ -13,6 +13,7 @@ import {Plans} from "./plans.js";
 import {Plots} from "./plots.js";
 import {Recordings} from "./recordings.js";
 import {Simulation} from "./simulation.js";
+import {Steering} from "./steering.js";
 import {LANGUAGES, load, text} from "./texts.js";
 import {Topics} from "./topics.js";
 import {View} from "./view.js";
@@ -44,6 +45,7 @@ const exercises = new Exercises();
 const comparison = new Interface(send);
 const notebook = new Notebook(send, query);
 const simulation = new Simulation(send, () => view);
+const steering = new Steering(send, () => view);
 const overlay = new Overlay(send, () => view);
 const camera = new Camera(() => ({paused: simulation.paused, factor: state.factor}));
 let robot = {};
@@ -69,6 +71,7 @@ function settle(...codes) {
 
 function stop() {
   panel.settle();
+  steering.letGo();
   send({op: "stop"});
   if (!state.connected) note("connecting");
 }
@@ -97,6 +100,7 @@ function refresh() {
   recordings.allow(acting, driving);
   simulation.allow(driving);
   hands.allow(acting, driving);
+  steering.allow(driving);
   notebook.allow(acting);
   comparison.allow(acting);
 }
@@ -138,6 +142,8 @@ const served = {
   told({code, text: detail}) {
     panel.settle();
     plans.answered(null);
+    // What is still held would move again as soon as it can.
+    if (code !== "held") steering.letGo();
     note(code, detail);
   },
   rested() {
@@ -219,6 +225,7 @@ function buildPanels() {
   panel.build(robot);
   plans.build(robot);
   hands.build(robot.hands ?? []);
+  steering.build(robot);
   controls.build(robot);
   plots.build(robot.joints ?? []);
   simulation.build(robot);
@@ -249,6 +256,7 @@ function startTopics() {
     if (wasAtEnd) log.scrollTop = log.scrollHeight;
   });
   controls.start(topics);
+  steering.start(topics);
   camera.start(topics);
 }
 
@@ -325,4 +333,4 @@ setInterval(sayAlive, ALIVE_MS);
 document.addEventListener("visibilitychange", sayAlive);
 startTopics();
 // For the console, and for tests.
-globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, served};
+globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, steering, served};

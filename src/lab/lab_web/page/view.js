@@ -12,6 +12,8 @@ const SHORTEST_MS = 33;
 const SHARE = 0.33;
 // A picture waits that long for an answer that it is to show: without a graphics card, drawing would hold the answer up.
 const LONGEST_WAIT_MS = 50;
+// A link that holds an arm back.
+const HOLDS = 0xd0342c;
 // Where a hand would be: reached, and the nearest posture of one that is not.
 const GHOST = {true: 0x2f9e64, false: 0xd0342c};
 const GHOST_OPACITY = 0.5;
@@ -37,6 +39,8 @@ export class View {
     this.shapes = new Map();
     this.links = [];
     this.ghosts = new Map();
+    this.named = new Map();
+    this.marked = new Map();
     this.revision = null;
     this.planned = this.isAsking = this.answered = false;
     this.lastEnd = this.due = this.timer = 0;
@@ -94,8 +98,27 @@ export class View {
       this.world.add(link);
       return link;
     }));
+    // Links by their names, and by those of the joints that move them.
+    this.named = new Map();
+    bodies.flatMap(({names = []}) => names).forEach((pair, number) => {
+      for (const name of pair) this.named.set(name, [...this.named.get(name) ?? [], number]);
+    });
+    this.marked = new Map();
     this.sun.position.set(...light.to_sun).multiplyScalar(5);
     this.revision = revision;
+  }
+
+  // Show the links in red that have one of these names, or whose joint has; all others in their own colours.
+  mark(names) {
+    const wanted = new Set(names.flatMap((name) => this.named.get(name) ?? []));
+    if (wanted.size === this.marked.size && [...wanted].every((number) => this.marked.has(number))) return;
+    for (const own of this.marked.values()) own.forEach(([material, colour]) => material.color.copy(colour));
+    this.marked = new Map([...wanted].map((number) => [number, this.links[number].children.map(({material}) => {
+      const own = material.color.clone();
+      material.color.setHex(HOLDS);
+      return [material, own];
+    })]));
+    this.draw();
   }
 
   // poses: ArrayBuffer of the revision [uint32] and rows of (3, 4) [float32]. Returns whether they are of this scene.

@@ -210,14 +210,26 @@ class Lab:
             raise MotionError("there is no pose %r; there are %s" % (name, ", ".join(self._robot.poses)))
         self._aim(client, targets, is_stream=False)
 
-    def start(self, client, make):
+    def start(self, client, make, is_stream=False):
         """Move by ``make(limits, measured)``, which has what Motion has, in place of what is under way. Raises
         NotInControl, MotionError.
         """
         with self._lock:
-            self._require_ready(client, is_stream=False)
-            self._motion = make(self._robot.limits, self._measured())
-            self._begin(is_stream=False)
+            self._require_ready(client, is_stream)
+            self._replace(make(self._robot.limits, self._measured()))
+            self._begin(is_stream)
+
+    def let_go(self, client, motion):
+        """End ``motion`` where it is that of this page."""
+        with self._lock:
+            if self._control.holder == client and self._motion is motion:
+                motion.stop()
+
+    def _replace(self, motion):
+        if motion is not self._motion:
+            self._motion.stop()
+            self._setpoints = {}
+        self._motion = motion
 
     def _begin(self, is_stream):
         if not (is_stream and self._moving.is_set()):
@@ -229,7 +241,7 @@ class Lab:
         with self._lock:
             self._require_ready(client, is_stream)
             if not isinstance(self._motion, Motion) or self._motion.limits != self._robot.limits:
-                self._motion = Motion(self._robot.limits)
+                self._replace(Motion(self._robot.limits))
             self._motion.aim(targets, self._measured())
             self._begin(is_stream)
 

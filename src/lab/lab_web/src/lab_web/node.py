@@ -43,15 +43,18 @@ from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
+from lab_web.servos import Servos
 from lab_web.sights import Sights
 from lab_web.sim_clock import LINGER_S, SimClock
 from lab_web.simulation import Simulation
+from lab_web.steering import Steering
+from lab_web.steering import operation as steer_operation
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from master_calls.simulator_start import SimulatorDied, StartWatch
 from processes import ports
-from rospy_fixes.ports.threads import lasting
 from processes.memory import return_large_blocks
+from rospy_fixes.ports.threads import lasting
 from rospy_nodes.rest import Demand
 from rospy_nodes.start import end_on_signals, limit_ports
 from web_bridge import ros_graph
@@ -175,7 +178,15 @@ def serve(options, page, libraries):
     clock = SimClock(lambda: is_needed() or clients.need_time)
     clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: clients.need_time and clock.need())
 
-    states = Demand(robot.listen, robot.rest, LINGER_S, is_needed)
+    def listen():
+        robot.listen()
+        equipment.servos.listen()
+
+    def rest():
+        robot.rest()
+        equipment.servos.rest()
+
+    states = Demand(listen, rest, LINGER_S, is_needed)
 
     def watch(ends):
         while not ends():
@@ -254,6 +265,7 @@ class _Equipment(NamedTuple):
     recorder: Recorder
     guard: ReleaseGuard
     sights: Sights
+    servos: Servos
     loops: dict
 
 
@@ -282,13 +294,17 @@ def _equip(pages, robot, faults):
     lab.add("record", recorder.record, needs_control=False)
     lab.add("load", recorder.load, needs_control=False)
     lab.add("play", lambda client, _operation: play(lab, client, recorder))
+    servos = Servos()
+    steering = Steering(lambda: servos.hands, lambda side: robot.explain(
+        side + "_s0", lambda why: pages.tell(lab.holder, "held", "the %s arm: %s" % (side, why))))
+    lab.add("steer", steer_operation(lab, steering, lambda: servos.hands))
     comparison = Comparison(_findings, comparisons, partial(pages.share, "interface"), time.time)
     lab.add("compare", comparison.ask, needs_control=False)
     lab.add("nod", parts.nod, needs_power=True)
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
-    return _Equipment(hands, simulation, recorder, guard, sights, {
+    return _Equipment(hands, simulation, recorder, guard, sights, servos, {
         **{name: attended(pages.present, loop) for name, loop in (
             ("the arms", lab.run), ("the 3D view", partial(_follow, pages)), ("points and frames", overlay.run),
             ("the hands", hands.run), ("errands", errands.run), ("plans", plans.run),
@@ -405,7 +421,8 @@ def _described(robot, equipment, published):
     """Description of the robot for pages: the operation "robot". ``published``: {topic: type}."""
     return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
                        for name, limits in robot.limits.items()],
-            "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,
+            "poses": list(robot.poses), "hands": equipment.hands.sides, "servos": equipment.servos.there,
+            "grippers": robot.grippers,
             "cameras": sorted(topic for topic, kind in published.items() if kind == _COMPRESSED),
             "can_plan": published.get(RESULT_TOPIC) == RESULT_TYPE,
             "can_press": Parts.can_press(), "has_screen": SCREEN_TOPIC in published,

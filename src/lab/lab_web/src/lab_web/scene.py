@@ -19,7 +19,8 @@ _REST = 1e-4
 
 
 class Picture:
-    """One scene. ``text``: JSON with ``revision``, ``bodies`` [{name, links: [[{shape, colour}]]}], ``light``;
+    """One scene. ``text``: JSON with ``revision``, ``light``, ``bodies`` [{name, links: [[{shape, colour}]], joints:
+    their number, names: of each link and of the joint that moves it}];
     ``shapes``: {name: bytes of float32, three rows x y z nx ny nz [m] for each triangle}; names belong to contents;
     ``bodies``: {name: sensor_renderer.mirror.Body} in the scene's order.
     """
@@ -79,7 +80,9 @@ def picture_of(mirror, revision):
                     shapes[names[part.key]] = content
                 shown.append({"shape": names[part.key], "colour": [float(value) for value in part.colour]})
             links.append(shown)
-        bodies.append({"name": name, "links": links, "joints": len(body.joint_names)})
+        # A link and the joint that moves it.
+        parts = [[link, joint] for link, joint in zip(body.link_names, ["", *body.joint_names], strict=True)]
+        bodies.append({"name": name, "links": links, "joints": len(body.joint_names), "names": parts})
     light = {key: [float(value) for value in getattr(mirror.light, key)] for key in ("ambient", "to_sun", "sun")}
     return Picture(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
                    dict(mirror.bodies))

@@ -22,6 +22,8 @@ from lab_web.motion import Limits
 from lab_web.playback import Recorder, play
 from lab_web.scene import SceneFollower
 from lab_web.serving import Pages, routes, upload_routes
+from lab_web.steering import Steering
+from lab_web.steering import operation as steer_operation
 from loop_ros.faults import Faults
 from urdf_model import parse_urdf
 from web_bridge.access import Access
@@ -75,6 +77,20 @@ class Robot:
         self.switched.append(what)
 
 
+class Servo:
+    """Keeps what steers it. ``status``, ``reason``: what it says of itself."""
+
+    def __init__(self):
+        self.is_there, self.status, self.reason, self.sent = True, 0, "", []
+
+    def steer(self, twist, in_tool):
+        self.sent.append((twist.tolist(), in_tool))
+
+    @property
+    def moves(self):
+        return bool(self.sent) and any(self.sent[-1][0])
+
+
 class Rosbridge(websocket.WebSocketHandler):
     """Says the robot's state and joints to its subscribers, and nothing else."""
 
@@ -94,7 +110,7 @@ class Rosbridge(websocket.WebSocketHandler):
         self._sockets.discard(self)
 
 
-async def say(sockets, robot, time_s, camera):
+async def say(sockets, robot, time_s, camera, servos):
     """In the loop: messages of now."""
     joints = list(robot.positions)
     messages = {
@@ -106,6 +122,9 @@ async def say(sockets, robot, time_s, camera):
         NUMBERS: {"header": {"seq": 3, "stamp": {"secs": int(time_s), "nsecs": 0}}, "text": "x", "near": True,
                   "wrench": {"force": {"x": time_s, "y": None}}, "names": ["a", "b"], "values": [1.0, 2.0],
                   "rest": [5]}}
+    for side, servo in servos.items():
+        messages["/%s_servo/status" % side] = {"data": servo.status}
+        messages["/%s_servo/status_reason" % side] = {"data": servo.reason}
     if camera:
         messages[CAMERA] = {"format": "png", "data": camera}
     for socket in list(sockets):
@@ -142,6 +161,9 @@ class Server:
         errands = Errands(self.pages.tell, Faults(SimpleNamespace(error=pytest.fail)))
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
+        self.servos = {side: Servo() for side in SIDES}
+        steering = Steering(lambda: self.servos, lambda side: None)
+        self.lab.add("steer", steer_operation(self.lab, steering, lambda: self.servos))
         recorder = Recorder(lambda state: self.pages.share("recording", state))
         self.shown, self.planned, self.notebook_asks, self.watched, self.compared = [], [], [], {}, []
         self.lab.add("watch", self.watched.__setitem__, needs_control=False, for_viewers=True)
@@ -164,8 +186,8 @@ class Server:
         self.pages.share("robot", {
             "joints": [{"name": name, "lower": row.lower, "upper": row.upper} for name, row in
                        self.robot.limits.items()],
-            "poses": ["neutral"], "hands": hands.sides, "grippers": SIDES, "cameras": [CAMERA], "has_scene": True,
-            "can_plan": True, "can_press": True, "things": ["block"]})
+            "poses": ["neutral"], "hands": hands.sides, "servos": SIDES, "grippers": SIDES,
+            "cameras": [CAMERA], "has_scene": True, "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
                                        (r"/notebook/(?:lab|doc).*", Frame),
                                        (r"/rosbridge", Rosbridge, {"sockets": self._sockets})])
@@ -194,7 +216,7 @@ class Server:
             self._write()
             self._follow()
             self._recorder.take(0.02 * self.ticks, self.robot.positions)
-            self.loop.run(say(self._sockets, self.robot, 0.02 * self.ticks, self.camera))
+            self.loop.run(say(self._sockets, self.robot, 0.02 * self.ticks, self.camera, self.servos))
 
     def close(self):
         self._ended.set()

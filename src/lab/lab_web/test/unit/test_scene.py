@@ -80,7 +80,7 @@ def test_parts_have_the_coarsest_triangles_that_are_near_the_original():
     levels = tuple(Level(error_m, lambda rows=rows: rows)
                    for error_m, rows in ((0.001, finest), (0.0025, near), (0.01, plain)))
     part = Part("shape", plain, (1.0, 0.0, 0.0, 1.0), levels=levels)
-    body = SimpleNamespace(parts=[[part, Part("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[])
+    body = SimpleNamespace(parts=[[part, Part("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[], link_names=["a"])
     light = SimpleNamespace(ambient=[0.5], to_sun=[0.0, 0.0, 1.0], sun=[0.5])
     picture = picture_of(SimpleNamespace(bodies={"a": body}, light=light), 1)
     (first, second), = json.loads(picture.text)["bodies"][0]["links"]
