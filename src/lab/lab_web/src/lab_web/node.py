@@ -95,6 +95,12 @@ def main():
     options = _parser().parse_args(rospy.myargv()[1:])
     try:
         _require_lab()
+        there = page_files.address(rosgraph.get_master_uri())
+        # A second node of the name would end the first and somebody's page. Options ask for another one.
+        if there and not _is_launched() and not rospy.myargv()[1:]:
+            print("The lab's page is served already, until Ctrl-C in its terminal. Open in a browser:\n\n    %s"
+                  % there, flush=True)
+            return 0
         page = Path(rospkg.RosPack().get_path("lab_web")) / "page"
         serve(options, page, fetched(page))
     except (Failure, LibrariesError) as error:
@@ -355,11 +361,15 @@ def _announce(port, tokens, public):
     # Notebooks of this user find it there; a folder that cannot be written costs only that.
     with contextlib.suppress(OSError):
         page_files.write_address(rosgraph.get_master_uri(), operators)
-    # roslaunch names its nodes; what else it starts still prints lines.
-    is_launched = "__name" in rosgraph.names.load_mappings(sys.argv)
-    text = announcement(operators, viewers, port if public else None, is_launched)
+    # What else roslaunch starts still prints lines.
+    text = announcement(operators, viewers, port if public else None, _is_launched())
     threading.Thread(target=_print_when_started, args=(text,), daemon=True).start()
     return operators
+
+
+def _is_launched() -> bool:
+    """Whether roslaunch started this process: it names its nodes."""
+    return "__name" in rosgraph.names.load_mappings(sys.argv)
 
 
 def announcement(operators: str, viewers: str, public_port: int | None, is_launched: bool) -> str:
