@@ -46,9 +46,10 @@ with matplotlib.rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'labs', 'pat
 
 def is_blank(png):
     """Whether a picture has almost only one colour."""
-    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).reshape(-1, 3)
-    colours, counts = np.unique(pixels, axis=0, return_counts=True)
-    paper = colours[np.argmax(counts)].astype(int)
+    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).reshape(-1, 3).astype(int)
+    # As one number a pixel: rows take seven times as long to sort.
+    _, first, counts = np.unique(pixels @ (1, 256, 65536), return_index=True, return_counts=True)
+    paper = pixels[first[np.argmax(counts)]]
     return float((np.abs(pixels - paper).max(axis=1) > 16).mean()) < 0.01
 
 

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands that the project's pages mark with `run lab`, on Baxter's lab or on the one that the page starts."""
+"""The commands that the project's pages mark with `run lab`, on Baxter's lab (the argument "baxter") or on those that
+pages start ("own").
+"""
 
 import contextlib
 import os
@@ -77,27 +79,44 @@ def run_page(blocks, folder, master_uri):
                 page_blocks.run(block, folder, LIMIT_S, ROS_MASTER_URI=master_uri)
 
 
-class PagesTest(unittest.TestCase):
-    def test_marked_commands_run(self):
+def starts_a_lab(blocks):
+    return any(block.kind == "start" for block in blocks)
+
+
+class Pages(unittest.TestCase):
+    def run_pages(self, chosen):
+        """Run the pages with commands for a lab of which ``chosen(blocks)`` is true; there must be some."""
         command = ["git", "-C", str(ROOT), "ls-files", "*.md"]
         listed = subprocess.run(command, capture_output=True, text=True, check=True)
-        baxters = os.environ["ROS_MASTER_URI"]
-        wait_for_service(baxters, "/ExternalTools/left/PositionKinematicsNode/IKService")
         ran, wrong = 0, []
         for page in sorted(listed.stdout.split()):
             if not (ROOT / page).exists():
                 continue
             blocks = page_blocks.marked_blocks(page, (ROOT / page).read_text(encoding="utf-8"))
-            if any(block.kind == "lab" for block in blocks):
+            if any(block.kind == "lab" for block in blocks) and chosen(blocks):
                 ran += 1
                 with tempfile.TemporaryDirectory() as folder:
                     try:
-                        run_page(blocks, Path(folder), baxters)
+                        run_page(blocks, Path(folder), os.environ["ROS_MASTER_URI"])
                     except AssertionError as error:
                         wrong.append(str(error))
         self.assertEqual("\n".join(wrong), "")
         self.assertGreater(ran, 0)
 
 
+class OnBaxter(Pages):
+    def test_marked_commands_run(self):
+        wait_for_service(os.environ["ROS_MASTER_URI"], "/ExternalTools/left/PositionKinematicsNode/IKService")
+        self.run_pages(lambda blocks: not starts_a_lab(blocks))
+
+
+class OnTheirOwn(Pages):
+    def test_marked_commands_run(self):
+        self.run_pages(starts_a_lab)
+
+
+SUITES = {"baxter": OnBaxter, "own": OnTheirOwn}
+
 if __name__ == "__main__":
-    rostest.rosrun("workspace_tests", "pages", PagesTest)
+    suite = next(word for word in sys.argv[1:] if word in SUITES)
+    rostest.rosrun("workspace_tests", "pages_" + suite, SUITES[suite])
