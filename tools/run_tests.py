@@ -102,6 +102,8 @@ def run(selection: Selection, options: argparse.Namespace) -> int:
         worst = 0
         for number in range(options.repeat):
             order = [] if options.shuffle is None else [f"--shuffle={options.shuffle + number}"]
+            if options.repeat > 1:
+                print(" ".join([f"Round {number + 1} of {options.repeat}", *order]), flush=True)
             worst = max(worst, int(pytest.main([*order, *words])))
         return worst
 

@@ -302,6 +302,16 @@ def test_a_run_counts_everything(tmp_path, fake_rostest, words):
     assert done.returncode == 1 and "test_one.py::test_skipped_without_a_reason: skipped without" in done.stdout
 
 
+def test_long_tests_of_both_kinds_are_listed_by_their_mark(tmp_path):
+    (tmp_path / "test_one.py").write_text(UNIT % True)
+    (tmp_path / "rostest").mkdir()
+    for name in ("works", "soak"):
+        (tmp_path / f"rostest/{name}.test").write_text("<launch>%s</launch>" % ("<!-- long -->" * (name == "soak")))
+    done = run_pytest(tmp_path, "--collect-only", "-m", "long")
+    assert done.returncode == 0 and [line for line in done.stdout.splitlines() if "::" in line] == [
+        "rostest/soak.test::rostest", "test_one.py::test_slow"]
+
+
 def test_an_error_of_pytest_itself_fails_the_run(tmp_path):
     (tmp_path / "test_one.py").write_text("def test_one(): pass")
     (tmp_path / "conftest.py").write_text("def pytest_runtest_logfinish(): raise RuntimeError('broken')")
@@ -379,6 +389,15 @@ def test_a_run_that_is_ended_leaves_no_process(tmp_path, fake_rostest):
         assert processes.wait_until_gone(mark, 30.0, processes.RUN_MARKER) == {}
     finally:
         processes.kill_all(mark, processes.RUN_MARKER)
+
+
+def test_a_round_that_fails_can_be_repeated_by_its_seed(monkeypatch, capsys):
+    ran = []
+    monkeypatch.setattr(run_tests.pytest, "main", lambda words: ran.append(words) or len(ran) - 1)
+    options = run_tests.parser().parse_args(["--repeat=2", "--shuffle=7"])
+    assert run_tests.run(run_tests.Selection([], []), options) == 1
+    assert [words[0] for words in ran] == ["--shuffle=7", "--shuffle=8"]
+    assert capsys.readouterr().out.splitlines()[1:] == ["Round 1 of 2 --shuffle=7", "Round 2 of 2 --shuffle=8"]
 
 
 def test_help_names_every_option(capsys):

@@ -68,7 +68,10 @@ def pytest_make_parametrize_id(val, argname):
 
 class RostestFile(pytest.File):
     def collect(self):
-        yield Rostest.from_parent(self, name="rostest")
+        test = Rostest.from_parent(self, name="rostest")
+        if is_long(self.path):
+            test.add_marker("long")
+        yield test
 
 
 class Rostest(pytest.Item):
@@ -117,7 +120,7 @@ def pytest_collection_modifyitems(config, items):
     named = tuple(argument for argument in config.args if "::" in argument)
     if not (config.option.long or config.option.markexpr):
         left_out = [item for item in items
-                    if _is_long(item) and not str(config.rootpath / item.nodeid).startswith(named)]
+                    if item.get_closest_marker("long") and not str(config.rootpath / item.nodeid).startswith(named)]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in set(left_out)]
         _tell(config, "long", [item.nodeid for item in left_out])
@@ -134,10 +137,6 @@ def pytest_collection_modifyitems(config, items):
     # Tests that need the whole machine first: later they would wait for a moment in which nothing else runs.
     files.sort(key=lambda file: not is_whole_machine(config.rootpath / file))
     items[:] = [item for file in files for item in by_file[file]]
-
-
-def _is_long(item) -> bool:
-    return is_long(item.path) if isinstance(item, Rostest) else item.get_closest_marker("long") is not None
 
 
 def _tell(config, name: str, value):
@@ -257,7 +256,7 @@ class Controller:
         ordinary = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
         if session.exitstatus not in ordinary and not self._total.failed:
             self._fail(f"pytest ended with exit code {int(session.exitstatus)}")
-        if self._total.failed or not self._total.passed:
+        if self._total.failed or not (self._total.passed or self._config.option.collectonly):
             session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
         took = {file: round(both[0], 1) for file, both in self._took.items() if both[0] >= MIN_DURATION_S}
         text = json.dumps({**read_durations(self._folder), **took}, indent=0, sort_keys=True)
