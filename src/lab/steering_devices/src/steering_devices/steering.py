@@ -95,7 +95,8 @@ class Keyboard:
 
 class Gamepad:
     """Sticks and buttons by a layout: {motions: {x: {axis: 1, scale: 1.0} or {buttons: [plus, minus]}, ...},
-    hold: button, open, close, hand, tool, success, failure, again: buttons}. Nothing moves unless ``hold`` is held."""
+    hold: button, open, close, hand, tool, success, failure, again: buttons, dead_zone: of the axes}. Nothing moves
+    unless ``hold`` is held; where it is null, as of a cap that returns to its middle, what is let go is at rest."""
 
     def __init__(self, layout: dict[str, Any], hands: int = 1) -> None:
         """Raises LayoutError."""
@@ -107,8 +108,12 @@ class Gamepad:
             if row not in ROWS:
                 raise LayoutError("the layout moves '%s'; expected some of %s" % (row, ", ".join(ROWS)))
             self._motions[ROWS.index(row)] = _source(row, source)
+        zone = layout.get("dead_zone", 0.0)
+        if isinstance(zone, bool) or not isinstance(zone, int | float) or not 0.0 <= zone < 1.0:
+            raise LayoutError("dead_zone is %r; expected a number from 0, less than 1" % (zone,))
+        self._dead_zone = zone
         for name in ("hold", "hand", "tool", *GRIPPER, *MARKS):
-            if name in layout:
+            if name in layout and not (name == "hold" and layout[name] is None):
                 self._buttons[name] = _index("button of " + name, layout[name])
         self._before: dict[str, bool] = {}
         self._hand, self._in_tool = 0, False
@@ -124,13 +129,13 @@ class Gamepad:
         twist = np.zeros(6)
         for row, (axis, scale, plus, minus) in self._motions.items():
             if axis is not None and axis < len(axes):
-                twist[row] = scale * axes[axis]
+                twist[row] = 0.0 if abs(axes[axis]) < self._dead_zone else scale * axes[axis]
             elif axis is None:
                 twist[row] = scale * (float(button(plus)) - float(button(minus)))
         if "hand" in new:
             self._hand = (self._hand + 1) % self.hands
         self._in_tool ^= "tool" in new
-        held = pressed["hold"] and "hand" not in new and np.isfinite(twist).all()
+        held = pressed.get("hold", True) and "hand" not in new and np.isfinite(twist).all()
         return Steering(np.clip(twist, -1.0, 1.0) if held else np.zeros(6), self._hand, self._in_tool,
                         next((name for name in GRIPPER if name in new), ""),
                         next((name for name in MARKS if name in new), ""))

@@ -61,6 +61,15 @@ def test_a_gamepad_moves_only_while_it_is_held(kind):
     assert not gamepad.take([], []).twist.any()
 
 
+def test_a_cap_needs_no_button_and_rests_in_its_middle():
+    cap, _ = pad("spacemouse")
+    assert cap.take([0.5, 0.05, -1.2, 0.0, 0.09, -0.3], [0, 0]).twist.tolist() == [0.5, 0.0, -1.0, 0.0, 0.0, -0.3]
+    assert not cap.take([0.05] * 6, [0, 0]).twist.any() and not cap.take([], []).twist.any()
+    taken = cap.take([0.5] * 6, [1, 0])
+    assert taken.hand == 1 and not taken.twist.any(), "the other hand does not begin with a motion"
+    assert cap.take([0.0] * 6, [0, 1]).gripper == "close"
+
+
 @pytest.mark.parametrize("kind", PADS)
 def test_buttons_count_once(kind):
     gamepad, layout = pad(kind)
@@ -75,7 +84,9 @@ def test_buttons_count_once(kind):
 
 @pytest.mark.parametrize("layout", [None, {}, {"motions": {"x": {"axis": 1}}},
                                     {"hold": 1, "motions": {"q": {"axis": 1}}},
-                                    {"hold": 1, "motions": {"x": {"axis": "one"}}}, {"hold": -1, "motions": {}}])
+                                    {"hold": 1, "motions": {"x": {"axis": "one"}}}, {"hold": -1, "motions": {}},
+                                    {"hold": 1, "motions": {}, "dead_zone": 1.5},
+                                    {"hold": 1, "motions": {}, "dead_zone": True}])
 def test_a_layout_that_cannot_be_used(layout):
     with pytest.raises(LayoutError):
         Gamepad(layout)
