@@ -3,7 +3,7 @@
 import {element} from "./panel.js";
 import {text} from "./texts.js";
 
-// Between two messages of what is held, and looks at the gamepads. The server lets go after 150 ms without.
+// Between two messages of what is held, and looks at the gamepads. The server lets go after 300 ms without.
 const SEND_MS = 40;
 const SIDES = ["left", "right"];
 const CHOICES = {left: ["left"], right: ["right"], both: SIDES};

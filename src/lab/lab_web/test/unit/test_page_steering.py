@@ -5,7 +5,7 @@ from test_lab import Hall, move
 
 from lab_web.control import SILENCE_S
 from lab_web.lab import TICK_S
-from lab_web.steering import Steering, operation
+from lab_web.steering import FRESH_S, Steering, operation
 
 UP = [0, 0, 1, 0, 0, 0]
 
@@ -67,7 +67,7 @@ def test_both_hands_move_while_they_are_held_and_rest_when_they_are_let_go(hall)
     lambda hall: hall.lab.gone(1), lambda hall: hall.lab.serve(2, True, {"op": "take"}),
     lambda hall: hall.lab.serve(2, False, {"op": "stop"}), lambda hall: hall.pass_time(SILENCE_S + 2.0 * TICK_S),
     # Its connection speaks for the page, and says nothing of what is held.
-    lambda hall: hall.pass_time(SILENCE_S + 2.0 * TICK_S, beats_of=1),
+    lambda hall: hall.pass_time(FRESH_S + 2.0 * TICK_S, beats_of=1),
     lambda hall: hall.pass_time(SILENCE_S + 2.0 * TICK_S, beats_of=1, page_answers=False),
     lambda hall: move(hall, left_s0=0.0), lambda hall: hall.lab.serve(1, True, {"op": "pose", "name": "neutral"})])
 def test_an_arm_rests_when_its_page_is_lost_or_moves_it_otherwise(hall, lose):
