@@ -11,7 +11,7 @@ from lab_web.tokens import TOKEN, VIEW_TOKEN
 from processes import isolation, ports, system_calls
 from rf_checks import hidden
 from rf_checks.handout import STUBBED, emptied_notebook, stub
-from world_picture.results import READY, cache_folder
+from world_picture.results import READY, cache_folder, ready_for
 
 #: Ports inside of a lab's separate network, as on any lab's machine.
 MASTER_PORT, PAGE_PORT = 11311, 8090
@@ -59,22 +59,14 @@ def prepared(place, options, tokens, listener, refused):
         return [*limits, *command], environment, (listener,)
     environment[isolation.WALLED] = "1"
     options_of_calls, descriptors = refused
+    ready, variables = ready_for(home)
+    environment.update(variables)
     binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
-             *_ready(environment), *isolation.caches(os.environ, place.folder / "caches"),
+             *ready, *isolation.caches(os.environ, place.folder / "caches"),
              *_without_solutions(os.environ, place.folder / "caches")]
     enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True, options_of_calls,
                               SCRATCH_BYTES)
     return [*enter, *limits, *command], environment, (listener, *descriptors)
-
-
-def _ready(environment):
-    """Set-up's prepared drawings, as binds; without them each lab simplifies the robot's meshes when it
-    starts, which takes ten seconds of a processor. Notes in the lab's environment where it is."""
-    folder = cache_folder("")
-    if not folder.is_dir():
-        return []
-    environment[READY] = environment["HOME"] + "/.cache/bullet_gazebo_ready"
-    return [(folder, environment[READY], False)]
 
 
 def _without_solutions(environment, folder):

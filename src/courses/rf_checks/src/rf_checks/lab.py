@@ -30,6 +30,7 @@ from rf_checks import hidden
 from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, changes_the_world
+from world_picture.results import ready_for
 
 #: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
@@ -264,7 +265,9 @@ class Lab:
 
     def _run(self, command, environment):
         if self._walls:
-            binds = isolation.caches(os.environ, self._folder / "caches")
+            ready, variables = ready_for(isolation.HOME)
+            environment = {**environment, **variables}
+            binds = [*ready, *isolation.caches(os.environ, self._folder / "caches")]
             command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
                                           hidden.SOLVED, not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:

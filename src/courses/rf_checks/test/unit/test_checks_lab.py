@@ -13,6 +13,7 @@ from lab_testing.waiting import wait_until
 from rf_checks.lab import Lab, LabFailed, TooSlow
 from rf_checks.recorder import Recorder
 from rf_checks.recorder_names import RECORDS, SOCKETS_VARIABLE
+from world_picture.results import READY
 
 
 @pytest.fixture
@@ -40,6 +41,19 @@ def test_a_node_that_is_done_ends_nothing(lab, line):
     (lab.folder / "output.txt").write_text(line + "\n")
     with pytest.raises(TooSlow, match="waiting for the robot"):
         lab._await(lambda: False, "the robot", time.monotonic() + 0.2)
+
+
+def test_a_lab_in_a_sandbox_sees_what_set_up_has_made_ready_for_pictures(tmp_path, monkeypatch):
+    started = []
+    monkeypatch.setattr(subprocess, "Popen", lambda command, env, **_: started.append((command, env)))
+    ready = tmp_path / "cache" / "bullet_gazebo"
+    ready.mkdir(parents=True)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(ready.parent))
+    lab = Lab("<robot/>", walls=True)
+    lab._folder = tmp_path
+    lab._run(["true"], {"A": "1"})
+    (command, environment), = started
+    assert environment == {"A": "1", READY: command[command.index(str(ready)) + 1]}
 
 
 def test_a_lab_ends_with_its_judge(tmp_path):

@@ -31,6 +31,13 @@ def existing(folder, name, cache):
     return None
 
 
+def ready_for(home):
+    """This user's results for a sandbox in which ``home`` is the home: (binds for ``isolation.command``, variables of the
+    environment there); without results none. They save it ten seconds of a processor for a robot's meshes."""
+    folder, place = cache_folder(""), os.path.join(home, ".cache", "bullet_gazebo_ready")
+    return ([(folder, place, False)], {READY: place}) if folder.is_dir() else ([], {})
+
+
 def open_to_all(path):
     """Let all users read a new file or folder, whatever the umask: it may be another user's :data:`READY`."""
     os.chmod(path, 0o755 if os.path.isdir(path) else 0o644)
