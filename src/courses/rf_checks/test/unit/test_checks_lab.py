@@ -45,7 +45,8 @@ def test_a_node_that_is_done_ends_nothing(lab, line):
 
 def test_a_lab_in_a_sandbox_sees_what_set_up_has_made_ready_for_pictures(tmp_path, monkeypatch):
     started = []
-    monkeypatch.setattr(subprocess, "Popen", lambda command, env, **_: started.append((command, env)))
+    monkeypatch.setattr("rf_checks.lab.subprocess", SimpleNamespace(
+        **{**vars(subprocess), "Popen": lambda command, env, **_: started.append((command, env))}))
     ready = tmp_path / "cache" / "bullet_gazebo"
     ready.mkdir(parents=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(ready.parent))

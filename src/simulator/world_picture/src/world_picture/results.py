@@ -32,8 +32,8 @@ def existing(folder, name, cache):
 
 
 def ready_for(home):
-    """This user's results for a sandbox in which ``home`` is the home: (binds for ``isolation.command``, variables of the
-    environment there); without results none. They save it ten seconds of a processor for a robot's meshes."""
+    """This user's results for a sandbox in which ``home`` is the home: (binds for ``isolation.command``, variables of
+    the environment there); without results none. They save ten seconds of a processor for a robot's meshes."""
     folder, place = cache_folder(""), os.path.join(home, ".cache", "bullet_gazebo_ready")
     return ([(folder, place, False)], {READY: place}) if folder.is_dir() else ([], {})
 
