@@ -84,7 +84,7 @@ class PlanQuery:
     attempts: int = 1
     velocity_scaling: float = 1.0
     acceleration_scaling: float = 1.0
-    timing: str = "time_optimal_trajectory_generation"
+    timing: str = "ruckig"
     start_bounds_error: float = 0.05
     jiggle: float = 0.02
     planner_id: str = ""
@@ -319,7 +319,7 @@ class _Planning:
         left = self.query.allowed_time - self._used()
         search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
                         clock=self.tools.clock, stop=self.tools.stop, constraints=self.query.path_constraints,
-                        planner=self.query.planner)
+                        planner=self.query.planner, improve=True)
         try:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:

@@ -193,6 +193,45 @@ def test_shorter_and_still_free(snake, exact):
     assert np.mean(gained) > 0.2
 
 
+def test_a_path_gets_shorter_while_there_is_time(snake, exact):
+    group, rng = snake.groups["arm"], np.random.default_rng(4)
+    first, better = [], []
+    for seed in range(10):
+        scene = clutter(snake, seed, 8)
+        start, goal = free_postures(exact, scene, group, rng, 2)
+        paths = [plan_path(scene, "arm", start, [goal], search(exact, improve=improve)) for improve in (False, True)]
+        first.append(paths[0].length)
+        better.append(paths[1].length)
+        assert np.array_equal(paths[1].points[0], start) and np.array_equal(paths[1].points[-1], paths[0].points[-1])
+        assert exact.first_blocked(scene, states_on(paths[1].points, 0.011), "arm") is None
+        again = plan_path(scene, "arm", start, [goal], search(exact, improve=True))
+        assert np.array_equal(again.points, paths[1].points)
+    assert all(after <= before + 1e-6 for before, after in zip(first, better, strict=True))
+    assert np.mean(better) < 0.985 * np.mean(first)
+
+
+def test_a_path_stays_as_it_was_found_without_time_to_improve_it_or_where_that_touches(snake, exact):
+    scene, group = clutter(snake, 3), snake.groups["arm"]
+    start, goal = apart(exact, scene, group)
+    found = plan_path(scene, "arm", start, [goal], search(exact))
+    ticks = itertools.count()
+    late = Search(exact, 1, PATIENCE_S, lambda: PATIENCE_S * 0.6 * (next(ticks) > 0), improve=True)
+    assert np.array_equal(plan_path(scene, "arm", start, [goal], late).points, found.points)
+    watched = Watched(exact)
+    plan_path(scene, "arm", start, [goal], search(watched))
+    refusing = RefusingLater(exact, len(watched.seen))
+    assert np.array_equal(plan_path(scene, "arm", start, [goal], search(refusing, improve=True)).points, found.points)
+
+
+def test_a_search_gives_up_after_its_samples(snake):
+    scene, inside, outside = shut_in(snake)
+    checker = SphereChecker(SphereModel.of(snake, None), snake.groups["arm"], scene)
+    run = Run(1, time.monotonic() + PATIENCE_S, time.monotonic, samples=3000)
+    with pytest.raises(NoPath, match="3000 samples") as caught:
+        rrt_connect(checker, snake.bounds, outside, [inside], run)
+    assert caught.value.spent and not caught.value.late
+
+
 # -- where spheres and exact geometry disagree ----------------------------------------------------------------------
 
 def slot(model, gap):
@@ -242,6 +281,20 @@ def test_a_path_that_exact_geometry_refuses_is_not_returned(snake, exact):
     assert np.allclose(plan_path(scene, "arm", start, [goal], search(twice)).points[-1], goal, atol=1e-6)
     with pytest.raises(NoPath):
         plan_path(scene, "arm", start, [goal], patient(Refusing(exact, (start, goal), 10**9), 1))
+
+
+class RefusingLater:
+    """An exact checker that refuses all that it is asked after so many postures."""
+
+    def __init__(self, exact, patience):
+        self.model, self.meshes, self._exact, self._patience = exact.model, exact.meshes, exact, patience
+
+    def free(self, scene, state, group):
+        return self._exact.free(scene, state, group)
+
+    def first_blocked(self, scene, postures, group):
+        self._patience -= len(postures)
+        return 0 if self._patience < 0 else self._exact.first_blocked(scene, postures, group)
 
 
 class Watched:
@@ -309,7 +362,7 @@ def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
     assert not checker.valid(crossed)[0] and all(alone.valid(crossed[part])[0] for part, alone in checker.parts)
     rng = np.random.default_rng(5)
     found = waited = 0
-    for seed in range(60):
+    for seed in range(150):
         start, goal = free_postures(exact, scene, group, rng, 2)
         if not checker.valid([start, goal]).all():
             continue
@@ -332,25 +385,30 @@ def test_both_arms_together_and_further_pairs_of_paths_take_turns(pair, monkeypa
     group = model.groups["both"]
     checker = SphereChecker(SphereModel.of(model, None), group, Scene(model))
     start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
-    passing, tried = parts._one_by_one, []
+    tried = []
 
-    def planned(useless_pairs, together):
-        def one_by_one(*arguments):
-            tried.append(arguments)
-            points, samples, seconds = passing(*arguments)
-            return None if len(tried) <= useless_pairs else points, samples, seconds
+    def planned(useless, together):
+        def but(passing):
+            def failing(*arguments):
+                tried.append(passing.__name__)
+                points, *more = passing(*arguments)
+                return None if len(tried) <= useless else points, *more
+            return failing
 
         tried.clear()
-        monkeypatch.setattr(parts, "_one_by_one", one_by_one)
-        monkeypatch.setattr(parts, "growing", together)
-        run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
-        return parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
+        with monkeypatch.context() as patched:
+            for passing in (parts._one_by_one, parts._in_turns):
+                patched.setattr(parts, passing.__name__, but(passing))
+            patched.setattr(parts, "growing", together)
+            return parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
 
-    def endless(searched, *arguments):
-        return itertools.repeat(None) if searched is checker else growing(searched, *arguments)
+    def endless(searched, within, *arguments):
+        return itertools.repeat(None) if within is bounds else growing(searched, within, *arguments)
 
+    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
     path = planned(20, endless)
-    assert len(tried) == 21 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
+    assert len(tried) >= 21 and set(tried[3:]) == {"_in_turns"}
+    assert np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
     path = planned(math.inf, growing)
     assert 3 <= len(tried) < 100 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
     # The same seed gives the same path.
@@ -376,6 +434,26 @@ def test_a_posture_aside_that_cannot_be_reached_costs_one_turn_only(pair, monkey
     run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
     path = parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
     assert asked and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
+
+
+def test_one_arm_makes_room_for_the_other_and_comes_back(pair):
+    """The arms change sides of each other: on their own ways they cannot pass."""
+    model, exact = pair
+    scene, group = Scene(model), model.groups["both"]
+    checker = SphereChecker(SphereModel.of(model, None), group, scene)
+    start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
+    found = 0
+    for seed in range(20):
+        run = Run(seed, time.monotonic() + PATIENCE_S, time.monotonic)
+        points, samples = parts._in_turns(checker, bounds, start, goal, run, 0.5, seed % 2)
+        if points is None:
+            continue
+        found += 1
+        assert samples <= 3 * parts._IN_A_TURN and np.allclose(points[[0, -1]], [start, goal], atol=1e-6)
+        assert exact.first_blocked(scene, states_on(points, 0.011), "both") is None
+        moves = np.abs(np.diff(points, axis=0)) > 1e-5
+        assert not (moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1)).any()
+    assert found >= 5
 
 
 def test_two_ways_at_once_begin_and_end_together_and_pieces_of_no_length_do_no_harm():
@@ -444,11 +522,14 @@ def test_warming_up_compiles_all_that_planning_needs(tmp_path):
     code = """
 import runpy, sys
 runpy.run_module("motion_planning", run_name="__main__")
+from motion_planning.exact import kernels as exact
 from motion_planning.planners import kernels as planning
 from motion_planning.spheres import kernel
-for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.free_edges):
+for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.free_edges, exact.unproven,
+                 exact.fill_poses):
     print(function.__name__, len(function.signatures))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "free_edges", "1"]
+    assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "free_edges", "1", "unproven", "1",
+                                   "fill_poses", "1"]

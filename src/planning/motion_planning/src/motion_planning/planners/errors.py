@@ -5,8 +5,8 @@ from motion_planning.errors import PlanningError
 
 class NoPath(PlanningError):
     """No path was found. The text gives the reason; ``late``: the time limit was reached, ``stopped``: the caller
-    stopped it."""
+    stopped it, ``spent``: a search gave up after its number of samples."""
 
-    def __init__(self, reason, late=False, stopped=False):
+    def __init__(self, reason, late=False, stopped=False, spent=False):
         super().__init__(reason)
-        self.late, self.stopped = late, stopped
+        self.late, self.stopped, self.spent = late, stopped, spent

@@ -131,25 +131,44 @@ def _point(path, lengths, along, out):
 
 
 @compiled
-def shortcut(tables, path, count, numbers, step, tries, misses):
-    """Shorten a path in place: straight lines between two random points of it, if they are free and save enough.
+def _length(path, i, o):
+    total = np.float32(0.0)
+    for j in range(path.shape[1]):
+        total += (path[i, j] - path[o, j]) ** 2
+    return np.sqrt(total)
+
+
+@compiled
+def _without_idle(path, count):
+    """Take points out that lie on the line between their neighbours. Returns the new count."""
+    kept = 1
+    for i in range(1, count - 1):
+        if _length(path, kept - 1, i) + _length(path, i, i + 1) - _length(path, kept - 1, i + 1) > np.float32(1e-6):
+            path[kept] = path[i]
+            kept += 1
+    path[kept] = path[count - 1]
+    return kept + 1
+
+
+@compiled
+def shortcut(tables, path, count, numbers, step, tries, misses, single):
+    """Shorten a path in place between two random points of it, if that is free and saves enough: all joints on a
+    straight line, or one random joint while the others stay on their way (Geraerts and Overmars 2007).
 
     path (room, k), of which the first ``count`` rows count; each success adds at most 2 rows. Ends after ``tries`` or
-    after ``misses`` in a row. Returns the new count.
+    after ``misses`` in a row. single: the share of tries with one joint. Returns the new count.
     """
     room, k = path.shape
     work = work_arrays(tables[0])
     a, b = np.empty(k, np.float32), np.empty(k, np.float32)
-    lengths = np.empty(room, np.float32)
+    lengths, piece = np.empty(room, np.float32), np.empty((room, k), np.float32)
+    saved = np.float32(1e-3) if single == 0.0 else np.float32(1e-4)  # of the whole length: one joint saves less
     missed = 0
     lengths[0] = np.float32(0.0)
     known = 1  # number of valid entries in lengths
     for _ in range(tries):
         for i in range(known, count):
-            total = np.float32(0.0)
-            for j in range(k):
-                total += (path[i, j] - path[i - 1, j]) ** 2
-            lengths[i] = lengths[i - 1] + np.sqrt(total)
+            lengths[i] = lengths[i - 1] + _length(path, i, i - 1)
         known = count
         whole = lengths[count - 1]
         first, second = random_unit(numbers) * whole, random_unit(numbers) * whole
@@ -159,27 +178,42 @@ def shortcut(tables, path, count, numbers, step, tries, misses):
         o = _point(path, lengths[:count], second, b)
         if i == o:
             continue
+        # Corners i + 1 ... o give way to the points of ``piece``.
+        piece[0] = a
+        size = 2
+        if single > 0.0 and random_unit(numbers) < single:
+            size = o - i + 2
+            joint = min(k - 1, int(random_unit(numbers) * np.float32(k)))
+            for c in range(1, size - 1):
+                piece[c] = path[i + c]
+                piece[c, joint] = a[joint] + (lengths[i + c] - first) / (second - first) * (b[joint] - a[joint])
+        piece[size - 1] = b
+        change = size - (o - i)
         direct = np.float32(0.0)
-        for j in range(k):
-            direct += (b[j] - a[j]) ** 2
-        if second - first - np.sqrt(direct) < np.float32(1e-3) * whole or count + 2 > room \
-                or not free_edge(tables, work, a, b, step):
+        for c in range(1, size):
+            direct += _length(piece, c - 1, c)
+        free = second - first - direct >= saved * whole and count + change <= room
+        for c in range(1, size):
+            free = free and free_edge(tables, work, piece[c - 1], piece[c], step)
+        if not free:
             missed += 1
             if missed >= misses:
                 break
             continue
         missed = 0
-        # Corners i + 1 ... o give way to two.
-        change = 2 - (o - i)
         if change > 0:
             for row in range(count - 1, o, -1):
                 path[row + change] = path[row]
         elif change < 0:
             for row in range(o + 1, count):
                 path[row + change] = path[row]
-        path[i + 1], path[i + 2] = a, b
+        for c in range(size):
+            path[i + 1 + c] = piece[c]
         count += change
         known = i + 1
+        if single > 0.0:
+            count = _without_idle(path, count)
+            known = 1
     return count
 
 

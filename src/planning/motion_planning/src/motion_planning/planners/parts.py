@@ -15,7 +15,7 @@ from motion_planning.planners import kernels
 from motion_planning.planners.trees import SAMPLES, Path, growing, shorten
 
 # Distance [rad] of postures on the path of one arm that are combined with those of the other.
-_SPACING = 0.15
+_SPACING = 0.3
 # Number of searches for a path through these postures that avoids steps found to be in collision.
 _TURNS = 4
 # Tries and misses of shortcuts, see ``shorten``: of the path of one arm, and afterwards of the path of both.
@@ -34,8 +34,11 @@ def two_parts(checker, bounds, start, goals, run, reach):
     nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
     together, samples, shortening = growing(checker, bounds, start, goals, run, reach), 0, 0.0
     for turn in itertools.count():
-        points, drawn, seconds = _one_by_one(checker, bounds, start, nearest, run._replace(seed=run.seed + turn), reach,
-                                             turn)
+        again, seconds = run._replace(seed=run.seed + turn), 0.0
+        if turn < _PAIRS:
+            points, drawn, seconds = _one_by_one(checker, bounds, start, nearest, again, reach)
+        else:
+            points, drawn = _in_turns(checker, bounds, start, nearest, again, reach, turn % 2)
         samples, shortening = samples + drawn, shortening + seconds
         if points is not None:
             return Path(points, samples, {"shorten": shortening})
@@ -46,34 +49,41 @@ def two_parts(checker, bounds, start, goals, run, reach):
                 return found._replace(samples=samples + found.samples)
 
 
-def _one_by_one(checker, bounds, start, goal, run, reach, turn):
+def _one_by_one(checker, bounds, start, goal, run, reach):
     """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
-    the parts cannot pass each other on these.
-
-    After _PAIRS turns, one of the parts moves to a random posture on its way, where it may be aside of the other. That
-    posture may be out of its reach, so this search is bounded; points are None, too, where it ends.
-    """
+    the parts cannot pass each other on these."""
     samples, shortening, ways = 0, 0.0, []
-    for number, (indices, alone) in enumerate(checker.parts):
-        ends, within, most = [start[indices], goal[indices]], bounds[indices], None
-        if turn >= _PAIRS and turn % 2 == number:
-            ends.insert(1, _aside(alone, within, run))
-            most = _IN_A_TURN // SAMPLES
-        way = [ends[:1]]
-        for begin, end in itertools.pairwise(ends):
-            searched = itertools.islice(growing(alone, within, begin, end, run, reach), most)
-            found = next((path for path in searched if path is not None), None)
-            if found is None:
-                return None, samples + _IN_A_TURN, shortening
-            samples += found.samples
-            since = run.clock()
-            way.append(shorten(found, alone, run, *_ALONE).points[1:])
-            shortening += run.clock() - since
-        ways.append(np.concatenate(way))
+    for indices, alone in checker.parts:
+        found = next(path for path in growing(alone, bounds[indices], start[indices], goal[indices], run, reach)
+                     if path is not None)
+        samples += found.samples
+        since = run.clock()
+        ways.append(shorten(found, alone, run, *_ALONE).points)
+        shortening += run.clock() - since
     points = _at_once(checker.parts, ways)
     if not checker.between_parts.edges(points).all():
         points = _past_each_other(checker, ways)
     return points, samples, shortening
+
+
+def _in_turns(checker, bounds, start, goal, run, reach, yielding):
+    """(points (m, k), samples): a part moves to a random posture, then the other part to its goal, then the first part.
+    The searches are bounded, since the posture may be out of reach; points are None where one of them ends."""
+    indices, alone = checker.parts[yielding]
+    aside, arrived = start.copy(), goal.copy()
+    aside[indices] = arrived[indices] = _aside(alone, bounds[indices], run)
+    samples, ways = 0, [start[None]]
+    for moving, (begin, end) in zip((indices, np.setdiff1d(np.arange(len(start)), indices), indices),
+                                    itertools.pairwise([start, aside, arrived, goal]), strict=True):
+        within = np.column_stack([begin, begin])
+        within[moving] = bounds[moving]
+        searched = itertools.islice(growing(checker, within, begin, end, run, reach), _IN_A_TURN // SAMPLES)
+        found = next((path for path in searched if path is not None), None)
+        samples += _IN_A_TURN if found is None else found.samples
+        if found is None:
+            return None, samples
+        ways.append(found.points[1:])
+    return np.concatenate(ways), samples
 
 
 def _aside(alone, bounds, run):
@@ -99,10 +109,7 @@ def _at_once(parts, ways):
 def _past_each_other(checker, ways):
     """The points (m, k) of the two parts moving along their paths; one waits or moves back for the other if needed.
     None if that does not help."""
-    (one, _), (other, _) = checker.parts
-    first, second = map(_dense, ways)
-    grid = np.empty((len(first), len(second), len(one) + len(other)))
-    grid[:, :, one], grid[:, :, other] = first[:, None], second
+    grid = _grid(checker.parts, *map(_dense, ways))
     free = checker.between_parts.valid(grid.reshape(-1, grid.shape[2])).reshape(grid.shape[:2])
     # The caller has checked that both ends are free.
     free[0, 0] = free[-1, -1] = True
@@ -119,6 +126,14 @@ def _past_each_other(checker, ways):
             (i, j), (di, dj) = cells[k], cells[k + 1] - cells[k]
             closed[i, j, 3 * di + dj + 4] = closed[i + di, j + dj, 4 - 3 * di - dj] = True
     return None
+
+
+def _grid(parts, first, second):
+    """(a, b, k): each posture ``first`` (a, i) of one part with each ``second`` (b, j) of the other."""
+    (one, _), (other, _) = parts
+    grid = np.empty((len(first), len(second), len(one) + len(other)), dtype=np.float32)
+    grid[:, :, one], grid[:, :, other] = first[:, None], second
+    return grid
 
 
 def _dense(way):

@@ -12,7 +12,7 @@ import numpy as np
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.parts import TOGETHER, two_parts
-from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
+from motion_planning.planners.trees import REACH, Path, Run, improve, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 from motion_planning.scene import Scene
 from motion_planning.spheres import Patience, SphereChecker, SphereModel, make_links
@@ -23,6 +23,8 @@ _SHARE_OF_SPHERES = 0.7
 # s for requests without a limit. The preparation ends after all of the time, or this time [s] if that is longer, since
 # scenes of thousands of objects must be planned for on slow machines too; the search has at least this share.
 _SHARE_OF_TABLES, _TABLES_S, LEAST_FOR_SCENE_S, SHARE_OF_SEARCH = 0.4, 5.0, 20.0, 0.3
+# The share of the time within which a path may be made shorter.
+_SHARE_TO_IMPROVE = 0.5
 # After exact geometry has refused a path, the search is repeated with states on its edges closer by this factor each
 # time.
 _FINER = 0.5
@@ -30,6 +32,11 @@ _FINEST = 1.0 / 512.0
 # Size of a step out of a contact of spheres [rad], and number of steps that are checked together.
 _STEPS_OUT = (0.03, 0.4)
 _CANDIDATES = 48
+# Number of ways out of which the one with the most room at its end counts.
+_WAYS_OUT = 8
+_HOPS, _ROOM = 5, 16
+# Number of samples after which other ways out are tried; each time half as many more.
+_SAMPLES = 2000
 # Edges that are checked by exact geometry alone are shorter: most of them fail.
 _EXACT_REACH = 0.25
 # Exact geometry checks one in this many states of a path even if spheres prove them free; number of states per call.
@@ -43,7 +50,8 @@ class Search(NamedTuple):
     """Options of a search. exact: ExactChecker. seed: the same one gives the same path if the time suffices.
     allowed_time [s] on ``clock``, a function that returns seconds. stop: called every few ms; true ends the search.
     constraints: ConstraintSet for every state on the path, or None. planner: a function like ``rrt_connect`` that
-    searches with spheres (``names.planner_of``); with constraints, another one is used."""
+    searches with spheres (``names.planner_of``); with constraints, another one is used. improve: whether to make the
+    first path that is found shorter for some 20 ms, if the time allows it."""
 
     exact: Any
     seed: int
@@ -52,6 +60,7 @@ class Search(NamedTuple):
     stop: Callable[[], bool] = lambda: False
     constraints: Any = None
     planner: Callable = rrt_connect
+    improve: bool = False
 
 
 def sphere_model_of(exact):
@@ -108,7 +117,8 @@ def prepare(exact):
 def plan_path(scene, group, start, goals, search):
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
 
-    Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten" and "exact".
+    Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten", "exact" and
+    "improve".
 
     It is found and shortened with spheres that contain the robot. Then ``search.exact`` checks states between those of
     the search, at the same distance: each corner, every eighth, and all states that spheres do not prove free. If the
@@ -191,19 +201,21 @@ class _Planning:
 
     def _by_spheres(self, start, goals):
         run = self._run(_SHARE_OF_SPHERES)
-        outwards = self._way_out(start, run)
-        inwards = []
-        for last, goal in enumerate(goals, 1 - len(goals)):
-            try:
-                inwards.append(self._way_out(goal, run)[::-1])
-            except NoPath as error:
-                if error.stopped or last == 0 and not inwards:
-                    raise
-        entries = np.array([way[0] for way in inwards])
-        checker, seed = self.checker, self.search.seed
-        self._note("way out")
+        outwards, inwards = self._ways(start, goals, run)
+        checker, seed, samples = self.checker, self.search.seed, _SAMPLES
         while True:
-            found = self._found(checker, outwards[-1], entries, run._replace(seed=seed))
+            entries = np.array([way[0] for way in inwards])
+            try:
+                # Where ends lead out of narrow places, other ways out may be much better.
+                most = samples if len(outwards) + sum(map(len, inwards)) > 1 + len(inwards) else math.inf
+                found = self._found(checker, outwards[-1], entries, run._replace(seed=seed, samples=most))
+            except NoPath as error:
+                if not error.spent:
+                    raise
+                self._note("search")
+                outwards, inwards = self._ways(start, goals, run)
+                samples, seed = 1.5 * samples, seed + 1
+                continue
             self._note("search")
             within = found.times.get("shorten")
             short = shorten(found, checker, run._replace(seed=seed), *(() if within is None else TOGETHER))
@@ -212,14 +224,42 @@ class _Planning:
             self.times["shorten"] += within
             self.times["search"] -= within
             inward = inwards[int(np.abs(entries - short.points[-1]).max(axis=1).argmin())]
-            path = short._replace(points=np.concatenate([outwards[:-1], short.points, inward[1:]]))
-            path.points[0], path.points[-1] = start, inward[-1]
+            path = _between_ways(outwards, short, inward)
             free = self._path_is_free(path.points, run)
             self._note("exact")
             if free:
-                return path
+                return self._improved(path, short, (checker, run._replace(seed=seed)), (outwards, inward))
             run.check("a path was looked for that exact geometry agrees with")
             checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
+
+    def _improved(self, path, short, how, ways):
+        """``path``, or a shorter one if there is time: ``short`` improved, between two ``ways``. how: checker, Run."""
+        checker, run = how
+        run = run._replace(deadline=self.begin + _SHARE_TO_IMPROVE * self.search.allowed_time)
+        if not self.search.improve or not self._left(_SHARE_TO_IMPROVE):
+            return path
+        better = _between_ways(ways[0], improve(short, checker, run), ways[1])
+        try:
+            return better if self._path_is_free(better.points, run) else path
+        except NoPath as error:
+            if error.stopped:
+                raise
+            return path
+        finally:
+            self._note("improve")
+
+    def _ways(self, start, goals, run):
+        """(way from the start to where spheres are free, ways from there to the goals); goals without one are left
+        out."""
+        outwards, inwards = self._way_out(start, run), []
+        for last, goal in enumerate(goals, 1 - len(goals)):
+            try:
+                inwards.append(self._way_out(goal, run)[::-1])
+            except NoPath as error:
+                if error.stopped or last == 0 and not inwards:
+                    raise
+        self._note("way out")
+        return outwards, inwards
 
     def _found(self, checker, start, goals, run):
         """A Path by spheres to one of ``goals``."""
@@ -228,25 +268,46 @@ class _Planning:
         return self.search.planner(checker, self.bounds, start, goals, run)
 
     def _way_out(self, q, run):
-        """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres."""
+        """Points (m, k) from ``q``, free by exact geometry, to one that is free by spheres and has room around it."""
         if self.checker.valid(q)[0]:
             return np.array([q])
         nodes, parents = [q], [-1]
         while True:
             run.check("a way was looked for out of where the robot nearly touches something")
             parent = int(self.random.integers(len(nodes)))
-            away = self.random.normal(size=(_CANDIDATES, len(q)))
-            away *= self.random.uniform(*_STEPS_OUT, (_CANDIDATES, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
-            some = np.clip(nodes[parent] + away, self.bounds[:, 0], self.bounds[:, 1])
+            some = self._around(nodes[parent])
             free = self.checker.valid(some)
-            # The shortest step that leads out, else one that leads further.
+            # The shortest steps that lead out, else one that leads further.
             order = np.argsort(np.linalg.norm(some - nodes[parent], axis=1))
-            for number in [*[k for k in order if free[k]][:8], *[k for k in order if not free[k]][:1]]:
-                if self._edge_is_free(nodes[parent], some[number]):
-                    nodes.append(some[number])
+            outside = [some[k] for k in order if free[k]]
+            ways = [one for one in outside[:_WAYS_OUT] if self._edge_is_free(nodes[parent], one)]
+            if ways:
+                return np.concatenate([self._traced(nodes, parents, parent)[::-1], self._to_room(ways)])
+            for one in some[order][~free[order]][:1]:
+                if self._edge_is_free(nodes[parent], one):
+                    nodes.append(one)
                     parents.append(parent)
-                    if free[number]:
-                        return self._traced(nodes, parents, len(nodes) - 1)[::-1]
+
+    def _to_room(self, ways):
+        """Points (m, k) from one of the postures ``ways``, free by spheres, to one that has more room around it."""
+        found, best = [], -1
+        for _ in range(_HOPS):
+            room = [int(self.checker.valid(self._around(one)).sum()) for one in ways]
+            if max(room, default=-1) <= best:
+                break
+            best = max(room)
+            found.append(ways[room.index(best)])
+            if best >= _ROOM:
+                break
+            some = self._around(found[-1])
+            ways = [one for one in some[self.checker.valid(some)][:_WAYS_OUT] if self.checker.edge(found[-1], one)]
+        return np.array(found)
+
+    def _around(self, q):
+        """Random postures (_CANDIDATES, k) at different distances from ``q``."""
+        away = self.random.normal(size=(_CANDIDATES, len(q)))
+        away *= self.random.uniform(*_STEPS_OUT, (_CANDIDATES, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
+        return np.clip(q + away, self.bounds[:, 0], self.bounds[:, 1])
 
     def _by_exact(self, start, goals):
         """RRT-Connect with exact geometry only: slow, for gaps that are too narrow for spheres."""
@@ -345,6 +406,11 @@ class _Planning:
 
     def _left(self, share):
         return self.search.clock() < self.begin + share * self.search.allowed_time
+
+
+def _between_ways(outwards, path, inward):
+    """The Path, which begins where the points ``outwards`` end, with these and those ``inward`` from its end."""
+    return path._replace(points=np.concatenate([outwards, path.points[1:-1], inward]))
 
 
 def _between_checked(points, resolution):

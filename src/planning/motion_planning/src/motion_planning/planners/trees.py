@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RRT-Connect (Kuffner and LaValle 2000) and shortcuts, on a SphereChecker."""
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
@@ -17,6 +18,9 @@ _LEAST_ROOM, _MOST_ROOM = 4096, 1 << 20
 _ALL = (1 << 64) - 1
 # Shortcuts: total tries, failed tries in a row.
 _TRIES, _MISSES = 200, 30
+#: Number of tries to make a path shorter that is good enough already; how many between two looks at the clock, and the
+#: share of those that change one joint.
+IMPROVING, _AT_ONCE, _SINGLE = 2000, 250, 0.5
 
 
 class Path(NamedTuple):
@@ -36,12 +40,13 @@ class Path(NamedTuple):
 
 class Run(NamedTuple):
     """seed: the same one gives the same path. deadline: on ``clock``, a function that returns seconds. stop: a function
-    called every few ms; true ends the search."""
+    called every few ms; true ends the search. samples: the number of them after which a search gives up."""
 
     seed: int
     deadline: float
     clock: Callable[[], float]
     stop: Callable[[], bool] = lambda: False
+    samples: float = math.inf
 
     def check(self, what):
         """Raise NoPath if the deadline has passed or the caller stops the search."""
@@ -77,6 +82,8 @@ def growing(checker, bounds, start, goals, run, reach=REACH):
             return
         run.check("a path was looked for: %d samples were drawn, the trees from start and goal have %d and %d postures"
                   % (trees[2][6], trees[2][0], trees[2][1]))
+        if trees[2][6] >= run.samples:
+            raise NoPath("no path was found with %d samples" % trees[2][6], spent=True)
         if result == kernels.FULL:
             trees = _roomier(trees)
         yield None
@@ -85,11 +92,28 @@ def growing(checker, bounds, start, goals, run, reach=REACH):
 def shorten(path, checker, run, tries=_TRIES, misses=_MISSES):
     """Return the Path without detours for which ``checker`` finds a straight line; it is never longer than before. Ends
     after so many ``tries``, or so many ``misses`` in a row."""
+    return _shorter(path, checker, _numbers(run.seed), (tries, misses, 0.0))
+
+
+def improve(path, checker, run):
+    """Return the Path after ``IMPROVING`` tries to make it shorter, some 20 ms for both arms of Baxter, or fewer if the
+    deadline has passed. Raises NoPath if it is stopped."""
+    numbers = _numbers(run.seed)
+    for _ in range(0, IMPROVING, _AT_ONCE):
+        if run.stop():
+            raise NoPath("stopped while a path was made shorter", stopped=True)
+        if run.clock() >= run.deadline:
+            break
+        path = _shorter(path, checker, numbers, (_AT_ONCE, _AT_ONCE, _SINGLE))
+    return path
+
+
+def _shorter(path, checker, numbers, how):
+    """how: tries, misses, share of a single joint, see ``kernels.shortcut``."""
     count = len(path.points)
-    points = np.empty((count + 2 * tries + 2, path.points.shape[1]), np.float32)
+    points = np.empty((count + 2 * how[0] + 2, path.points.shape[1]), np.float32)
     points[:count] = path.points
-    count = kernels.shortcut(checker.tables, points, count, _numbers(run.seed), np.float32(checker.resolution), tries,
-                             misses)
+    count = kernels.shortcut(checker.tables, points, count, numbers, np.float32(checker.resolution), *how)
     return path._replace(points=points[:count].astype(float))
 
 

@@ -40,5 +40,5 @@ def warm_up():
     arm, level = model.groups["arm"], ConstraintSet(orientations=[OrientationTarget("arm", np.eye(3))])
     Manifold(Scene(model), arm, level, ends[0]).project(ends[0])
     exact = ExactChecker(model, None)
-    exact.free(Scene(model))
+    exact.first_blocked(Scene(model), [[0.0], [1.6]])
     exact.distance(Scene(model))
