@@ -23,8 +23,9 @@ DEFAULT_CAPABILITIES = (
 OTHER_CAPABILITIES = ("move_group/MoveGroupExecuteService", "move_group/TfPublisher",
                       "pilz_industrial_motion_planner/MoveGroupSequenceAction",
                       "pilz_industrial_motion_planner/MoveGroupSequenceService")
-# Adapters that select the time parameterization; the last one in the list counts.
-_TIMINGS = {"AddTimeParameterization": "time_optimal_trajectory_generation",
+# Adapters that select the time parameterization; the first one in the list counts: it is the outermost, which gets the
+# answers of the others. Without one, and with that of MoveIt's old configurations, jerk is limited.
+_TIMINGS = {"AddTimeParameterization": "ruckig",
             "AddTimeOptimalParameterization": "time_optimal_trajectory_generation",
             "AddIterativeSplineParameterization": "iterative_spline_parameterization",
             "AddRuckigTrajectorySmoothing": "ruckig"}
@@ -42,7 +43,7 @@ class Pipeline:
     name: str
     planners: dict = field(default_factory=dict)
     groups: dict = field(default_factory=dict)
-    timing: str = "time_optimal_trajectory_generation"
+    timing: str = "ruckig"
     start_bounds_error: float = 0.05
     jiggle: float = 0.02
     industrial: bool = False
@@ -98,7 +99,7 @@ def _pipeline(name, tree, groups):
     pipeline.planners = {key: {k: str(v) for k, v in (value or {}).items()} for key, value in configs.items()} \
         if isinstance(configs, dict) else {}
     pipeline.groups = {group: tree[group] for group in groups if isinstance(tree.get(group), dict)}
-    for adapter in str(tree.get("request_adapters", "")).split():
+    for adapter in reversed(str(tree.get("request_adapters", "")).split()):
         pipeline.timing = _TIMINGS.get(adapter.rpartition("/")[2], pipeline.timing)
     pipeline.start_bounds_error = _number(tree.get("start_state_max_bounds_error"), pipeline.start_bounds_error)
     pipeline.jiggle = _number(tree.get("jiggle_fraction"), pipeline.jiggle)

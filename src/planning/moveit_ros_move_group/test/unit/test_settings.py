@@ -63,3 +63,18 @@ def test_a_default_pipeline_that_is_not_built_in_gives_way_to_ompl(monkeypatch):
     assert set(found) == {"pilz", "z"} and usual == "z"
     assert any("CHOMPPlanner is not built in" in text for text in complaints)
     assert any("there is no pipeline 'chomp'" in text and "'z' is taken" in text for text in complaints)
+
+
+@pytest.mark.parametrize("adapters, timing", [
+    ("", "ruckig"), ("AddTimeParameterization ResolveConstraintFrames", "ruckig"),
+    ("AddTimeOptimalParameterization", "time_optimal_trajectory_generation"),
+    # The first is the outermost: it times what the second has timed.
+    ("AddRuckigTrajectorySmoothing AddTimeOptimalParameterization", "ruckig"),
+    ("AddIterativeSplineParameterization", "iterative_spline_parameterization")])
+def test_the_outermost_adapter_times_a_motion_and_jerk_is_limited_unless_told(monkeypatch, adapters, timing):
+    names = " ".join("default_planner_request_adapters/" + name for name in adapters.split())
+    tree = {"~planning_pipelines": {"ompl": {"planning_plugin": "ompl_interface/OMPLPlanner",
+                                             "request_adapters": names}}}
+    monkeypatch.setattr(settings.rospy, "get_param", lambda name, usual=None: tree.get(name, usual))
+    found, _, _ = settings.pipelines([])
+    assert found["ompl"].timing == timing
