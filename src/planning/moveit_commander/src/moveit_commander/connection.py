@@ -5,6 +5,7 @@ import time
 from functools import cache
 
 import actionlib
+import rospkg
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from moveit_msgs import msg, srv
@@ -26,6 +27,13 @@ TOPICS = {"attached_collision_object": msg.AttachedCollisionObject, "collision_o
 #: Time limit for a service that move_group has not advertised yet [s].
 SERVICE_WAIT_S = 5.0
 _POLL_S = 0.05
+
+
+def how_to_start() -> str:
+    """The sentence that says what starts move_group, with the configurations that are installed."""
+    found = sorted(name for name in rospkg.RosPack().list() if name.endswith("_moveit_config"))
+    return "Start it with its robot's configuration: roslaunch %s move_group.launch; without a robot, its demo" % (
+        " or ".join(found) or "ROBOT_moveit_config")
 
 
 class Connection:
@@ -50,7 +58,7 @@ class Connection:
             while not client.wait_for_server(rospy.Duration(0, -1)):
                 if rospy.is_shutdown() or time.monotonic() > deadline:
                     raise RuntimeError("Unable to connect to move_group action server '%s' within allotted time (%gs); "
-                                       "is move_group running?" % (self.name(name), seconds))
+                                       "is move_group running? %s" % (self.name(name), seconds, how_to_start()))
                 time.sleep(_POLL_S)
 
     def start(self, name, goal):

@@ -8,6 +8,7 @@ import yaml
 
 from motion_planning.model import PlanningModel
 
+from .connection import how_to_start
 from .node import ensure_node
 
 
@@ -47,7 +48,8 @@ def load(robot_description, namespace):
     missing = [name + suffix for suffix, text in (("", urdf), ("_semantic", srdf)) if not text]
     if missing:
         raise RuntimeError("Unable to construct robot model. Please make sure all needed information is on the "
-                           "parameter server: there is no %s" % " and no ".join(missing))
+                           "parameter server: there is no %s. move_group brings them. %s"
+                           % (" and no ".join(missing), how_to_start()))
     planning = rospy.get_param(name + "_planning", None) or {}
     try:
         model = _model(urdf, srdf, yaml.safe_dump(planning.get("joint_limits") or {}))

@@ -4,7 +4,7 @@ import pytest
 import rospy
 
 import moveit_commander
-from moveit_commander import description
+from moveit_commander import connection, description
 
 URDF = """<robot name="one"><link name="base"/><link name="tool"/>
   <joint name="turn" type="revolute"><parent link="base"/><child link="tool"/><axis xyz="0 0 1"/>
@@ -42,7 +42,7 @@ def test_a_description_in_the_namespace_of_move_group(parameters):
 
 
 def test_what_is_missing_is_named(parameters):
-    with pytest.raises(RuntimeError, match="no /robot_description and no /robot_description_semantic"):
+    with pytest.raises(RuntimeError, match="no /robot_description and no /robot_description_semantic.*roslaunch"):
         description.load("robot_description", "")
     parameters.update({"/robot_description": URDF})
     with pytest.raises(RuntimeError, match="there is no /robot_description_semantic"):
@@ -50,6 +50,14 @@ def test_what_is_missing_is_named(parameters):
     parameters.update({"/robot_description_semantic": "<robot"})
     with pytest.raises(RuntimeError, match="Unable to construct robot model from /robot_description: "):
         description.load("robot_description", "")
+
+
+def test_what_to_start_is_said(monkeypatch):
+    for packages, said in ((["arm_moveit_config", "arm_gazebo", "leg_moveit_config"],
+                            "roslaunch arm_moveit_config or leg_moveit_config move_group.launch"),
+                           ([], "roslaunch ROBOT_moveit_config move_group.launch")):
+        monkeypatch.setattr(connection.rospkg.RosPack, "list", lambda self, packages=packages: packages)
+        assert said in connection.how_to_start()
 
 
 def test_names_that_programs_rely_on():
