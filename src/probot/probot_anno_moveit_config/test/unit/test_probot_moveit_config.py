@@ -183,10 +183,21 @@ def test_fake_arms_move_as_asked_for(arguments):
     ("move_group.launch", "gazebo debug info allow_trajectory_execution fake_execution max_safe_path_cost capabilities "
                           "jiggle_fraction publish_monitored_planning_scene disable_capabilities"),
     ("planning_context.launch", "load_robot_description robot_description"),
+    ("trajectory_execution.launch.xml", "moveit_controller_manager moveit_manage_controllers gazebo"),
+    ("probot_anno_moveit_controller_manager.launch.xml", "gazebo moveit_controller_manager"),
+    ("fake_moveit_controller_manager.launch.xml", "gazebo"), ("planning_pipeline.launch.xml", "pipeline"),
+    ("ompl_planning_pipeline.launch.xml", ""), ("chomp_planning_pipeline.launch.xml", ""),
     ("moveit_rviz.launch", "debug config"), ("demo.launch", "db db_path debug use_gui")])
 def test_every_argument_of_the_originals_is_there(name, arguments):
     there = {argument.get("name") for argument in etree.parse(str(PACKAGE / "launch" / name)).iterfind("/arg")}
     assert set(arguments.split()) <= there
+
+
+def test_who_asks_for_chomp_gets_ompl_beside_it():
+    values = {name: param.value for name, param in load("move_group.launch", "pipeline:=chomp").params.items()}
+    assert values["/move_group/default_planning_pipeline"] == "chomp"
+    assert values["/move_group/planning_pipelines/chomp/planning_plugin"] == "chomp_interface/CHOMPPlanner"
+    assert values["/move_group/planning_pipelines/ompl/planning_plugin"] == "ompl_interface/OMPLPlanner"
 
 
 def run(executable, *arguments, **environment):
