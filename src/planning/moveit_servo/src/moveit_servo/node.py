@@ -250,7 +250,7 @@ class ServoNode:
         self._sent |= bool(kind)
         if self._sent and (not settings.num_outgoing_halt_msgs_to_publish
                            or self._halts <= settings.num_outgoing_halt_msgs_to_publish):
-            self._out.publish(message_of(step, q[self._indices], servo.joints, settings, seconds))
+            self._out.publish(message_of(step, q[self._indices], servo.joints, settings, seconds, now))
 
     def _command(self, kind: str, value: Any, frame: str, q: np.ndarray, settings: ServoSettings) -> Command:
         if not kind:

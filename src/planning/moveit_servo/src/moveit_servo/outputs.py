@@ -32,10 +32,12 @@ def message_type(name: str) -> type:
 
 
 def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings, seconds: float = 0.0,
-               ) -> Any:
+               now: float = 0.0) -> Any:
     """Return the message of ``settings.command_out_type`` for a Step; measured (k,): where the joints are; seconds: how
-    long the step is. A trajectory takes that time, or a period: a step that came late is a long one, and its way in
-    one period would be faster than the servo allows."""
+    long the step is; now: when it was made. A trajectory takes that time, or a period: a step that came late is a long
+    one, and its way in one period would be faster than the servo allows. With a command_lead it is due at a time:
+    otherwise one that comes late, or together with the next, is hurried by what it is late.
+    """
     positions, accelerations = step.position.tolist(), step.acceleration.tolist()
     velocities = step.velocity
     if not settings.publish_joint_positions and not step.rests:
@@ -50,8 +52,11 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
         return kind(mode=kind.RAW_POSITION_MODE if by_position else kind.VELOCITY_MODE, names=list(joints),
                     command=positions if by_position else velocities)
     trajectory = JointTrajectory(joint_names=list(joints))
-    trajectory.header.frame_id = settings.planning_frame  # a stamp of 0: now
-    first = max(seconds, settings.publish_period)
+    trajectory.header.frame_id = settings.planning_frame
+    if settings.command_lead > 0.0:
+        trajectory.header.stamp, first = rospy.Time.from_sec(now), settings.command_lead
+    else:
+        first = max(seconds, settings.publish_period)  # from when it comes: the stamp is 0
     for number in range(_POINTS_FOR_GAZEBO if settings.use_gazebo else 1):
         trajectory.points.append(JointTrajectoryPoint(
             positions=positions if settings.publish_joint_positions else [],

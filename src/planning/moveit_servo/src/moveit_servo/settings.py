@@ -28,8 +28,9 @@ class ServoSettings:
     examples. Lengths in m, angles in rad, times in s, rates in Hz. Of the names, an empty one is chosen by the robot.
 
     Ours: max_acceleration, a number or {joint: number} [rad/s^2], None: what the velocity limits need to stop;
-    stopping_time; target_pose_timeout: how long a pose is pursued, 0: until it is reached; the PID gains of pose
-    tracking, which in MoveIt are in a file for themselves.
+    stopping_time; command_lead: how long after its step a trajectory's point is due, by the time in its header, 0: a
+    period after it has come, as MoveIt's; target_pose_timeout: how long a pose is pursued, 0: until it is reached; the
+    PID gains of pose tracking, which in MoveIt are in a file for themselves.
     """
 
     move_group_name: str = ""
@@ -80,6 +81,7 @@ class ServoSettings:
     angular_derivative_gain: float = 0.0
     target_pose_timeout: float = 0.5
     stopping_time: float = 0.1
+    command_lead: float = 0.0
     max_acceleration: Any = None
     unknown: tuple[str, ...] = field(default=())
 
@@ -119,7 +121,7 @@ class ServoSettings:
         wrong += ["%s is %g; expected 0 or more" % (name, getattr(self, name)) for name in (
             "num_outgoing_halt_msgs_to_publish", "lower_singularity_threshold", "hard_stop_singularity_threshold",
             "joint_limit_margin", "low_pass_filter_coeff", "self_collision_proximity_threshold",
-            "incoming_command_timeout", "scene_collision_proximity_threshold", "target_pose_timeout",
+            "incoming_command_timeout", "scene_collision_proximity_threshold", "target_pose_timeout", "command_lead",
             "min_allowable_collision_distance")
             if getattr(self, name) < 0]
         if self.hard_stop_singularity_threshold < self.lower_singularity_threshold:
