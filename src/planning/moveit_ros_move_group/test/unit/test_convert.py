@@ -303,7 +303,7 @@ def test_states_are_laid_over(scene):
     assert not READER.with_robot_state(full(scene), message, errors).state.attached
     message.joint_state.position = [0.7]
     READER.with_robot_state(scene, message, errors)
-    assert "2 joint names but 1 positions" in errors[0]
+    assert "2 joint names but 1 position" in errors[0]
     message.joint_state.position = [float("inf"), 0.0]
     READER.with_robot_state(scene, message, errors)
     assert "joint 'reach' is not finite" in errors[1]
