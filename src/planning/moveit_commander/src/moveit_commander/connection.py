@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The connection to a running move_group: its actions, services and topics."""
+import socket
 import threading
 import time
+import urllib.parse
 from functools import cache
 
 import actionlib
+import rosgraph
 import rospkg
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -27,6 +30,9 @@ TOPICS = {"attached_collision_object": msg.AttachedCollisionObject, "collision_o
 #: Time limit for a service that move_group has not advertised yet [s].
 SERVICE_WAIT_S = 5.0
 _POLL_S = 0.05
+#: Time limit for a move_group that has started, but does not serve yet [s]: at its first start with a robot it makes
+#: what planning needs to know of the robot's shape.
+START_WAIT_S = 120.0
 
 
 def how_to_start() -> str:
@@ -50,16 +56,33 @@ class Connection:
         return rospy.resolve_name("/".join(filter(None, [self._namespace, name])))
 
     def wait_for_actions(self, names, seconds):
-        """Wait until the action servers answer. Raises RuntimeError after the time limit, in seconds of real time."""
-        deadline = time.monotonic() + seconds
+        """Wait until the action servers answer, in seconds of real time; longer, up to START_WAIT_S, while move_group
+        is starting. Raises RuntimeError after the time limit."""
+        begin = time.monotonic()
+        deadline, told = begin + seconds, False
         for name in names:
             client = self._client(name)
             # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
             while not client.wait_for_server(rospy.Duration(0, -1)):
-                if rospy.is_shutdown() or time.monotonic() > deadline:
+                now = time.monotonic()
+                starting = name == "move_group" and deadline < now < begin + START_WAIT_S
+                if starting and not rospy.is_shutdown() and self._is_starting():
+                    if not told:
+                        rospy.logwarn("move_group is starting, which takes longer the first time with a robot; waiting")
+                    told, deadline = True, now + 1.0
+                if rospy.is_shutdown() or now > deadline:
                     raise RuntimeError("Unable to connect to move_group action server '%s' within allotted time (%gs); "
                                        "is move_group running? %s" % (self.name(name), seconds, how_to_start()))
                 time.sleep(_POLL_S)
+
+    def _is_starting(self) -> bool:
+        """Whether move_group's node is there, served or not."""
+        try:
+            uri = urllib.parse.urlsplit(rosgraph.Master(rospy.get_name()).lookupNode(self.name("move_group")))
+            socket.create_connection((uri.hostname, uri.port), timeout=1.0).close()
+        except (rosgraph.MasterException, OSError):  # the master knows no such node, or one that has ended
+            return False
+        return True
 
     def start(self, name, goal):
         """Send a goal and return at once; :meth:`cancel` ends it."""
