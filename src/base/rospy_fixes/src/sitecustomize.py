@@ -5,7 +5,7 @@ program whose output nobody reads any more end without an error. Debian's Python
 It imports only what Python has loaded or built in, so other programs are not slowed down. docs/decisions/0008 says why
 it is done this way.
 """
-import _signal
+import _signal  # pyright: ignore[reportMissingImports]
 import atexit
 import os
 import site
@@ -77,15 +77,15 @@ def _add_the_workspaces_packages() -> None:
 
 def _program(words: list) -> str:
     """The program that Python runs when called with `words`: a file, "-c" or "-m"; "" where its user types."""
-    words = iter(words)
-    for word in words:
+    rest = iter(words)
+    for word in rest:
         if not word.startswith("-"):
             return word
         option = "" if word.startswith("--") else next((sign for sign in word if sign in "cmWX"), "")
         if option in ("c", "m"):
             return "-" + option
         if word == "--check-hash-based-pycs" or (option and word.endswith(option)):
-            next(words, "")  # the option's value
+            next(rest, "")  # the option's value
     return ""
 
 
@@ -117,7 +117,7 @@ def _is_starting(trace):
     before its node was ready. The system's programs have no line of their user's to tell at all."""
     core = sys.modules.get("rospy.core")
     program = getattr(sys.modules.get("__main__"), "__file__", None) or ""
-    if program.startswith(SYSTEM_FOLDERS) or (hasattr(core, "is_initialized") and not core.is_initialized()):
+    if program.startswith(SYSTEM_FOLDERS) or not getattr(core, "is_initialized", lambda: True)():
         return True
     while trace is not None:
         code, name = trace.tb_frame.f_code, trace.tb_frame.f_globals.get("__name__", "")

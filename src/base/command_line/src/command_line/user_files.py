@@ -75,7 +75,7 @@ def kind_of(mode: int) -> str:
     return next((words for is_kind, words in kinds if is_kind(mode)), "something else")
 
 
-def _check(status, path, most_bytes):
+def _check(status: os.stat_result, path: str | os.PathLike, most_bytes: int) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "it is %s, not a file" % kind_of(status.st_mode), str(path))
     # The kernel's own files claim to be empty, and reading some of them waits.
@@ -85,11 +85,11 @@ def _check(status, path, most_bytes):
         raise _too_large(status.st_size, path, most_bytes)
 
 
-def _too_large(size, path, most_bytes):
+def _too_large(size: int, path: str | os.PathLike, most_bytes: int) -> OSError:
     return OSError(errno.EFBIG, "it has %d bytes, expected at most %d" % (size, most_bytes), str(path))
 
 
-def _read_pipe(descriptor, path, most_bytes, wait_s):
+def _read_pipe(descriptor: int, path: str | os.PathLike, most_bytes: int, wait_s: float) -> bytes:
     deadline = time.monotonic() + wait_s
     poller = select.poll()
     poller.register(descriptor, select.POLLIN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TextIO
 
 # Shortest time between two lines on a stream that is not a terminal [s].
 AGAIN_AFTER_S = 30.0
@@ -18,11 +18,12 @@ class WaitingLine:
     Attribute `again_after_s`: shortest time between two permanent lines [s].
     """
 
-    def __init__(self, stream: Any = None, again_after_s: float = AGAIN_AFTER_S, now: Callable = time.monotonic) -> None:
+    def __init__(self, stream: TextIO | None = None, again_after_s: float = AGAIN_AFTER_S,
+                 now: Callable[[], float] = time.monotonic) -> None:
         self.again_after_s = again_after_s
         self._stream = stream
         self._now = now
-        self._said_at_s = None
+        self._said_at_s: float | None = None
         self._shown = ""
         self._last = ""
 
@@ -41,7 +42,7 @@ class WaitingLine:
             stream.flush()
             self._said_at_s, self._last = self._now(), what
 
-    def note(self, text):
+    def note(self, text: str) -> None:
         """Write a line that stays, such as a reason for the wait."""
         self.end()
         stream = sys.stderr if self._stream is None else self._stream

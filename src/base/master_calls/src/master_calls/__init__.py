@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError, ValueError)
 
 
-def proxy(uri: str, answer_s: float) -> xmlrpc.client.ServerProxy:
+def proxy(uri: str, answer_s: float) -> Any:
     """An XML-RPC client; each of its calls raises TimeoutError after ``answer_s`` [s] without an answer."""
     return xmlrpc.client.ServerProxy(uri, transport=_Transport(answer_s))
 

@@ -7,7 +7,10 @@ A simulator is starting if:
 - the simulator's node is registered and does not publish /clock yet;
 - a node is spawning a model: gazebo_ros's spawn_model registers as a publisher of SPAWNING meanwhile.
 """
+from __future__ import annotations
+
 import socket
+from collections.abc import Iterator
 from urllib.parse import urlparse
 
 import master_calls
@@ -28,12 +31,12 @@ class SimulatorDied(OSError):
 class StartWatch:
     """Watches the start of a simulator at the master `uri`; `caller` is the caller id for the master."""
 
-    def __init__(self, uri, caller="/simulator_start"):
+    def __init__(self, uri: str, caller: str = "/simulator_start") -> None:
         self._uri = uri
         self._caller = caller
         self._is_known = False
 
-    def look(self):
+    def look(self) -> list[str]:
         """Return the names of starting processes and nodes; raises SimulatorDied if one of them has ended."""
         try:
             graph = Graph(self._uri, self._caller)
@@ -54,7 +57,7 @@ class StartWatch:
         return names
 
 
-def starting(graph):
+def starting(graph: Graph) -> list[str]:
     """The names of the processes and nodes that are starting, sorted."""
     names = {name for name in graph.processes() if name not in graph.nodes and _is_of_a_start(name)}
     if SIMULATOR in graph.nodes and not graph.published.get(CLOCK) and graph.is_alive(SIMULATOR):
@@ -63,14 +66,14 @@ def starting(graph):
     return sorted(names)
 
 
-def _is_of_a_start(process):
+def _is_of_a_start(process: str) -> bool:
     return process == SIMULATOR or "spawn" in process
 
 
 class Graph:
     """The state of the master at one moment. Attributes: `published` {topic: [node]}, `nodes` {node}."""
 
-    def __init__(self, uri, caller):
+    def __init__(self, uri: str, caller: str) -> None:
         self._caller = caller
         self._master = master_calls.proxy(uri, ANSWER_TIMEOUT_S)
         self.published, subscribed, services = (
@@ -78,7 +81,7 @@ class Graph:
         self.nodes = {node for part in (self.published, subscribed, services) for nodes in part.values()
                       for node in nodes}
 
-    def processes(self):
+    def processes(self) -> Iterator[str]:
         """Names of the processes that every roslaunch of this master runs now, with a leading slash."""
         try:
             launches = master_calls.value(self._master.getParam(self._caller, "/roslaunch/uris"))
@@ -93,7 +96,7 @@ class Graph:
                 continue
             yield from names
 
-    def is_alive(self, node):
+    def is_alive(self, node: str) -> bool:
         """Whether the node's registered address accepts connections: the node may be too busy to answer."""
         try:
             address = urlparse(master_calls.value(self._master.lookupNode(self._caller, node)))

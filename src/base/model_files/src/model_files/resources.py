@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the files that URDF and world files name: package://, model://, file:// and plain paths."""
+from __future__ import annotations
+
 import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 import yaml
 
 from urdf_model import XmlRefused, parse_xml
 
-from .packages import NOT_FOUND, find_packages
+from .packages import NOT_FOUND, Packages, find_packages
 
 
-def model_folders(packages=None, environ=os.environ):
+def model_folders(packages: Packages | None = None, environ: Mapping[str, str] = os.environ) -> list[Path]:
     """Search path of ``model://NAME``: the user's folders first, ours last. ``packages``: RosPack."""
     packages = packages or find_packages()
     ours = Path(packages.get_path("model_files")) / "models"
@@ -19,26 +23,27 @@ def model_folders(packages=None, environ=os.environ):
             Path.home() / ".gazebo" / "models", ours]
 
 
-def resource_folders(packages=None, environ=os.environ):
+def resource_folders(packages: Packages | None = None, environ: Mapping[str, str] = os.environ) -> list[Path]:
     """Search path of world files and ``file://media/...``, after the current folder: ``GAZEBO_RESOURCE_PATH``, then
     what packages export. ``packages``: RosPack."""
     return [*_listed(environ, "GAZEBO_RESOURCE_PATH"), *exported_folders("gazebo_media_path", packages)]
 
 
-def plugin_tables(packages=None, environ=os.environ):
+def plugin_tables(packages: Packages | None = None, environ: Mapping[str, str] = os.environ) -> list[Path]:
     """The files ``model_plugins.yaml`` in the folders of ``GAZEBO_PLUGIN_PATH`` and in those that packages export as
     ``plugin_path``, first the more important one. ``packages``: RosPack."""
     folders = [*_listed(environ, "GAZEBO_PLUGIN_PATH"), *exported_folders("plugin_path", packages)]
     return [path for path in (folder / "model_plugins.yaml" for folder in folders) if path.is_file()]
 
 
-def model_sizes(packages):
+def model_sizes(packages: Packages) -> dict[str, dict[str, Any]]:
     """Shapes that replace models of Gazebo's library, in the form that :class:`sdf_model.ModelFolders` takes."""
     path = Path(packages.get_path("model_files")) / "config" / "model_sizes.yaml"
-    return yaml.safe_load(path.read_text(encoding="utf-8"))
+    sizes: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return sizes
 
 
-def exported_folders(attribute, packages=None):
+def exported_folders(attribute: str, packages: Packages | None = None) -> list[Path]:
     """The folders (Paths) that packages name in ``<export><gazebo_ros attribute="${prefix}/models:..."/></export>``.
 
     ``attribute``: gazebo_model_path, gazebo_media_path or plugin_path. An unreadable manifest is skipped.
@@ -52,7 +57,8 @@ def exported_folders(attribute, packages=None):
             # Most of the hundred packages export nothing, and parsing XML is slower than this search.
             if attribute.encode() not in text:
                 continue
-            exports = parse_xml(text).findall("export/gazebo_ros")
+            root: Any = parse_xml(text)
+            exports = root.findall("export/gazebo_ros")
         except (OSError, XmlRefused):
             continue
         for value in (element.get(attribute, "") for element in exports):
@@ -60,34 +66,34 @@ def exported_folders(attribute, packages=None):
     return found
 
 
-def _listed(environ, variable):
+def _listed(environ: Mapping[str, str], variable: str) -> list[Path]:
     return [Path(folder) for folder in environ.get(variable, "").split(":") if folder]
 
 
 class ResourceFinder:
     """Turns resource names into paths. Callable; remembers what it found, so later calls cost a dictionary look-up."""
 
-    def __init__(self, packages=None):
+    def __init__(self, packages: Packages | None = None) -> None:
         """``packages``: a ``rospkg.RosPack`` that has crawled already, which saves a second crawl."""
         self._packages = packages or find_packages()
         self._model_folders = model_folders(self._packages)
         self._resource_folders = resource_folders(self._packages)
-        self._found = {}
+        self._found: dict[str, str | None] = {}
         self._may_look_again = True
 
-    def __call__(self, name):
+    def __call__(self, name: str) -> str | None:
         """The path if it exists and is not a folder, else None. It need not be a regular file: the caller checks when
         it opens it."""
         if name not in self._found:
             self._found[name] = next((str(path) for path in self._candidates(name) if _is_there(path)), None)
         return self._found[name]
 
-    def forget_missing(self):
+    def forget_missing(self) -> None:
         """Search again for names that were not found: files and packages appear while a user works on a lab."""
         self._found = {name: path for name, path in self._found.items() if path is not None}
         self._may_look_again = True
 
-    def _candidates(self, name):
+    def _candidates(self, name: str) -> Iterator[Path]:
         url = urlparse(name)
         if url.scheme == "package":
             package = self._package_folder(url.netloc)
@@ -104,7 +110,7 @@ class ResourceFinder:
         elif not url.scheme:
             yield Path(name)
 
-    def _package_folder(self, name):
+    def _package_folder(self, name: str) -> Path | None:
         try:
             return Path(self._packages.get_path(name))
         except NOT_FOUND:
@@ -116,7 +122,7 @@ class ResourceFinder:
         return self._package_folder(name)
 
 
-def _is_there(path):
+def _is_there(path: Path) -> bool:
     try:
         return path.exists() and not path.is_dir()
     except (OSError, ValueError):  # a name that is too long, or holds a zero byte

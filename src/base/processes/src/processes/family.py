@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Processes and their descendants, as /proc shows them. Linux only."""
+from __future__ import annotations
+
 import contextlib
 import os
+from collections.abc import Iterable
 
 # How the kernel names shared memory without a file.
 _SHARED = b" /dev/zero (deleted)"
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
-def with_parent(command, sign="KILL"):
+def with_parent(command: Iterable[str], sign: str = "KILL") -> list[str]:
     """The command (list) that runs another one and ends it by a signal at the end of the process that starts it.
 
     Also where that process ends before the signal is ordered: then the command does not begin. sign: the signal's name.
@@ -20,9 +23,9 @@ def with_parent(command, sign="KILL"):
             str(os.getpid()), *command]
 
 
-def direct_children(pid):
+def direct_children(pid: int) -> set[int]:
     """Process ids of the children of one process."""
-    found = set()
+    found: set[int] = set()
     with contextlib.suppress(OSError):
         for thread in os.listdir("/proc/%d/task" % pid):
             with contextlib.suppress(OSError), open("/proc/%d/task/%s/children" % (pid, thread), "rb") as file:
@@ -30,9 +33,10 @@ def direct_children(pid):
     return found
 
 
-def children_of(parents):
+def children_of(parents: Iterable[int]) -> set[int]:
     """All living descendants of the process ids `parents`, with these."""
-    found, to_visit = set(), list(parents)
+    found: set[int] = set()
+    to_visit = list(parents)
     while to_visit:
         pid = to_visit.pop()
         if pid in found:
@@ -43,7 +47,7 @@ def children_of(parents):
     return found
 
 
-def is_running(pid):
+def is_running(pid: int) -> bool:
     """Whether a process is running; a zombie is not."""
     try:
         with open("/proc/%d/stat" % pid, "rb") as file:
@@ -53,7 +57,7 @@ def is_running(pid):
     return text[text.rfind(b")") + 2:][:1] not in (b"Z", b"X")
 
 
-def memory_exceeds(pids, limit_bytes):
+def memory_exceeds(pids: Iterable[int], limit_bytes: float) -> bool:
     """Whether processes have more memory than ``limit_bytes`` together: their private pages, and what they share with
     each other; pages of files do not count."""
     private = reserved = 0
@@ -68,7 +72,7 @@ def memory_exceeds(pids, limit_bytes):
     return reserved > limit_bytes and private + _shared_bytes(pids) > limit_bytes
 
 
-def _shared_bytes(pids):
+def _shared_bytes(pids: Iterable[int]) -> int:
     """Shared mappings without a file: their whole size, since pages that a process has given back stay in memory."""
     mappings = {}
     for pid in pids:

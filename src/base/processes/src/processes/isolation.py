@@ -5,6 +5,8 @@ A process and its children can move to a separate network namespace, with a loop
 A sandbox (`command`) has own processes and own /dev/shm, a home and a /tmp of limited size that are deleted afterwards,
 and only those parts of the machine that programs need, read-only. The caller names what of the workspace is hidden.
 """
+from __future__ import annotations
+
 import ctypes
 import errno
 import fcntl
@@ -15,6 +17,7 @@ import socket
 import struct
 import subprocess
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 HOME = "/home/student"
@@ -37,8 +40,9 @@ _VARIABLES = ("PATH", "PYTHONPATH", "LD_LIBRARY_PATH", "CMAKE_PREFIX_PATH", "PKG
 _CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000
 _SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 0x1
 _PROBE_S = 20.0
+_Path = str | os.PathLike
 
-_network = None
+_network: str | None = None
 _network_problem = ""
 
 
@@ -46,7 +50,7 @@ class NotIsolated(Exception):
     """This machine does not allow a sandbox; the text says why, and what can be done."""
 
 
-def enter_network():
+def enter_network() -> None:
     """Move this process into a network namespace that has a loopback and nothing else. Raises NotIsolated.
 
     To be called before any thread starts; child processes that it starts later are in it, too.
@@ -74,7 +78,7 @@ def enter_network():
     _network = os.readlink("/proc/self/ns/net")
 
 
-def try_to_enter_network():
+def try_to_enter_network() -> None:
     """As `enter_network`; if that fails, `problem` returns the reason from then on."""
     global _network_problem
     try:
@@ -83,7 +87,7 @@ def try_to_enter_network():
         _network_problem = str(refusal)
 
 
-def has_own_network():
+def has_own_network() -> bool:
     """Whether `enter_network` has been called in this process."""
     return _network is not None
 
@@ -92,14 +96,14 @@ _REMEDY = ("In Docker, start the container with --security-opt seccomp=unconfine
            "--cap-add SYS_ADMIN to have them")
 
 
-def _switched_off(name, value):
+def _switched_off(name: str, value: str) -> bool:
     try:
         return Path("/proc/sys/" + name).read_text(encoding="ascii").strip() == value
     except OSError:
         return False
 
 
-def _reason(what):
+def _reason(what: str) -> str:
     """Why namespaces are refused, and the remedy."""
     if _switched_off("kernel/apparmor_restrict_unprivileged_userns", "1"):
         return ("AppArmor of this Ubuntu forbids namespaces to ordinary users (%s). As root, once: sysctl -w "
@@ -114,13 +118,13 @@ def _reason(what):
     return "the kernel refuses namespaces (%s), as it does in most containers. %s" % (what, _REMEDY)
 
 
-def problem():
+def problem() -> str:
     """Why no sandbox can be made here: a sentence with the remedy, or "" without a problem."""
     return _network_problem or _bubblewrap_problem()
 
 
 @functools.cache
-def _bubblewrap_problem():
+def _bubblewrap_problem() -> str:
     if shutil.which("bwrap") is None:
         return "bubblewrap is not installed (apt install bubblewrap, or ./baxter.sh setup). " + _REMEDY
     probe = ["bwrap", *_base(), "--", "/bin/sh", "-c", "exit 0"]
@@ -132,16 +136,16 @@ def _bubblewrap_problem():
 
 
 @functools.cache
-def _can_limit_size():
+def _can_limit_size() -> bool:
     done = subprocess.run(["bwrap", "--help"], capture_output=True, text=True)
     return "--size" in done.stdout + done.stderr
 
 
-def _folder(path, size):
+def _folder(path: str, size: int) -> list[str]:
     return [*(("--size", str(size)) if _can_limit_size() else ()), "--perms", "0700", "--tmpfs", path]
 
 
-def _base(scratch_bytes=FOLDER_BYTES):
+def _base(scratch_bytes: int = FOLDER_BYTES) -> list[str]:
     """Options of every sandbox: namespaces, the system read-only, and folders of its own."""
     options = ["--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try", "--die-with-parent",
                "--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
@@ -159,7 +163,7 @@ def _base(scratch_bytes=FOLDER_BYTES):
     return options
 
 
-def workspaces(environment):
+def workspaces(environment: Mapping[str, str]) -> list[str]:
     """Folders outside the system that programs need: the workspace, Python's, sourced workspaces."""
     found = [environment.get("LAB_ROOT", ""), sys.prefix, sys.base_prefix, os.path.dirname(sys.executable)]
     for name in _PATHS:
@@ -171,12 +175,12 @@ def workspaces(environment):
     return sorted(path for path in roots if not any(path != other and path.startswith(other + "/") for other in roots))
 
 
-def _is_system(path):
+def _is_system(path: str) -> bool:
     return path == "/" or any(path == top or path.startswith(top + "/") for top in ("/usr", "/opt", *_SYSTEM))
 
 
-def _hide(roots, names):
-    options = []
+def _hide(roots: Iterable[str], names: Iterable[str]) -> list[str]:
+    options: list[str] = []
     for root in roots:
         for name in names:
             path = os.path.join(root, name)
@@ -189,7 +193,8 @@ def _hide(roots, names):
     return options
 
 
-def command(environment, binds=(), hidden=(), own_network=False, further=(), scratch_bytes=FOLDER_BYTES):
+def command(environment: Mapping[str, str], binds: Iterable[tuple[_Path, _Path, bool]] = (), hidden: Iterable[str] = (),
+            own_network: bool = False, further: Iterable[str] = (), scratch_bytes: int = FOLDER_BYTES) -> list[str]:
     """The command prefix that starts a command in a separate sandbox.
 
     environment: of the command; it shows which workspace is needed. binds: (source, target, writable) of further files
@@ -210,7 +215,7 @@ def command(environment, binds=(), hidden=(), own_network=False, further=(), scr
     return ["bwrap", *options, *(("--unshare-net",) if own_network else ()), *further, "--"]
 
 
-def environment_of(environment):
+def environment_of(environment: Mapping[str, str]) -> dict[str, str]:
     """The variables of an environment that a sandboxed program gets: no token or agent of the user."""
     kept = {name: value for name, value in environment.items()
             if name in _VARIABLES or name.startswith(("ROS_", "ROSCONSOLE_", "LC_"))}
@@ -218,13 +223,13 @@ def environment_of(environment):
             "XDG_RUNTIME_DIR": "/run", "USER": "student", "LOGNAME": "student"}
 
 
-def caches(environment, folder):
+def caches(environment: Mapping[str, str], folder: _Path) -> list[tuple[Path, Path, bool]]:
     """Copies of what numba has compiled and of spheres that stand for robots' links, as `binds` for `command`: they are
     used only where they could be written, beside the source.
 
     folder: folder of the copies, used by nothing else, so that a sandbox cannot change the originals. Raises OSError.
     """
-    binds = []
+    binds: list[tuple[Path, Path, bool]] = []
     for root in workspaces(environment):
         for path, names, _ in os.walk(os.path.join(root, "src")):
             names[:] = [name for name in names if not name.startswith(".") and name not in ("meshes", "node_modules")]
@@ -238,7 +243,7 @@ def caches(environment, folder):
     return binds
 
 
-def _copy(source, target):
+def _copy(source: Path, target: Path) -> None:
     try:
         shutil.copytree(source, target)
     except shutil.Error as error:

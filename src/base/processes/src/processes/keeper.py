@@ -5,6 +5,8 @@ The starting process holds the other end of that pipe, so that the command ends 
 Free of ROS. The state file is locked while the keeper lives; its first line is `running` or `ending`, the others are
 the command. With LAB_SESSION_AFTER naming another keeper's state file, the command outlives that keeper.
 """
+from __future__ import annotations
+
 import contextlib
 import ctypes
 import fcntl
@@ -14,6 +16,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
+from typing import TextIO
 
 # roslaunch gives a node 15 s after SIGINT and 2 s after SIGTERM before it kills it.
 STOP_TIMEOUT_S = 20.0
@@ -21,14 +25,14 @@ _POLL_S = 0.1
 _PR_SET_CHILD_SUBREAPER = 36
 
 
-def _write_state(file, state, command):
+def _write_state(file: TextIO, state: str, command: Sequence[str]) -> None:
     file.seek(0)
     file.truncate()
     file.write("%s\n%s\n" % (state, " ".join(command)))
     file.flush()
 
 
-def is_held(path):
+def is_held(path: str | os.PathLike) -> bool:
     """Whether a living keeper holds the lock of this state file."""
     try:
         with open(path, encoding="utf-8") as file:
@@ -40,18 +44,18 @@ def is_held(path):
     return False
 
 
-def _wait_until(condition, timeout_s):
+def _wait_until(condition: Callable[[], bool], timeout_s: float) -> None:
     deadline = time.monotonic() + timeout_s
     while not condition() and time.monotonic() < deadline:
         time.sleep(_POLL_S)
 
 
-def _own_children():
+def _own_children() -> list[int]:
     with open("/proc/self/task/%d/children" % os.getpid(), encoding="ascii") as file:
         return [int(word) for word in file.read().split()]
 
 
-def _end_everything():
+def _end_everything() -> None:
     """Kill remaining processes: as subreaper this process inherits every orphan below it."""
     while True:
         children = _own_children()
@@ -64,7 +68,7 @@ def _end_everything():
                 os.waitpid(pid, 0)
 
 
-def _wait_for_orphans(grace_s):
+def _wait_for_orphans(grace_s: float) -> None:
     deadline = time.monotonic() + grace_s
     while _own_children() and time.monotonic() < deadline:
         with contextlib.suppress(ChildProcessError):
@@ -72,7 +76,8 @@ def _wait_for_orphans(grace_s):
                 time.sleep(_POLL_S)
 
 
-def keep(state_path, command, after=None, grace_s=0.0):
+def keep(state_path: str | os.PathLike, command: Sequence[str], after: str | os.PathLike | None = None,
+         grace_s: float = 0.0) -> int:
     """Run `command` until it ends or standard input closes; returns its exit code, or 0 when it was ended.
 
     after: state file of a keeper that ends first; grace_s: time for what the command leaves to end by itself.

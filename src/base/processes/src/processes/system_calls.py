@@ -8,11 +8,14 @@ ENOSYS, as on a kernel that does not have them: libraries then use other ways. S
 without writing to it, which fill any disk in less than a second: they fail with EOPNOTSUPP, as on a file system that
 does not have them.
 """
+from __future__ import annotations
+
 import contextlib
 import errno
 import os
 import platform
 import struct
+from collections.abc import Iterator
 
 # Machine -> its number in linux/audit.h, and the numbers of calls in its asm/unistd.h.
 _MACHINES = {
@@ -40,7 +43,7 @@ _ALLOW, _REFUSE, _UNSUPPORTED = 0x7FFF0000, 0x00050000 | errno.ENOSYS, 0x0005000
 _LOAD, _EQUAL, _NOT_LESS, _BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 
 
-def filter_program(machine=None):
+def filter_program(machine: str | None = None) -> bytes:
     """The filter for this machine (as `platform.machine` names it) as bytes, b"" for a machine that is not known."""
     if (machine or platform.machine()) not in _MACHINES:
         return b""
@@ -73,7 +76,7 @@ def filter_program(machine=None):
 
 
 @contextlib.contextmanager
-def refused():
+def refused() -> Iterator[tuple[list[str], tuple[int, ...]]]:
     """The options of bubblewrap that refuse these calls, and the descriptors that it must inherit; for one start."""
     program = filter_program()
     if not program:

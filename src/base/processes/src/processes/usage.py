@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Memory that the kernel keeps for programs outside of their processes: files in memory, and sockets. Free of ROS;
 Linux only."""
+from __future__ import annotations
+
 import contextlib
 import os
+from collections.abc import Iterable
 
 from processes.isolation import FOLDERS, HOME
 
@@ -12,7 +15,7 @@ SCRATCH = tuple(folder for folder in FOLDERS if folder != HOME)
 ENTRY_BYTES = 1 << 10
 
 
-def root_of(pids):
+def root_of(pids: Iterable[int]) -> str:
     """The topmost folder of the sandbox that some of these processes are in, seen from outside; "" without one."""
     outside = os.stat("/")
     for pid in pids:
@@ -24,7 +27,7 @@ def root_of(pids):
     return ""
 
 
-def files_in_memory(root, folders=SCRATCH):
+def files_in_memory(root: str, folders: Iterable[str] = SCRATCH) -> tuple[int, int]:
     """(entries, bytes) of a sandbox's folders in memory; empty files need memory, too.
 
     root: by `root_of`. Raises OSError once the process of that root has ended.
@@ -34,7 +37,7 @@ def files_in_memory(root, folders=SCRATCH):
     return entries, sum((one.f_blocks - one.f_bfree) * one.f_frsize for one in found) + ENTRY_BYTES * entries
 
 
-def sockets(pids):
+def sockets(pids: Iterable[int]) -> int:
     """How many sockets these processes have open; one that several share counts once."""
     found = set()
     for pid in pids:

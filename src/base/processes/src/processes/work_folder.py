@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Temporary folders that do not stay for ever where their process is killed. Free of ROS; Linux only."""
+from __future__ import annotations
+
 import contextlib
 import fcntl
 import os
 import shutil
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 _LOCK = "lock"
 
 
 @contextlib.contextmanager
-def claimed_folder(prefix, end_users=lambda folder: None):
+def claimed_folder(prefix: str, end_users: Callable[[Path], object] = lambda folder: None) -> Iterator[Path]:
     """A new temporary folder (Path), which is removed at the end.
 
     Before, those of the same prefix whose processes were killed are removed: each running one holds a lock in its own.
@@ -33,7 +36,7 @@ def claimed_folder(prefix, end_users=lambda folder: None):
 
 
 @contextlib.contextmanager
-def work_folder(prefix):
+def work_folder(prefix: str) -> Iterator[Path]:
     """A :func:`claimed_folder` that is TMPDIR until the end."""
     before = os.environ.get("TMPDIR")
     with claimed_folder(prefix) as folder:
@@ -48,7 +51,7 @@ def work_folder(prefix):
             tempfile.tempdir = None
 
 
-def _remove_if_left(folder, end_users):
+def _remove_if_left(folder: Path, end_users: Callable[[Path], object]) -> None:
     with contextlib.suppress(OSError):
         if folder.is_symlink() or folder.stat().st_uid != os.getuid():
             return

@@ -5,11 +5,14 @@ The system gives the number of a closed descriptor to the next one that opens. r
 ended by this number, so it found the newest one instead: a subscriber that had just connected was forgotten, and no
 message ever came. rospy.wait_for_message in a loop met it, once in some thousand calls on a busy machine.
 """
+from __future__ import annotations
+
 import contextlib
 import functools
+from typing import Any
 
 
-def amend(topics):
+def amend(topics: Any) -> None:
     """Make the publishers and subscribers of rospy.topics tell connections apart by the connection itself.
 
     ``topics``: the module rospy.topics.

@@ -4,12 +4,15 @@
 rosgraph closes the server's socket and does not tell the server, which waits for requests on it. Such a wait returns at
 once, so the thread takes a whole core for as long as the process lives: a notebook's kernel whose node has ended.
 """
+from __future__ import annotations
+
 import contextlib
 import functools
 import threading
+from typing import Any
 
 
-def amend(xmlrpc):
+def amend(xmlrpc: Any) -> None:
     """Make rosgraph.xmlrpc's nodes end their server's loop when they shut down; it ends within 0.5 s."""
     close = xmlrpc.XmlRpcNode.shutdown
 

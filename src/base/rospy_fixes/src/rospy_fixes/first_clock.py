@@ -4,11 +4,15 @@
 Under /use_sim_time rospy's time is 0 until the first message on /clock and then jumps, possibly by minutes. If a
 program waits for 2 s at that moment, as the vendor's SDK does, its wait ends before anything could arrive.
 """
+from __future__ import annotations
+
 import functools
 import os
 import re
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 import master_calls
 from command_line.waiting_line import WaitingLine
@@ -37,7 +41,7 @@ class ClockWait:
     names the awaited thing; `complaint` is the error text after a failed wait.
     """
 
-    def __init__(self, watch, wants_the_world, begin_s):
+    def __init__(self, watch: simulator_start.StartWatch, wants_the_world: bool, begin_s: float) -> None:
         self.what = "the first message on /clock, since /use_sim_time is true"
         self.complaint = ""
         self.waited_s = 0.0
@@ -45,9 +49,9 @@ class ClockWait:
         self._wants_the_world = wants_the_world
         self._begin_s = self._look_at_s = begin_s
         self._end_s = begin_s + NOBODY_S
-        self._starting = []
+        self._starting: list[str] = []
 
-    def is_over(self, has_time, is_published, now_s):
+    def is_over(self, has_time: bool, is_published: Callable[[], bool], now_s: float) -> bool:
         """Whether init_node may return: `has_time`: a message has come; `is_published()`: there is a publisher."""
         self.waited_s = now_s - self._begin_s
         if has_time and not self._wants_the_world:
@@ -78,7 +82,7 @@ class ClockWait:
             self._end_s = max(self._end_s, self._begin_s + SILENT_S)
 
 
-def amend(client):
+def amend(client: Any) -> None:
     """Replace init_node in the module rospy.client by the waiting version."""
     client.init_node = _waiting(client.init_node)
 
@@ -104,16 +108,16 @@ def _option(function, name, args, options):
     return dict(zip(names, args, strict=False), **options).get(name, False)
 
 
-def _is_tool(argv):
+def _is_tool(argv: list[str]) -> bool:
     return bool(argv and _TOOLS.fullmatch(os.path.realpath(argv[0])))
 
 
-def _is_of_a_launch(argv):
+def _is_of_a_launch(argv: list[str]) -> bool:
     """Whether roslaunch has started this program, which then belongs to the same start as the simulator."""
     return any(word.startswith("__name:=") for word in argv)
 
 
-def _master_answers():
+def _master_answers() -> bool:
     import rosgraph
 
     try:

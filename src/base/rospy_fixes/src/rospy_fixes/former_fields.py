@@ -5,8 +5,11 @@ fields by position without those that Noetic's have gained.
 Former fields are not sent, and gained ones have their defaults, so neither MD5 nor wire changes. The first use of each
 is told in one line.
 """
+from __future__ import annotations
+
 import functools
 import sys
+from typing import Any
 
 # Class -> {field: what a program reads there}; they were the last ones. Noetic's inverse kinematics searches until the
 # time-out.
@@ -27,7 +30,7 @@ GAINED = {
 }
 
 
-def amend(messages):
+def amend(messages: Any) -> None:
     """Make the message classes of a module take what they took."""
     for class_name in (FIELDS.keys() | GAINED.keys()) & vars(messages).keys():
         _accept(getattr(messages, class_name), FIELDS.get(class_name, {}), GAINED.get(class_name, ()))

@@ -3,15 +3,18 @@
 
 Messages still go to the terminal and to /rosout. Only handlers of files are concerned, and only errors about room.
 """
+from __future__ import annotations
+
 import errno
 import functools
 import logging
 import sys
+from typing import Any
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
-def amend(module):
+def amend(module: Any) -> None:
     """Called when rosgraph.roslogging, which opens ROS's log files, has been loaded."""
     del module
     handle = logging.FileHandler.handleError

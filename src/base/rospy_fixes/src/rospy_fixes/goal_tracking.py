@@ -5,11 +5,14 @@ actionlib publishes a goal first, and notes then which goal it follows. What the
 threads, counted as news about a goal that nobody follows: feedback was lost, and where the goal had already ended,
 `wait_for_result` waited for ever.
 """
+from __future__ import annotations
+
 import functools
 import threading
+from typing import Any
 
 
-def amend(simple_action_client):
+def amend(simple_action_client: Any) -> None:
     """Make the clients of actionlib.simple_action_client take news of goals when no goal is just being sent."""
     client = simple_action_client.SimpleActionClient
     send = client.send_goal

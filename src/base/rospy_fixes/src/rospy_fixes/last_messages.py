@@ -4,26 +4,29 @@
 For a publisher with a queue, rospy sends in one thread per connection, and these threads end with the program: a
 command in a program's last line was lost at random.
 """
+from __future__ import annotations
+
 import sys
 import time
+from typing import Any
 
 # Longest delay of a program's end by a stopped reader [s, wall].
 LONGEST_S = 2.0
 _LOOK_EVERY_S = 0.002
 
 
-def amend(core):
+def amend(core: Any) -> None:
     """Make the module rospy.core send queued messages before it shuts a node down."""
     core.add_preshutdown_hook(_before_shutdown)
 
 
-def _before_shutdown(reason):
+def _before_shutdown(reason: str) -> None:
     # After Ctrl-C the user wants a quick end; and a signal may come while a needed lock is held.
     if not reason.startswith("signal"):
         await_sent(queued_connections())
 
 
-def queued_connections():
+def queued_connections() -> list[Any]:
     """Connections of this process's publishers that have a queue: list."""
     topics = sys.modules.get("rospy.topics")
     manager = topics and topics.get_topic_manager()
@@ -32,7 +35,7 @@ def queued_connections():
             if hasattr(connection, "_cond_data_available")]
 
 
-def await_sent(connections, longest_s=LONGEST_S):
+def await_sent(connections: list[Any], longest_s: float = LONGEST_S) -> bool:
     """Wait until all connections' queues are sent to the system, at most ``longest_s`` [s]; returns whether."""
     end_s = time.monotonic() + longest_s
     while not all(map(_is_sent, connections)):
@@ -42,7 +45,7 @@ def await_sent(connections, longest_s=LONGEST_S):
     return True
 
 
-def _is_sent(connection):
+def _is_sent(connection: Any) -> bool:
     """Whether a rospy QueuedConnection's thread has sent everything: its queue is empty, and it waits for messages."""
     if connection.done:
         return True

@@ -5,13 +5,16 @@ rospy refuses subscribers from the moment at which a node begins to shut down, b
 that. A program that ends soon after its start was not connected yet: what its handler published was lost, and a handler
 that publishes until it sees the effect never ended.
 """
+from __future__ import annotations
+
 import functools
 import threading
+from typing import Any
 
 import rospy.core
 
 
-def amend(tcpros_pubsub):
+def amend(tcpros_pubsub: Any) -> None:
     """Make the publishers of rospy.impl.tcpros_pubsub accept subscribers until the shutdown handlers have run."""
     connecting = threading.local()
     requested = rospy.core.is_shutdown_requested

@@ -6,6 +6,8 @@ the middle of the start the main thread may hold a lock that the monitor needs. 
 failed at its next process, and roslaunch left before its monitor had ended the master. Here the handler only says that
 the end has come and interrupts the start; whatever the reason of an end, roslaunch waits for its monitor.
 """
+from __future__ import annotations
+
 import contextlib
 import functools
 import inspect
@@ -13,15 +15,18 @@ import os
 import re
 import signal
 import sys
+from collections.abc import Callable
+from typing import Any
 
 # Longest wait for the monitor at exit, beyond the time that its processes may take [s].
 MARGIN_S = 10.0
 
 
-def amend(parent):
+def amend(parent: Any) -> None:
     """Amend the parts of roslaunch that its module ``parent`` has imported."""
-    core, launch, pmon, nodeprocess = (sys.modules["roslaunch." + name]
+    modules: Any = (sys.modules["roslaunch." + name]
                                        for name in ("core", "launch", "pmon", "nodeprocess"))
+    core, launch, pmon, nodeprocess = modules
     end = _End(pmon)
     end.starts = {parent.ROSLaunchParent.start.__code__, launch.ROSLaunchRunner.launch.__code__}
     end.not_in = {nodeprocess.LocalProcess.start.__code__, launch.ROSLaunchRunner.stop.__code__,
@@ -32,7 +37,7 @@ def amend(parent):
     core.Master.is_running = end.of_question(core.Master.is_running)
 
 
-def wait_for_end(monitor) -> bool:
+def wait_for_end(monitor: Any) -> bool:
     """End the processes of a monitor; whether all of them have ended. roslaunch calls it at its exit."""
     if monitor is None:
         return False
@@ -43,7 +48,7 @@ def wait_for_end(monitor) -> bool:
     return not monitor.is_alive()
 
 
-def _is_python(process) -> bool:
+def _is_python(process: Any) -> bool:
     """Whether a process begins with the lab's sitecustomize, which lets Ctrl-C through: before that, Python tells the
     user of a fatal error."""
     if process.env.get("PYTHONPATH") != os.environ.get("PYTHONPATH"):
@@ -59,12 +64,12 @@ def _is_python(process) -> bool:
 class _End:
     """The end of this process's launches, once a signal has ordered it."""
 
-    def __init__(self, pmon):
+    def __init__(self, pmon: Any) -> None:
         self._pmon = pmon
         # Code of the functions that a signal interrupts, and of those within them that it does not.
         self.starts, self.not_in = set(), set()
 
-    def handle(self, number, frame):
+    def handle(self, number: int, frame: Any) -> None:
         """The handler of signals: it takes no lock and waits for nothing. Raises KeyboardInterrupt in the start."""
         is_first, self._pmon._shutting_down = not self._pmon._shutting_down, True
         for monitor in list(self._pmon._pmons):
@@ -76,7 +81,7 @@ class _End:
         if self._is_in_start(frame):
             raise KeyboardInterrupt
 
-    def _is_in_start(self, frame) -> bool:
+    def _is_in_start(self, frame: Any) -> bool:
         """Whether the start may be interrupted here: not within logging, which the monitor needs, too, nor between a
         process's begin and its entry in the books, nor where Python would print an exception and drop it, as in a
         generator that is thrown away. There the next step of the start ends it."""
@@ -92,7 +97,7 @@ class _End:
             frame = frame.f_back
         return is_start
 
-    def of_launch(self, start):
+    def of_launch(self, start: Callable) -> Callable:
         """``start`` of a launch. Interrupted by a signal, it ends as a launch does that was interrupted later."""
         @functools.wraps(start)
         def started(launch, *arguments, **options):
@@ -108,7 +113,7 @@ class _End:
                 launch.runner.spin = launch.runner.stop  # there is nothing to wait for any more
         return started
 
-    def of_process(self, start):
+    def of_process(self, start: Callable) -> Callable:
         """``start`` of a process: if the end has come meanwhile, the monitor may have passed it, and it ends here."""
         @functools.wraps(start)
         def started(process):
@@ -124,7 +129,7 @@ class _End:
             return is_started
         return started
 
-    def of_question(self, is_running):
+    def of_question(self, is_running: Callable) -> Callable:
         """``is_running`` of a master, which takes every exception, an interruption too, for a "no"."""
         @functools.wraps(is_running)
         def asked(master):

@@ -5,8 +5,11 @@ roslaunch sets parameters first and starts nodes in any order, and each node shu
 Before the second simulator itself could refuse, the first lab would lose its nodes. So we read the launch file. If it
 contains a simulator, and another one runs or starts on the master, roslaunch ends at once.
 """
+from __future__ import annotations
+
 import contextlib
 import sys
+from typing import Any
 
 import roslaunch.pmon
 from rosgraph.names import ns_join
@@ -16,7 +19,7 @@ from master_calls.single_instance import Claim, refusal, refusal_while_starting,
 _PACKAGE, _TYPES = "gazebo_ros", ("gzserver", "gazebo")
 
 
-def amend(module):
+def amend(module: Any) -> None:
     """Make every ``ROSLaunchParent`` of the module roslaunch.parent check before it starts anything."""
     parent = module.ROSLaunchParent
     load_config, start_monitor = parent._load_config, parent._start_pm
@@ -41,13 +44,13 @@ def amend(module):
 class _Simulators(roslaunch.pmon.ProcessListener):
     """The simulators in a launch file, and this process's claims to start them."""
 
-    def __init__(self, config):
+    def __init__(self, config: Any) -> None:
         self._master_uri = config.master.uri
         self._nodes = {ns_join(node.namespace, node.name): node for node in config.nodes
                        if node.package == _PACKAGE and node.type in _TYPES}
         self._claims = {name: Claim(name, self._master_uri) for name in self._nodes}
 
-    def reason_against(self):
+    def reason_against(self) -> str:
         """The message to the user if there is a simulator already; else "", and this process then holds the claim."""
         for name, claim in self._claims.items():
             found = None
@@ -60,7 +63,7 @@ class _Simulators(roslaunch.pmon.ProcessListener):
                 return refusal_while_starting(name, holder, self._master_uri)
         return ""
 
-    def process_died(self, process_name, exit_code):
+    def process_died(self, process_name: str, exit_code: int) -> None:
         """Release the claim of a simulator that has ended while its launch goes on."""
         name = "/" + process_name.rpartition("-")[0]
         if name in self._claims and not self._nodes[name].respawn:

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A standard output whose reader has ended, as in `program | head`. No ROS; Linux."""
+from __future__ import annotations
+
 import os
 import select
 import sys
 
 
-def is_lost():
+def is_lost() -> bool:
     """Whether the standard output is a pipe or a socket that nobody reads any more. If so, its descriptor goes to
     /dev/null from then on: what Python still holds back for it causes no second error."""
     try:

@@ -6,11 +6,14 @@ publishers come. Where both name a publisher at the same moment, two threads con
 each keep one connection to a peer and close the other; where they kept different ones, none was left, and no message
 ever came.
 """
+from __future__ import annotations
+
 import functools
 import threading
+from typing import Any
 
 
-def amend(masterslave):
+def amend(masterslave: Any) -> None:
     """Make the nodes of rospy.impl.masterslave connect to a publisher of a topic in one thread at a time; the next one
     finds the connection of the one before.
     """

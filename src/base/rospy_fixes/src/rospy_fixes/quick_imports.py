@@ -5,6 +5,8 @@ roslib imports catkin's search for packages, and with it a library for grammars,
 rosclean, which looks for the program ``du``, roslaunch imports setuptools, as much as all the rest of it. A launch
 searches the workspace three times, and each node once, for the last place that settings of its log may be in.
 """
+from __future__ import annotations
+
 import functools
 import importlib
 import os
@@ -12,6 +14,8 @@ import shutil
 import sys
 import time
 import types
+from collections.abc import Callable
+from typing import Any
 
 _SEARCH = "catkin.find_in_workspaces"
 _LOG_SETTINGS = "ROS_PYTHON_LOG_CONFIG_FILE"
@@ -20,7 +24,7 @@ _LOG_SETTINGS = "ROS_PYTHON_LOG_CONFIG_FILE"
 _REMEMBERED_S = 5.0
 
 
-def amend(module):
+def amend(module: Any) -> None:
     """Called when catkin, rosgraph.roslogging or roslaunch.config has been loaded; the modules in question are imported
     after these."""
     if module.__name__ == "catkin":
@@ -31,7 +35,7 @@ def amend(module):
         _import_rosclean()
 
 
-def _search_later(catkin):
+def _search_later(catkin: Any) -> None:
     if _SEARCH in sys.modules:
         return
 
@@ -43,21 +47,21 @@ def _search_later(catkin):
             raise AttributeError(name)
         return getattr(_search(), name)
 
-    later = types.ModuleType(_SEARCH)
+    later: Any = types.ModuleType(_SEARCH)
     later.find_in_workspaces, later.__getattr__ = find_in_workspaces, of_the_search
     sys.modules[_SEARCH] = catkin.find_in_workspaces = later
 
 
 @functools.cache
-def _search():
+def _search() -> Any:
     """The module itself."""
     sys.modules.pop(_SEARCH, None)
-    search = importlib.import_module(_SEARCH)
+    search: Any = importlib.import_module(_SEARCH)
     search.find_packages = remembering(search.find_packages)
     return search
 
 
-def remembering(find, clock=time.monotonic):
+def remembering(find: Callable, clock: Callable[[], float] = time.monotonic) -> Callable:
     """``find(path)``, which counts for some seconds. ``clock()`` [s]: replaceable for tests."""
     found = {}  # {path: (time, result)}
 
@@ -73,7 +77,7 @@ def remembering(find, clock=time.monotonic):
     return find_packages
 
 
-def with_settings_found(configure, rospkg):
+def with_settings_found(configure: Callable, rospkg: Any) -> Callable:
     """rosgraph's ``configure``, without a search for the package rosgraph where the user or the system has settings."""
     @functools.wraps(configure)
     def configure_logging(*args, **kwargs):
@@ -93,11 +97,12 @@ def with_settings_found(configure, rospkg):
     return configure_logging
 
 
-def _import_rosclean():
+def _import_rosclean() -> None:
     names = "distutils", "distutils.spawn"
     if any(name in sys.modules for name in names):
         return
-    package, spawn = (types.ModuleType(name) for name in names)
+    modules: Any = [types.ModuleType(name) for name in names]
+    package, spawn = modules
     spawn.find_executable = shutil.which
     sys.modules.update(zip(names, (package, spawn), strict=True))
     try:

@@ -4,13 +4,16 @@
 rospy writes that only to the node's log file: a program that subscribes with another type or version than the
 publisher's waits for ever without a message.
 """
+from __future__ import annotations
+
 import functools
+from typing import Any
 
 # A publisher with a new answer each time must fill neither memory nor terminal.
 MOST_LINES, LONGEST_REASON = 100, 300
 
 
-def amend(tcpros_base):
+def amend(tcpros_base: Any) -> None:
     """Make the subscribers of rospy.impl.tcpros_base log a publisher's refusal."""
     validate = tcpros_base.TCPROSTransport._validate_header
     told = set()

@@ -8,6 +8,8 @@ ends with a line in the log. One that gets no answer is tried for DEADLINE_S, th
 those that come meanwhile with it. A node that starts before its master still waits for it in its first registration.
 A node that ends takes its leave of the master within ANSWER_S, or goes without.
 """
+from __future__ import annotations
+
 import contextlib
 import functools
 import http.client
@@ -16,6 +18,7 @@ import threading
 import time
 import xml.parsers.expat
 import xmlrpc.client
+from typing import Any
 
 import master_calls
 
@@ -32,7 +35,7 @@ _NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.ProtocolError)
 _silent = threading.Event()
 
 
-def amend(module):
+def amend(module: Any) -> None:
     """Give the registrations of rospy.impl.registration's nodes a deadline, and the question of each subscriber of
     rospy.impl.statistics, whether to keep statistics: it has the locks of all topics meanwhile, too.
     """
@@ -90,14 +93,14 @@ def _amend_registrations(registration):
 class _Registrar:
     """The registrations of one node: those that are late, in their order, and the thread that tries them again."""
 
-    def __init__(self, manager, registration):
+    def __init__(self, manager: Any, registration: Any) -> None:
         self._manager, self._rospy = manager, registration
         self._lock = threading.RLock()  # a signal's handler may run inside
         self._late = []  # of (end of the master's methods, name, type or address of a service)
         self._master, self._is_calling = self._proxy(), threading.Lock()
         self._has_answered = False  # the master, at least once
 
-    def take(self, what):
+    def take(self, what: tuple[str, str, str]) -> None:
         """Register within the deadline, or later; the first one whenever the master comes: what rospy.init_node does
         next would fail without it.
         """
@@ -125,7 +128,7 @@ class _Registrar:
             threading.Thread(target=self._try_again, name="late registrations", daemon=True).start()
             return
 
-    def withdraw(self, method, name, data):
+    def withdraw(self, method: str, name: str, data: str) -> None:
         """Unregister, or forget what is not registered yet."""
         with self._lock:
             late = [what for what in self._late if what[:2] == (method, name)]
@@ -187,7 +190,7 @@ class _Registrar:
         except (*_REFUSALS, *_NO_ANSWER) as error:
             self.say("%s is still registered, the ROS master does not answer: %s" % (ascii(name)[1:-1], error))
 
-    def say(self, line):
+    def say(self, line: str) -> None:
         """Write to the log file and the terminal alone: for a line on /rosout, rospy may ask the master for a parameter
         first, and wait for its answer without end.
         """

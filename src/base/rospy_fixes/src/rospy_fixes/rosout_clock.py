@@ -4,12 +4,15 @@
 It needs none: lines of its log have the stamps of their messages. In simulated time each message of /clock wakes it, at
 500 Hz 2 % of a core, and has to be sent to it.
 """
+from __future__ import annotations
+
 import functools
+from typing import Any
 
 _REMAPPED = ["/clock", "/rosout/no_clock"]
 
 
-def amend(config):
+def amend(config: Any) -> None:
     """Called when roslaunch.config, which reads ROS's roscore.xml, has been loaded."""
     load = config.load_roscore
 

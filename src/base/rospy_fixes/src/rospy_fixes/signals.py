@@ -5,9 +5,13 @@ rospy runs a program's shutdown handlers in its signal handler, so in the thread
 thread was publishing, or calling the master, it holds a lock that is not reentrant; a handler that publishes, or the
 end of the node, waits for it for ever. And a message that is written inside of another one breaks the connection.
 """
+from __future__ import annotations
+
 import functools
 import sys
 import threading
+from collections.abc import Callable
+from typing import Any
 
 # Longest delay of a signal by a call that does not end: a master or a subscriber that has stopped [s, wall].
 LONGEST_S = 1.0
@@ -16,11 +20,11 @@ LONGEST_S = 1.0
 class Postponement:
     """Calls of the main thread that a signal does not interrupt: its handler runs at their end."""
 
-    def __init__(self, longest_s=LONGEST_S):
+    def __init__(self, longest_s: float = LONGEST_S) -> None:
         self._longest_s = longest_s
         self._depth, self._pending = 0, []
 
-    def around(self, call):
+    def around(self, call: Callable) -> Callable:
         """``call``, after which postponed handlers run."""
         @functools.wraps(call)
         def whole(*arguments, **options):
@@ -35,7 +39,7 @@ class Postponement:
                     self._handle()
         return whole
 
-    def of(self, handler):
+    def of(self, handler: Callable) -> Callable:
         """``handler`` of a signal: it runs at once, or at the end of the interrupted call. If that does not end within
         the longest delay, it runs in another thread."""
         @functools.wraps(handler)
@@ -57,11 +61,12 @@ class Postponement:
             handler()
 
 
-def amend(topics):
+def amend(topics: Any) -> None:
     """Make rospy's handler of signals wait for messages and calls of the master that are under way in the main thread.
 
     ``topics``: the module rospy.topics, which has imported the other two.
     """
+    core: Any
     core, registration = sys.modules["rospy.core"], sys.modules["rospy.impl.registration"]
     postponement = Postponement()
     core._ros_signal = postponement.of(core._ros_signal)
