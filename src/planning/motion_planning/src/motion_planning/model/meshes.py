@@ -3,6 +3,7 @@
 
 Triangles are kept on disk. Who finds all of them there starts no process, and loads no libraries: 40 MB and a second.
 """
+import contextlib
 import hashlib
 import os
 import tempfile
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from disk_cache.compiled import folder
+from disk_cache.files import draft_of
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh
 
@@ -87,16 +89,8 @@ def _made(path):
 
 def _keep(mesh, kept):
     """Write a TriangleMesh into the file ``kept``, unless there is no room."""
-    unfinished = None
-    try:
-        # Two processes may make it at once: the file is whole or not there.
-        handle, unfinished = tempfile.mkstemp(dir=kept.parent)
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, vertices=mesh.vertices, triangles=mesh.triangles)
-        os.replace(unfinished, kept)
-    except OSError:
-        if unfinished is not None:
-            Path(unfinished).unlink(missing_ok=True)
+    with contextlib.suppress(OSError), draft_of(kept) as draft:
+        np.savez(draft, vertices=mesh.vertices, triangles=mesh.triangles)
 
 
 def write_triangles(path, target):

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The spheres of all links of a robot, made once from its collision geometry and cached on disk."""
+import contextlib
 import hashlib
-import os
-import tempfile
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from disk_cache.compiled import folder
+from disk_cache.files import draft_of
 from motion_planning.errors import PlanningError
 from motion_planning.exact.geometry import bounds_of
 from motion_planning.shapes import TriangleMesh
@@ -218,17 +218,9 @@ def cached(function, parts, size):
     except (OSError, ValueError, EOFError):
         pass
     made = function(parts, size)
-    unfinished = None
-    try:
-        # Two processes may make it at the same time: the file is written atomically.
-        handle, unfinished = tempfile.mkstemp(dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            np.save(file, made)
-        os.replace(unfinished, path)
-    except OSError:
-        # A cache that cannot be written is ignored; callers can check with ``not_kept``.
-        if unfinished is not None:
-            Path(unfinished).unlink(missing_ok=True)
+    # A cache that cannot be written is ignored; callers can check with ``not_kept``.
+    with contextlib.suppress(OSError), draft_of(path) as draft:
+        np.save(draft, made)
     return made
 
 
