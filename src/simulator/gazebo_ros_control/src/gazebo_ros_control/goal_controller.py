@@ -33,9 +33,18 @@ class GoalController(Controller):
         self._time_s = time_s
         self._server.spin(time_s)
 
-    def _start(self):
-        """Start the controller for a goal, and return None, or why it may not."""
-        return None if self._runs else self._crew.start(self)
+    def _take(self, handle, refusal=None):
+        """Whether a goal is followed from now on, in place of the one before: unless there is a ``refusal``, or the
+        controller may not start; then it is rejected with the reason."""
+        if refusal is None and not self._runs:
+            refusal = self._crew.start(self)
+        if refusal is not None:
+            handle.reject(text=refusal)
+            return False
+        self._end("another goal took its place")
+        handle.accept()
+        self._goal = handle
+        return True
 
     def _end(self, why):
         handle, self._goal = self._goal, None

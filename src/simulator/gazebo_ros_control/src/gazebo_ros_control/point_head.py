@@ -180,13 +180,8 @@ class PointHead(GoalController):
             return
         self._waiting = None
         self._stop_listening()
-        refusal = self._start()
-        if refusal is not None:
-            handle.reject(text=refusal)
+        if not self._take(handle):
             return
-        self._end("another goal took its place")
-        handle.accept()
-        self._goal = handle
         point = wanted.target.point
         self._point = placed[:3] @ (point.x, point.y, point.z, 1.0)
         self._from = self.hardware.position[self._index].copy()

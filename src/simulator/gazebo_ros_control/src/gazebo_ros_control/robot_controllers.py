@@ -114,16 +114,10 @@ class _Gripper(GoalController):
 
     def _on_goal(self, handle):
         command = handle.goal.command
-        if math.isfinite(command.position) and math.isfinite(command.max_effort):
-            refusal = self._start()
-        else:
-            refusal = "position %r and max_effort %r must be finite" % (command.position, command.max_effort)
-        if refusal is not None:
-            handle.reject(text=refusal)
+        is_finite = math.isfinite(command.position) and math.isfinite(command.max_effort)
+        if not self._take(handle, None if is_finite else "position %r and max_effort %r must be finite"
+                          % (command.position, command.max_effort)):
             return
-        self._end("another goal took its place")
-        handle.accept()
-        self._goal = handle
         self._effort = command.max_effort if 0.0 < command.max_effort < self._most_n else self._most_n
         self._target = min(max(command.position, 0.0), self._most_m)
         self._last, self._moved_s = self._opening, self._time_s
