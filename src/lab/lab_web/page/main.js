@@ -206,6 +206,7 @@ async function loadScene(poses) {
     });
     view.setPoses(poses);
     simulation.listObjects(scene.bodies);
+    steering.say();
   } catch (error) {
     // The scene has changed while it was loading; the next poses ask for it again.
     console.info("the scene is loaded again:", error.message);

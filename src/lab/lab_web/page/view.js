@@ -12,8 +12,9 @@ const SHORTEST_MS = 33;
 const SHARE = 0.33;
 // A picture waits that long for an answer that it is to show: without a graphics card, drawing would hold the answer up.
 const LONGEST_WAIT_MS = 50;
-// A link that holds an arm back.
+// A link that holds an arm back: its colour, and what it glows with, since robots may be red themselves.
 const HOLDS = 0xd0342c;
+const GLOWS = 0xff2a4a;
 // Where a hand would be: reached, and the nearest posture of one that is not.
 const GHOST = {true: 0x2f9e64, false: 0xd0342c};
 const GHOST_OPACITY = 0.5;
@@ -112,10 +113,14 @@ export class View {
   mark(names) {
     const wanted = new Set(names.flatMap((name) => this.named.get(name) ?? []));
     if (wanted.size === this.marked.size && [...wanted].every((number) => this.marked.has(number))) return;
-    for (const own of this.marked.values()) own.forEach(([material, colour]) => material.color.copy(colour));
+    for (const own of this.marked.values()) own.forEach(([material, colour]) => {
+      material.color.copy(colour);
+      material.emissive.setHex(0);
+    });
     this.marked = new Map([...wanted].map((number) => [number, this.links[number].children.map(({material}) => {
       const own = material.color.clone();
       material.color.setHex(HOLDS);
+      material.emissive.setHex(GLOWS);
       return [material, own];
     })]));
     this.draw();

@@ -159,6 +159,8 @@ def test_what_holds_the_arm_is_told_beside_the_robot_and_red_on_it(steered, brow
     steered.servos["left"].status, steered.servos["left"].reason = 0, ""
     browser.wait("document.querySelectorAll('#steer-state li.good').length === 2")
     assert browser.evaluate("lab.view.marked.size") == 0
+    assert browser.evaluate("lab.view.links.every((link) => link.children.every(({material}) => "
+                            "material.emissive.getHex() === 0))")
 
 
 def test_without_servos_the_panel_says_what_starts_them(steered, browser):
