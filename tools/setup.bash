@@ -190,6 +190,7 @@ step_pip() {
         run "$VENV/bin/python3" -m pip uninstall -y rospkg
     fi
     if stamp_is "$key"; then
+        link_xacro  # an update may have moved it
         note="all there"
         return
     fi
@@ -198,11 +199,15 @@ step_pip() {
     if [[ $(uname -m) == x86_64 ]]; then wheels_only=(--only-binary :all:); fi
     run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" -r requirements.txt
     run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" --no-deps -r requirements-nodeps.txt
-    # PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
-    if [[ -f src/base/xacro/xacro ]]; then
+    link_xacro
+    stamp "$key"
+}
+
+# PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
+link_xacro() {
+    if [[ -f src/base/xacro/xacro && ! $VENV/bin/xacro -ef src/base/xacro/xacro ]]; then
         run ln -sf ../../src/base/xacro/xacro "$VENV/bin/xacro"
     fi
-    stamp "$key"
 }
 
 # The vendor's meshes come with example-robot-data; copies, so that `catkin_make install` installs files and not links.

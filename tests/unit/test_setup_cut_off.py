@@ -219,6 +219,17 @@ def test_relays_to_scripts_that_are_gone_are_removed(workspace):
     assert sorted(path.name for path in (root / "devel/bin").iterdir()) == ["living", "other"]
 
 
+def test_the_command_xacro_follows_ours_to_another_folder(workspace):
+    root, _ = workspace
+    ours, command = root / "src/base/xacro/xacro", root / ".venv/bin/xacro"
+    ours.write_text("ours")
+    assert finish(start(root))[0] == 0
+    command.unlink()
+    command.symlink_to("../../src/elsewhere/xacro")
+    status, said = finish(start(root))
+    assert status == 0 and command.read_text() == "ours", said
+
+
 def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
     root, _ = workspace
     (root / "theirs.rosinstall").rename(root / "elsewhere")
