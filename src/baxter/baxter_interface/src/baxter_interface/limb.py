@@ -18,6 +18,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from baxter_model import BASE_FRAME, poses
 from baxter_model.readiness import why_not_ready
+from command_line.options import counted
 
 from . import settings, startup
 from .hindrance import ArmHindrance, IgnoredCommands, newest
@@ -32,7 +33,6 @@ from .joint_checks import (
 from .joint_motion import Move, is_far
 from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
-from command_line.options import counted
 
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
