@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A path from a start to one of some goals: found with spheres, and always checked by exact geometry."""
+import itertools
 import math
 import threading
 import time
@@ -213,7 +214,7 @@ class _Planning:
                 if not error.spent:
                     raise
                 self._note("search")
-                outwards, inwards = self._ways(start, goals, run)
+                outwards, inwards = self._ways(start, goals, run, with_room=True)
                 samples, seed = 1.5 * samples, seed + 1
                 continue
             self._note("search")
@@ -248,13 +249,13 @@ class _Planning:
         finally:
             self._note("improve")
 
-    def _ways(self, start, goals, run):
+    def _ways(self, start, goals, run, with_room=False):
         """(way from the start to where spheres are free, ways from there to the goals); goals without one are left
-        out."""
-        outwards, inwards = self._way_out(start, run), []
+        out. with_room: see ``_way_out``."""
+        outwards, inwards = self._way_out(start, run, with_room), []
         for last, goal in enumerate(goals, 1 - len(goals)):
             try:
-                inwards.append(self._way_out(goal, run)[::-1])
+                inwards.append(self._way_out(goal, run, with_room)[::-1])
             except NoPath as error:
                 if error.stopped or last == 0 and not inwards:
                     raise
@@ -267,8 +268,9 @@ class _Planning:
             return two_parts(checker, self.bounds, start, goals, run, REACH)
         return self.search.planner(checker, self.bounds, start, goals, run)
 
-    def _way_out(self, q, run):
-        """Points (m, k) from ``q``, free by exact geometry, to one that is free by spheres and has room around it."""
+    def _way_out(self, q, run, with_room=False):
+        """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres; with_room: to the one
+        of several with the most room around it, and on to where there is more."""
         if self.checker.valid(q)[0]:
             return np.array([q])
         nodes, parents = [q], [-1]
@@ -280,9 +282,11 @@ class _Planning:
             # The shortest steps that lead out, else one that leads further.
             order = np.argsort(np.linalg.norm(some - nodes[parent], axis=1))
             outside = [some[k] for k in order if free[k]]
-            ways = [one for one in outside[:_WAYS_OUT] if self._edge_is_free(nodes[parent], one)]
+            found = (one for one in outside[:_WAYS_OUT] if self._edge_is_free(nodes[parent], one))
+            ways = list(found if with_room else itertools.islice(found, 1))
             if ways:
-                return np.concatenate([self._traced(nodes, parents, parent)[::-1], self._to_room(ways)])
+                return np.concatenate([self._traced(nodes, parents, parent)[::-1],
+                                       self._to_room(ways) if with_room else ways])
             for one in some[order][~free[order]][:1]:
                 if self._edge_is_free(nodes[parent], one):
                     nodes.append(one)

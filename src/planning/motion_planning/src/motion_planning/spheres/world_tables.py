@@ -8,6 +8,7 @@ import numpy as np
 
 from motion_planning.shapes import Cone, Octree, TriangleMesh
 from motion_planning.spheres import kernel
+from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.sphere_model import Boxes, Patience, box_around, boxes_of
 from urdf_model import Box, Cylinder, Plane, Sphere
 
@@ -152,28 +153,37 @@ def tree_of(solids):
     """Return the Tree over Solids: halves of the order in which a space-filling curve meets them, one object a leaf."""
     count = len(solids.kinds)
     order = _along_curve(0.5 * (solids.low + solids.high))
-    low, high = solids.low[order], solids.high[order]
-    # A branch is (first, last + 1 object, number of its node); what is below it has the numbers that follow.
-    first, last, number = np.array([0]), np.array([count]), np.array([0])
     links = np.empty((max(0, 2 * count - 1), 2), np.int32)
     nodes = np.empty((len(links), 6), np.float32)
-    levels = []
-    while len(first) and count:
-        size = last - first
-        links[number, 0] = number + 2 * size - 1
-        leaf = size == 1
-        links[number, 1] = np.where(leaf, first, -1)
-        levels.append((number[~leaf], size[~leaf]))
-        nodes[number[leaf]] = np.concatenate([low[first[leaf]] - _ROUNDING, high[first[leaf]] + _ROUNDING], axis=1)
-        first, last, number, size = first[~leaf], last[~leaf], number[~leaf], size[~leaf]
-        middle = first + size // 2
-        first, last, number = (np.concatenate([first, middle]), np.concatenate([middle, last]),
-                               np.concatenate([number + 1, number + 2 * (size // 2)]))
-    for number, size in reversed(levels):
-        one, other = nodes[number + 1], nodes[number + 2 * (size // 2)]
-        nodes[number, :3] = np.minimum(one[:, :3], other[:, :3])
-        nodes[number, 3:] = np.maximum(one[:, 3:], other[:, 3:])
+    _fill_tree(np.concatenate([solids.low[order] - _ROUNDING, solids.high[order] + _ROUNDING], axis=1).astype(
+        np.float32), links, nodes)
     return Tree(links, nodes, solids.kinds[order], solids.numbers[order])
+
+
+@compiled
+def _fill_tree(boxes, links, nodes):
+    """Write the tree over ``boxes`` (n, 6) float32: what is below a node has the numbers that follow."""
+    waiting = np.empty((64, 3), np.int64)  # (first, last + 1 object, number of the node)
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, boxes.shape[0], 0
+    count = min(1, boxes.shape[0])
+    while count:
+        count -= 1
+        first, last, number = waiting[count, 0], waiting[count, 1], waiting[count, 2]
+        size = last - first
+        links[number, 0], links[number, 1] = number + 2 * size - 1, first if size == 1 else -1
+        if size == 1:
+            nodes[number] = boxes[first]
+            continue
+        middle = first + size // 2
+        waiting[count, 0], waiting[count, 1], waiting[count, 2] = middle, last, number + 2 * (size // 2)
+        waiting[count + 1, 0], waiting[count + 1, 1], waiting[count + 1, 2] = first, middle, number + 1
+        count += 2
+    for number in range(links.shape[0] - 1, -1, -1):  # what is below comes first
+        if links[number, 1] < 0:
+            other = links[number + 1, 0]
+            for axis in range(3):
+                nodes[number, axis] = min(nodes[number + 1, axis], nodes[other, axis])
+                nodes[number, 3 + axis] = max(nodes[number + 1, 3 + axis], nodes[other, 3 + axis])
 
 
 def _along_curve(points):
