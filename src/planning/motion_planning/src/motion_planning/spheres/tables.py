@@ -152,8 +152,8 @@ def _with_tests(robot, stills, places):
     cluster = cluster[order]
     joints, *rest, skips, joint_branch = robot.arrays
     numbers = np.arange(max(joint_branch, default=-1) + 1)
-    ends = [np.searchsorted(keys, numbers, side) for keys in (joint_branch, branch, branch[cluster])
-            for side in ("left", "right")]
+    ends = [end for keys in (joint_branch, branch, branch[cluster])
+            for end in (np.searchsorted(keys, numbers), np.searchsorted(keys, numbers, "right"))]
     return (joints, *rest, robot.pairs, np.column_stack([cluster, *(end[order] for end in place)]).astype(
         np.int32).ravel(), np.column_stack(ends).astype(np.int32).ravel(), skips, *robot.maps)
 
