@@ -14,9 +14,9 @@ from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import Joy
 
 from baxter_interface import Limb, RobotEnable
+from baxter_model import SIDES
 from lab_testing.waiting import stretched, wait_until
 
-SIDES = ("left", "right")
 RATE_HZ = 50.0
 AT_REST = 0.01  # [rad/s]
 #: Of the servo, and what the way of the messages takes in real time [s].
