@@ -16,7 +16,7 @@ from world_window.viewer import Viewer
 
 SECONDS = 10.0
 SIZE = (1000, 700)
-LEAST_RATE = 20.0
+MIN_RATE = 20.0
 _WAIT_S = 120.0
 
 
@@ -39,7 +39,7 @@ def measure(report, quick, number):
             run(writer, joints, stretch_rad, lambda wall=wall: time.monotonic() - wall > seconds)
             count, elapsed, used = len(drawn) - before, time.monotonic() - wall, time.process_time() - used
             if stretch_rad:
-                report.add("%d x %d, %s: pictures" % (*SIZE, what), count / elapsed, "Hz", least=LEAST_RATE)
+                report.add("%d x %d, %s: pictures" % (*SIZE, what), count / elapsed, "Hz", least=MIN_RATE)
                 report.add("%d x %d, %s: CPU of a picture" % (*SIZE, what), 1e3 * used / max(count, 1), "ms")
             report.add("%d x %d, %s: CPU" % (*SIZE, what), 100.0 * used / elapsed, "% of a core")
     finally:

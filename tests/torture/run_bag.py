@@ -15,7 +15,7 @@ STILL_RAD = 0.001
 MINUTES = 2.0
 STATES_HZ = 50.0
 # Share of the joint states that must be in the bag; on a busy machine the recorder loses some.
-LEAST_PART = 0.5
+MIN_PART = 0.5
 
 
 def run(options, journal):
@@ -30,7 +30,7 @@ def run(options, journal):
             simulated_s = watch.simulated_s - begin
             end(recorder)
     counts, found = look_into(path)
-    expected = LEAST_PART * STATES_HZ * simulated_s
+    expected = MIN_PART * STATES_HZ * simulated_s
     if counts[STATES] < expected:
         found.append("the bag has %d joint states, at least %.0f were expected" % (counts[STATES], expected))
     if found:

@@ -28,7 +28,7 @@ from rospy_nodes.start import limit_ports
 BATCH = 500
 DEADLINE_S = 60.0
 # Threads that a batch may leave for a moment: of connections that wait for the deadline of their request.
-MOST_THREADS = 800
+MAX_THREADS = 800
 
 
 class Node:
@@ -88,7 +88,7 @@ class Node:
                 found.append("a good %s fails: %s: %s" % (what, type(error).__name__, error))
         if (faults := self.faults.summary()) is not None:
             found.append("%s %s" % faults)
-        if threading.active_count() > MOST_THREADS:
+        if threading.active_count() > MAX_THREADS:
             found.append("%d threads" % threading.active_count())
         return found
 

@@ -49,8 +49,8 @@ class Scenes:
         self.group = self.model.groups["arm"]
         sphere_model.cached = lambda function, parts, size: function(parts, size)
         if not all_work:
-            sphere_model._MOST_POINTS //= _LESS
-            sphere_model._MOST_BOXES //= _LESS
+            sphere_model._MAX_POINTS //= _LESS
+            sphere_model._MAX_BOXES //= _LESS
             covers.OF_OBJECTS = covers.Bound(*(most // _LESS for most in covers.OF_OBJECTS))
         SphereChecker(self.spheres, self.group, Scene(self.model))
 

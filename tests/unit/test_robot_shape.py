@@ -24,7 +24,7 @@ from world_picture.drawing import DrawingCache
 VIEWS = 40
 NEAR_M, CLOSE_M = 0.05, 0.003
 # Pixels of a hole, of the robot and of a link that fills the picture, where a pixel is half a millimetre.
-MOST_HOLE = 2
+MAX_HOLE = 2
 # The colour of the background, which no link has.
 NOWHERE = (0, 255, 0)
 PINHOLE = Pinhole.from_field_of_view(640, 400, 1.0, NEAR_M, 100.0)
@@ -155,7 +155,7 @@ def judge(name, results):
     assert outline.min() >= 0.99, name
     assert coloured.min() >= 0.99, name
     assert close.min() >= 0.99, name
-    assert hole.max() <= MOST_HOLE, name
+    assert hole.max() <= MAX_HOLE, name
 
 
 def whole_robot(robot, number):

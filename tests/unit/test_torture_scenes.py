@@ -15,7 +15,7 @@ def scenes(monkeypatch):
 
     from motion_planning.spheres import cover, sphere_model
 
-    for module, name in ((sphere_model, "cached"), (sphere_model, "_MOST_POINTS"), (sphere_model, "_MOST_BOXES"),
+    for module, name in ((sphere_model, "cached"), (sphere_model, "_MAX_POINTS"), (sphere_model, "_MAX_BOXES"),
                          (cover, "OF_OBJECTS")):
         monkeypatch.setattr(module, name, getattr(module, name))  # put back afterwards
     yield scenes

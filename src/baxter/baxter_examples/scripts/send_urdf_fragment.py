@@ -15,12 +15,12 @@ from command_line.user_files import PIPE_WAIT_S, read_text
 
 RATE_HZ = 5.0
 # Of a fragment; a whole robot has less.
-MOST_BYTES = 4_000_000
+MAX_BYTES = 4_000_000
 
 
 def send(path, link, joint):
     try:
-        text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
+        text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
         ElementTree.fromstring(text)
     except (OSError, UnicodeDecodeError) as error:
         raise ProgramFailed("%s cannot be read: %s" % (path, getattr(error, "strerror", error))) from error

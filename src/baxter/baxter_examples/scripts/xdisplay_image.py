@@ -14,19 +14,19 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed, run
-from command_line.options import MOST_SECONDS, number
+from command_line.options import MAX_SECONDS, number
 from command_line.user_files import PIPE_WAIT_S, check_picture, read_file
 
 # A latched picture disappears with its publisher: time for new subscribers to receive it [s].
 HAND_OVER_S = 1.0
 # Of a picture; the screen has 614,400 pixels.
-MOST_BYTES, MOST_PIXELS = 100_000_000, 64_000_000
+MAX_BYTES, MAX_PIXELS = 100_000_000, 64_000_000
 
 
 def show(path, delay_s):
     try:
-        content = read_file(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
-        check_picture(content, MOST_PIXELS)
+        content = read_file(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
+        check_picture(content, MAX_PIXELS)
     except OSError as error:
         raise ProgramFailed("%s: %s" % (path, error.strerror)) from error
     picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
@@ -42,7 +42,7 @@ def show(path, delay_s):
 def main():
     parser = new_parser(__doc__)
     add_file(parser, "the picture's file")
-    parser.add_argument("-d", "--delay", type=number(float, 0, MOST_SECONDS), default=0.0, metavar="SECONDS",
+    parser.add_argument("-d", "--delay", type=number(float, 0, MAX_SECONDS), default=0.0, metavar="SECONDS",
                         help="wait before (default: 0)")
     arguments = parse(parser)
     return run("rsdk_xdisplay_image", lambda: show(pathlib.Path(arguments.file), arguments.delay), anonymous=True)

@@ -6,7 +6,7 @@ import {text} from "./texts.js";
 
 const DRAW_MS = 100;
 const PERIOD_MS = 50;
-const MOST_FIELDS = 200;
+const MAX_FIELDS = 200;
 // Messages whose numbers are pictures or clouds.
 const LARGE = ["sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2", "sensor_msgs/PointCloud",
                "nav_msgs/OccupancyGrid"];
@@ -18,7 +18,7 @@ export function numbersIn(message, path = "", found = [], names = []) {
   for (const [key, value] of Object.entries(message)) {
     const label = !Array.isArray(message) ? (path ? `${path}.${key}` : key)
       : `${path}[${names.length === message.length && typeof names[key] === "string" ? names[key] : key}]`;
-    if (found.length >= MOST_FIELDS) break;
+    if (found.length >= MAX_FIELDS) break;
     if (typeof value === "number" || typeof value === "boolean") found.push([label, Number(value)]);
     else if (value !== null && typeof value === "object" && label !== "header") numbersIn(value, label, found, here);
   }

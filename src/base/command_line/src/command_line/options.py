@@ -9,11 +9,11 @@ import math
 from collections.abc import Callable, Iterable
 
 #: Longest time that a program is told to wait or to run [s], thirty years; Python's own limit ends in a traceback.
-MOST_SECONDS = 1e9
+MAX_SECONDS = 1e9
 #: Most processes at a time.
-MOST_WORKERS = 1000
+MAX_WORKERS = 1000
 #: Largest seed or serial number, as tables of results have room for.
-MOST_SEED = 2**63 - 1
+MAX_SEED = 2**63 - 1
 
 
 def number(kind: type, least: float, most: float, *, above: bool = False) -> Callable[[str], float]:
@@ -36,7 +36,7 @@ def number(kind: type, least: float, most: float, *, above: bool = False) -> Cal
 
 def seconds(least: float = 0.0) -> Callable[[str], float]:
     """As :func:`number`: a time [s] above ``least``."""
-    return number(float, least, MOST_SECONDS, above=True)
+    return number(float, least, MAX_SECONDS, above=True)
 
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:

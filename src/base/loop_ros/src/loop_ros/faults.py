@@ -15,7 +15,7 @@ LINE_PERIOD_S = 5.0
 # Longest text of an error, in a log line and in /diagnostics [characters].
 _TEXT_CHARACTERS = 300
 # Largest number of places. Topics and services are few; when there are more, the oldest place is dropped.
-_MOST_PLACES = 200
+_MAX_PLACES = 200
 
 
 class Fault:
@@ -48,7 +48,7 @@ class Faults:
         fault = self.places.get(place)
         if fault is None:
             fault = self.places[place] = Fault()
-            if len(self.places) > _MOST_PLACES:
+            if len(self.places) > _MAX_PLACES:
                 with contextlib.suppress(KeyError, StopIteration, RuntimeError):  # another thread has logged it
                     del self.places[next(iter(self.places))]
         fault.count += 1

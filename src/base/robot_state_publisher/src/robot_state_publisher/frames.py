@@ -13,7 +13,7 @@ _STAMPED = "III"  # sequence, seconds, nanoseconds
 _POSE = "7d"  # translation, quaternion x y z w
 # Sets of joints that are remembered: a robot has few, and a publisher of other names in each message must not fill the
 # memory.
-_MOST_SETS = 8
+_MAX_SETS = 8
 # States of several publishers may arrive out of order; an older one than that is of a clock that was reset [ns].
 _DISORDER_NS = 100_000_000
 
@@ -134,7 +134,7 @@ class Due:
 
 
 def _remembered(table, names, value):
-    if names not in table and len(table) >= _MOST_SETS:
+    if names not in table and len(table) >= _MAX_SETS:
         table.clear()
     table[names] = value
     return value

@@ -10,7 +10,7 @@ import functools
 from typing import Any
 
 # A publisher with a new answer each time must fill neither memory nor terminal.
-MOST_LINES, LONGEST_REASON = 100, 300
+MAX_LINES, LONGEST_REASON = 100, 300
 
 
 def amend(tcpros_base: Any) -> None:
@@ -26,7 +26,7 @@ def amend(tcpros_base: Any) -> None:
         reason = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in reason)
         is_service = self.protocol.direction == tcpros_base.BIDIRECTIONAL
         key = (self.name, self.endpoint_id, reason)
-        if reason and not is_service and key not in told and len(told) < MOST_LINES:
+        if reason and not is_service and key not in told and len(told) < MAX_LINES:
             told.add(key)
             tcpros_base.logerr("%s: no data from %s, which answers: %s", self.name, self.endpoint_id, reason)
         return validate(self, header)

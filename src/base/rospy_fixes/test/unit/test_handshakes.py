@@ -11,7 +11,7 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from rospy_fixes.ports import handshakes, limits
-from rospy_fixes.ports.event_log import MOST_KINDS, PERIOD_S, EventLog
+from rospy_fixes.ports.event_log import MAX_KINDS, PERIOD_S, EventLog
 from rospy_fixes.ports.handshakes import HandshakeServer
 from rospy_fixes.ports.tcpros_server import LONGEST_REASON, connection_handler
 from rospy_fixes.ports.threads import ThreadFaults
@@ -271,9 +271,9 @@ def test_a_client_that_does_not_read_its_long_refusal_holds_up_nobody(scene):
 
 def test_kinds_of_events_that_others_can_invent_are_forgotten():
     log = EventLog([].append)
-    for number in range(3 * MOST_KINDS):
+    for number in range(3 * MAX_KINDS):
         log.add(("refused", number), "refused")
-    assert len(log._kinds) <= MOST_KINDS
+    assert len(log._kinds) <= MAX_KINDS
 
 
 def test_one_kind_of_event_costs_one_line_a_minute_with_their_number():

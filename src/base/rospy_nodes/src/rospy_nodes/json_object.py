@@ -11,7 +11,7 @@ from typing import Any
 
 LONGEST = 10000  # characters of a text; the robot's longest is about 100
 DEEPEST = 8  # objects and lists within each other; a tool.s weight takes six
-MOST_DIGITS = 18  # of an integer: what 64 bits hold
+MAX_DIGITS = 18  # of an integer: what 64 bits hold
 LARGEST = 1e15  # magnitude of a number
 SHOWN = 100  # characters of a text that an error quotes
 
@@ -55,8 +55,8 @@ def _fault(text: str) -> str:
 
 
 def _integer(digits: str) -> int:
-    if len(digits) > MOST_DIGITS + digits.startswith("-"):
-        raise ValueError("an integer of %d digits; at most %d are read" % (len(digits), MOST_DIGITS))
+    if len(digits) > MAX_DIGITS + digits.startswith("-"):
+        raise ValueError("an integer of %d digits; at most %d are read" % (len(digits), MAX_DIGITS))
     return _bounded(int(digits), digits)
 
 

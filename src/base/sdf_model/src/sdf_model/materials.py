@@ -11,7 +11,7 @@ from .lights import colour
 from .ogre_script import parse_materials
 
 # A folder of scripts with more files is not one of a model.
-_MOST_SCRIPTS = 100
+_MAX_SCRIPTS = 100
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class MaterialScripts:
         places = [next(filter(_is_there, self._folders.places(uri, base)), None) for uri in uris]
         places = [place for place in places if place is not None]
         for place in places:
-            scripts = sorted(place.glob("*.material"))[:_MOST_SCRIPTS] if place.is_dir() else [place]
+            scripts = sorted(place.glob("*.material"))[:_MAX_SCRIPTS] if place.is_dir() else [place]
             materials = {}
             for script in scripts:
                 materials.update(self._materials_of(script))

@@ -65,10 +65,10 @@ DAMPING = Bound(0.0, 1e12, "N s/m or N m s/rad", "of joints and contacts: holds 
 FRICTION = Bound(0.0, 1e9, "N or N m", "of a joint: more than any effort overcomes")
 MASS = Bound(0.0, 1e7, "kg", "10000 t. Bullet solves ratios of masses up to some 1e10 in doubles")
 #: Less than a microgram is not a mass: its inverse times a force overflows a double.
-LEAST_MASS_KG = 1e-9
+MIN_MASS_KG = 1e-9
 #: A moving body needs some inertia, or the solver divides by zero: for its mass that of a ball of 1.6 mm radius
 #: (0.4 m r^2), smaller than any part of a robot.
-LEAST_INERTIA_PER_MASS_M2 = 1e-6
+MIN_INERTIA_PER_MASS_M2 = 1e-6
 INERTIA = _either_way(1e12, "kg m^2", "the largest mass on an arm of 300 m")
 SCALE = _either_way(1e6, "", "of a mesh: files in micrometres are the smallest in use")
 GRAVITY = _either_way(1e3, "m/s^2", "four times that of the Sun's surface")

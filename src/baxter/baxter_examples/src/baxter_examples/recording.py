@@ -14,7 +14,7 @@ from command_line.options import counted
 from command_line.user_files import PIPE_WAIT_S, read_text
 
 #: An hour of both arms at 100 Hz has a quarter of it.
-MOST_BYTES = 200_000_000
+MAX_BYTES = 200_000_000
 COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side), side + "_gripper"))]
 
 
@@ -64,7 +64,7 @@ def write_row(stream, values):
 def read(path):
     """Read a recording. Raises BadRecording, OSError."""
     try:
-        text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
+        text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
     except UnicodeDecodeError as error:
         raise BadRecording("%s is no text: %s" % (path, error)) from None
     return parse(io.StringIO(text, newline=""), path)

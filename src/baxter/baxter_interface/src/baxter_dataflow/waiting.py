@@ -32,7 +32,7 @@ class Stopwatch:
 
 
 # A step counts at most as this many periods of the loop or usual steps; the weight of a step in the usual one.
-_MOST_PERIODS, _MOST_USUAL_STEPS, _WEIGHT = 3.0, 2.0, 0.1
+_MAX_PERIODS, _MAX_USUAL_STEPS, _WEIGHT = 3.0, 2.0, 0.1
 
 
 class LoopStopwatch(Stopwatch):
@@ -47,7 +47,7 @@ class LoopStopwatch(Stopwatch):
         self._period_s = self._usual_s = period_s
 
     def _counted_s(self, step_s):
-        counted_s = min(step_s, max(_MOST_PERIODS * self._period_s, _MOST_USUAL_STEPS * self._usual_s))
+        counted_s = min(step_s, max(_MAX_PERIODS * self._period_s, _MAX_USUAL_STEPS * self._usual_s))
         self._usual_s += _WEIGHT * (counted_s - self._usual_s)
         return counted_s
 

@@ -39,7 +39,7 @@ COMMAND_RATE_HZ = 100.0
 # Shortest time between two log lines for the same reason, where a program repeats its commands [s].
 REPEAT_S = 5.0
 # A commanded speed above this moves an arm [rad/s].
-LEAST_SPEED_RAD_S = 0.02
+MIN_SPEED_RAD_S = 0.02
 IK_TIMEOUT_S = 5.0
 IK_REPORT = "/ExternalTools/%s/PositionKinematicsNode/IKReport"
 
@@ -174,7 +174,7 @@ class Limb:
         """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises the same
         errors."""
         sent = self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
-        self._warn_if_hindered(any(abs(speed) > LEAST_SPEED_RAD_S for speed in sent.values()))
+        self._warn_if_hindered(any(abs(speed) > MIN_SPEED_RAD_S for speed in sent.values()))
 
     def set_joint_torques(self, torques):
         """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises the same

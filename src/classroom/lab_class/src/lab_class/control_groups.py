@@ -29,7 +29,7 @@ _SOCKETS_USED = "memory.kmem.tcp.usage_in_bytes"
 REMOVAL_S = 5.0
 # By version: the file, and the weight of a lab, which is the kernel's default; the largest weight.
 _LAB_WEIGHTS = {1: ("cpu.shares", 1024), 2: ("cpu.weight", 100)}
-_MOST_WEIGHT = {1: 262144, 2: 10000}
+_MAX_WEIGHT = {1: 262144, 2: 10000}
 _DOOR = "front-door"
 _PROBE_S = 10.0
 
@@ -248,7 +248,7 @@ def _weigh(home, labs, problems):
     """The class weighs as much as its labs do together, and the front door DOOR_WEIGHT labs."""
     if "cpu" not in home.controllers:
         return
-    (file, lab), most = _LAB_WEIGHTS[home.version], _MOST_WEIGHT[home.version]
+    (file, lab), most = _LAB_WEIGHTS[home.version], _MAX_WEIGHT[home.version]
     try:
         (home.folder / _DOOR).mkdir(exist_ok=True)
         _write(home.folder / _DOOR / file, min(most, DOOR_WEIGHT * lab))

@@ -10,7 +10,7 @@ import re
 
 from tornado import web
 
-from lab_class.labs import MOST_FAILURES, ClassError, Kind, Role, State, may
+from lab_class.labs import MAX_FAILURES, ClassError, Kind, Role, State, may
 from lab_class.store import StoreError
 from web_bridge import http_text
 from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
@@ -18,7 +18,7 @@ from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
 #: The cookie that opens one lab, for its path alone.
 COOKIE = "lab_token"
 #: Requests and open pages of one lab at a time; a lab, or a page in a loop, must not take the descriptors of all.
-MOST_AT_ONCE = 64
+MAX_AT_ONCE = 64
 #: The waiting page asks again after this time [s].
 _AGAIN_S = 2
 # What an open JupyterLab asks again and again, without its user, beside listings of folders.
@@ -66,7 +66,7 @@ class Door:
         if lab.state is State.STARTING:
             return "The lab is starting. This page opens it as soon as it runs."
         if lab.state is State.FAILED:
-            again = "It starts again." if lab.failures < MOST_FAILURES else "The instructor can start it again."
+            again = "It starts again." if lab.failures < MAX_FAILURES else "The instructor can start it again."
             return "The lab has ended: %s. %s" % (lab.reason, again)
         return "The instructor has stopped this lab."
 
@@ -134,8 +134,8 @@ class Passed(PassingHandler):
         lab = self.door.supervisor.request(self._name)
         if lab.state is not State.RUNNING:
             self._say_wait(lab)
-        elif lab.busy + lab.sockets >= MOST_AT_ONCE:
-            self.refuse(429, "this lab has %d requests and open pages already; close some" % MOST_AT_ONCE)
+        elif lab.busy + lab.sockets >= MAX_AT_ONCE:
+            self.refuse(429, "this lab has %d requests and open pages already; close some" % MAX_AT_ONCE)
         else:
             await self.pass_to(self.door.supervisor.socket_of(self._name), below)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 #: A lab that has not answered after this time has failed [s].
 START_LIMIT_S = 180.0
 #: A lab that fails this often, each time within STEADY_S of its start, waits for the instructor.
-MOST_FAILURES = 3
+MAX_FAILURES = 3
 STEADY_S = 60.0
 #: Where memory is short, labs that nobody has visited give theirs to those with a visitor, one in this time [s].
 HAND_OVER_S = 15.0
@@ -144,7 +144,7 @@ class Labs:
         lab.used = now
         if lab.state is State.PAUSED:
             return self._wake(lab, now)
-        if lab.state is State.FAILED and lab.failures < MOST_FAILURES:
+        if lab.state is State.FAILED and lab.failures < MAX_FAILURES:
             self._enter_line(lab, now)
         lab.asked = lab.state is State.WAITING
         lab.visited = True
@@ -183,7 +183,7 @@ class Labs:
     def exceeded(self, name, reason, now):
         """A lab is over one of its limits: it is ended at once, and the instructor decides."""
         self._fail(self[name], reason, now)
-        self[name].failures = MOST_FAILURES
+        self[name].failures = MAX_FAILURES
         return [(Action.KILL, name)]
 
     def due(self, now, shortage=""):

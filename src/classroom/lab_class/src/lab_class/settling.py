@@ -6,8 +6,8 @@ import contextlib
 from pathlib import Path
 
 #: A lab has settled when, for QUIET_S [s], no process of it has started or ended, and its threads have asked for less
-#: than MOST_DEMAND processors. One that starts asks for more: its programs import their libraries beside each other.
-QUIET_S, MOST_DEMAND = 3.0, 1.0
+#: than MAX_DEMAND processors. One that starts asks for more: its programs import their libraries beside each other.
+QUIET_S, MAX_DEMAND = 3.0, 1.0
 #: A lab whose programs never become quiet counts as settled after this time [s].
 LIMIT_S = 40.0
 
@@ -29,7 +29,7 @@ class Settling:
         is_same = self._since is not None and processes == self._processes
         if is_same and now - self._since < QUIET_S:
             return False
-        if is_same and is_simulating and demand_s - self._demand_s < MOST_DEMAND * (now - self._since):
+        if is_same and is_simulating and demand_s - self._demand_s < MAX_DEMAND * (now - self._since):
             return True
         self._since, self._processes, self._demand_s = now, processes, demand_s
         return False

@@ -9,7 +9,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import front_door
-from lab_class.labs import MOST_FAILURES, Labs, State
+from lab_class.labs import MAX_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
 from rf_checks import roster
 from web_bridge import passing
@@ -180,7 +180,7 @@ def test_a_lab_that_does_not_run_says_what_is_to_come(tmp_path):
             assert (status, "Retry-After: 2" in head, b"it is the next" in body) == (503, True, True)
             body = (await house.ask("/anna/", token=token, Accept="text/html"))[2]
             assert b"refresh" in body and b"Anna &lt;b&gt;" in body
-            lab.state, lab.reason, lab.failures = State.FAILED, "it used 3 GB", MOST_FAILURES
+            lab.state, lab.reason, lab.failures = State.FAILED, "it used 3 GB", MAX_FAILURES
             assert b"it used 3 GB. The instructor can start it again" in (await house.ask("/anna/", token=token))[2]
             # Whoever asks for its WebSocket is told so, too.
             assert (await house.ask("/anna/lab", token=token, **UPGRADE))[0] == 503
@@ -277,7 +277,7 @@ def test_a_lab_that_does_not_read_holds_its_client_up(tmp_path, monkeypatch):
 
 
 def test_slow_uploads_count_from_their_first_byte_to_their_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(front_door, "MOST_AT_ONCE", 3)
+    monkeypatch.setattr(front_door, "MAX_AT_ONCE", 3)
 
     async def upload(reader, writer):
         head = await reader.readuntil(b"\r\n\r\n")
@@ -409,7 +409,7 @@ def test_an_operation_wakes_a_paused_lab_and_a_heartbeat_does_not(tmp_path):
 
 def test_a_lab_has_a_limit_of_connections(tmp_path, monkeypatch):
     """So that one student's pages do not take the descriptors of all."""
-    monkeypatch.setattr(front_door, "MOST_AT_ONCE", 3)
+    monkeypatch.setattr(front_door, "MAX_AT_ONCE", 3)
 
     async def check():
         async with House(tmp_path, echo) as house:

@@ -3,7 +3,7 @@
 import pytest
 
 from lab_class.front_door import kind_of
-from lab_class.labs import MOST_FAILURES, START_LIMIT_S, Action, ClassError, Kind, Labs, Role, State, may
+from lab_class.labs import MAX_FAILURES, START_LIMIT_S, Action, ClassError, Kind, Labs, Role, State, may
 
 IDLE_S = 900.0
 
@@ -119,7 +119,7 @@ def test_no_lab_is_paused_without_a_limit():
 
 
 def test_a_lab_that_ends_starts_again_at_the_next_request_three_times_at_most(labs):
-    for failures in range(1, MOST_FAILURES + 1):
+    for failures in range(1, MAX_FAILURES + 1):
         run(labs, "anna")
         assert labs.ended("anna", "roslaunch has ended", 1.0) == [(Action.END, "anna")]
         assert (labs["anna"].state, labs["anna"].failures) == (State.FAILED, failures)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from lab_class.settling import LIMIT_S, MOST_DEMAND, QUIET_S, Settling, demand_s
+from lab_class.settling import LIMIT_S, MAX_DEMAND, QUIET_S, Settling, demand_s
 from lab_testing.waiting import wait_until
 
 STEP_S = 0.5
@@ -32,7 +32,7 @@ def test_not_before_the_last_process_has_come_or_gone(processes):
 
 
 def test_not_while_its_threads_ask_for_processors():
-    busy = 1.5 * MOST_DEMAND
+    busy = 1.5 * MAX_DEMAND
     found = settles_at(lambda _: {1}, lambda now: busy * min(now, 10.0) + 0.1 * now)
     assert 10.0 <= found <= 10.0 + 2.0 * QUIET_S
 

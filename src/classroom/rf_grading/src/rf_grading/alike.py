@@ -15,11 +15,11 @@ from rf_checks import similarity
 
 WINDOW = 4
 #: A pair is reported if one of both shares this part of its own fingerprints with the other.
-LEAST_SHARE = 0.5
+MIN_SHARE = 0.5
 #: A program with fewer own fingerprints is not compared: short programs are alike without being copied.
-LEAST_OWN = 16
-#: A fingerprint in more of the class than this share, and in more than COMMON_LEAST submissions, is common knowledge.
-COMMON_SHARE, COMMON_LEAST = 0.25, 5
+MIN_OWN = 16
+#: A fingerprint in more of the class than this share, and in more than COMMON_MIN submissions, is common knowledge.
+COMMON_SHARE, COMMON_MIN = 0.25, 5
 _TOKEN = re.compile(r"\w+|[^\w\s]")
 _REMARK = re.compile(r"#.*")
 
@@ -64,7 +64,7 @@ def pairs(texts, handed_out):
     for entry, own in prints.items():
         for one in own:
             owners[one].append(entry)
-    most = max(COMMON_LEAST, COMMON_SHARE * len(texts))
+    most = max(COMMON_MIN, COMMON_SHARE * len(texts))
     common = {one for one, entries in owners.items() if len(entries) > most}
     own_counts = {entry: len(own - common) for entry, own in prints.items()}
     shared = Counter()
@@ -73,8 +73,8 @@ def pairs(texts, handed_out):
             shared.update(combinations(sorted(entries), 2))
     found = [Pair(first, second, count / own_counts[first], count / own_counts[second], count,
                   sorted(texts[first]) == sorted(texts[second]))
-             for (first, second), count in shared.items() if min(own_counts[first], own_counts[second]) >= LEAST_OWN]
-    found = [pair for pair in found if max(pair.of_first, pair.of_second) >= LEAST_SHARE]
+             for (first, second), count in shared.items() if min(own_counts[first], own_counts[second]) >= MIN_OWN]
+    found = [pair for pair in found if max(pair.of_first, pair.of_second) >= MIN_SHARE]
     found += _same(texts, known, {(pair.first, pair.second) for pair in found})
     return sorted(found, key=lambda pair: (-pair.is_same, -max(pair.of_first, pair.of_second), pair.first, pair.second))
 

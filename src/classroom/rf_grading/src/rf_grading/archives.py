@@ -19,16 +19,16 @@ from rf_checks.submission import LARGEST_BYTES
 SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tbz")
 OTHER_SUFFIXES = (".7z", ".rar", ".tar.xz", ".txz", ".tar.zst", ".gz", ".bz2", ".xz")
 #: Most programs of a submission, and their most bytes.
-MOST_FILES, MOST_TAKEN_BYTES = 200, 16 << 20
+MAX_FILES, MAX_TAKEN_BYTES = 200, 16 << 20
 #: Most bytes of an archive inside a submission: students pack their reports and films, too.
-MOST_ARCHIVE_BYTES = 256 << 20
+MAX_ARCHIVE_BYTES = 256 << 20
 # MemoryError: a dictionary of 4 GB for a small file.
 _DAMAGED = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, ValueError, OSError,
             NotImplementedError, RuntimeError, UnicodeError, MemoryError)
 # Entries of a tar file that describe the next one, such as a long name; tarfile reads them whole.
 _DESCRIPTIONS = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE, tarfile.GNUTYPE_LONGNAME,
                  tarfile.GNUTYPE_LONGLINK)
-_MOST_DESCRIPTION_BYTES = 1 << 20
+_MAX_DESCRIPTION_BYTES = 1 << 20
 # Of a zip file's list for each of its entries, with a long path.
 _LISTED_BYTES = 512
 _UTF8_FLAG, _ENCRYPTED_FLAG = 0x800, 0x1
@@ -46,7 +46,7 @@ class Bounds:
     taken_bytes: int
 
 
-OF_A_STUDENT = Bounds(10_000, 1 << 30, MOST_FILES, MOST_TAKEN_BYTES)
+OF_A_STUDENT = Bounds(10_000, 1 << 30, MAX_FILES, MAX_TAKEN_BYTES)
 #: The export of a whole class: a thousand submissions.
 OF_A_CLASS = Bounds(500_000, 32 << 30, 50_000, 1 << 30)
 
@@ -79,8 +79,8 @@ def is_litter(name):
 def most_bytes(name):
     """How large a file of this name may be. Notebooks hold pictures, which are not judged."""
     if is_archive(name):
-        return MOST_ARCHIVE_BYTES
-    return MOST_TAKEN_BYTES if name.lower().endswith(".ipynb") else LARGEST_BYTES
+        return MAX_ARCHIVE_BYTES
+    return MAX_TAKEN_BYTES if name.lower().endswith(".ipynb") else LARGEST_BYTES
 
 
 def safe_name(name):
@@ -223,7 +223,7 @@ class _TarInfo(tarfile.TarInfo):
     @classmethod
     def frombuf(cls, buf, encoding, errors):
         info = super().frombuf(buf, encoding, errors)
-        if info.type in _DESCRIPTIONS and info.size > _MOST_DESCRIPTION_BYTES:
+        if info.type in _DESCRIPTIONS and info.size > _MAX_DESCRIPTION_BYTES:
             raise BadArchive("holds a file name or attributes of %d bytes" % info.size)
         return info
 

@@ -10,7 +10,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from command_line.options import MOST_SEED, MOST_WORKERS, counted, number, seconds
+from command_line.options import MAX_SEED, MAX_WORKERS, counted, number, seconds
 from command_line.user_files import read_file
 from disk_cache.files import remove_drafts
 from lab_batch import JobError, Spec
@@ -55,12 +55,12 @@ def _parser():
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="for results and pages (default: FOLDER-graded)")
     parser.add_argument("--assignment", default="", metavar="NAME",
                         help="nbgrader's: only STUDENT/NAME is read; also the name in the results")
-    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
+    parser.add_argument("--seed", type=number(int, 0, MAX_SEED), default=0,
                         help="of start postures and goals (default: %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim", help="as in check (default: %(default)s)")
-    parser.add_argument("--serial", type=number(int, 0, MOST_SEED), default=0,
+    parser.add_argument("--serial", type=number(int, 0, MAX_SEED), default=0,
                         help="as in check (default: %(default)s)")
-    parser.add_argument("--workers", type=number(int, 1, MOST_WORKERS), metavar="N",
+    parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), metavar="N",
                         help="judges at a time (default: one for each processor, as far as memory lasts)")
     parser.add_argument("--wall-limit", type=seconds(), default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up a check ungraded after so long (default: %(default)g)")

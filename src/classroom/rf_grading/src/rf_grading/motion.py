@@ -5,7 +5,7 @@ from baxter_model import SIDES
 #: Links of an arm that are drawn, from shoulder to hand.
 LINKS = ("upper_shoulder", "upper_elbow", "upper_forearm", "wrist", "gripper")
 #: Most moments of a run that are kept.
-MOST_FRAMES = 60
+MAX_FRAMES = 60
 
 
 def of_run(recording, robot):
@@ -16,7 +16,7 @@ def of_run(recording, robot):
     count = len(recording.records)
     if not count:
         return {}
-    rows = sorted({round(k * (count - 1) / max(1, MOST_FRAMES - 1)) for k in range(MOST_FRAMES)})
+    rows = sorted({round(k * (count - 1) / max(1, MAX_FRAMES - 1)) for k in range(MAX_FRAMES)})
     start = recording.records[0]["t"]
     found = {"times": [round(recording.records[row]["t"] - start, 2) for row in rows]}
     for side in SIDES:

@@ -19,9 +19,9 @@ from rf_grading import archives, reading
 #: What a submission may bring.
 PROGRAMS = (".py", ".ipynb")
 _GRADESCOPE = "submission_metadata.yml"
-_MOST_METADATA_BYTES = 20 << 20
+_MAX_METADATA_BYTES = 20 << 20
 #: Of an entry's name; folders have at most 255, and a number may follow.
-_MOST_NAME_BYTES = 240
+_MAX_NAME_BYTES = 240
 #: Folders in each other: os.walk cannot follow a thousand.
 _DEEPEST = 30
 #: "Li Na_123456_assignsubmission_file_" and what follows: a folder of Moodle's, or a file of its flat form.
@@ -134,8 +134,8 @@ def _sort_in(top, name, collected, left_out, exercise_names):
 
 def _shortened(entry):
     """A name that a folder can have, also with a number behind it."""
-    return os.fsencode(entry)[:_MOST_NAME_BYTES].decode(errors="ignore") if (
-        len(os.fsencode(entry)) > _MOST_NAME_BYTES) else entry
+    return os.fsencode(entry)[:_MAX_NAME_BYTES].decode(errors="ignore") if (
+        len(os.fsencode(entry)) > _MAX_NAME_BYTES) else entry
 
 
 def _without_exercise(stem, exercise_names):
@@ -166,9 +166,9 @@ def _unpacked(files, others):
 
 def _limit(files):
     """Raises BadSubmission where {path: bytes} of programs are too many or too large."""
-    if len(files) > archives.MOST_FILES or sum(map(len, files.values())) > archives.MOST_TAKEN_BYTES:
+    if len(files) > archives.MAX_FILES or sum(map(len, files.values())) > archives.MAX_TAKEN_BYTES:
         raise files_of_programs.BadSubmission("the submission holds more than %d programs, or %d MiB of them" % (
-            archives.MOST_FILES, archives.MOST_TAKEN_BYTES >> 20))
+            archives.MAX_FILES, archives.MAX_TAKEN_BYTES >> 20))
 
 
 def _finish(one, assignment):
@@ -220,7 +220,7 @@ class _Folder:
 
     def text(self, name):
         path = self._path / name
-        if path.is_symlink() or not path.is_file() or path.stat().st_size > _MOST_METADATA_BYTES:
+        if path.is_symlink() or not path.is_file() or path.stat().st_size > _MAX_METADATA_BYTES:
             return ""
         return path.read_text(encoding="utf-8", errors="replace")
 
@@ -262,18 +262,18 @@ def _walk(top):
                 else:
                     others.append(relative)
         _limit(files)
-        if sum(map(len, packed.values())) > archives.MOST_ARCHIVE_BYTES:
+        if sum(map(len, packed.values())) > archives.MAX_ARCHIVE_BYTES:
             raise files_of_programs.BadSubmission("the submission holds archives of more than %d MiB" % (
-                archives.MOST_ARCHIVE_BYTES >> 20))
+                archives.MAX_ARCHIVE_BYTES >> 20))
         below.sort()
     return {**files, **packed}, others
 
 
 def _content(path, relative):
     if archives.is_archive(path.name):
-        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > archives.MOST_ARCHIVE_BYTES:
+        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > archives.MAX_ARCHIVE_BYTES:
             raise files_of_programs.BadSubmission("%s is no archive of at most %d MiB" % (
-                relative, archives.MOST_ARCHIVE_BYTES >> 20))
+                relative, archives.MAX_ARCHIVE_BYTES >> 20))
         return path.read_bytes()
     try:
         return files_of_programs.read(path, archives.most_bytes(path.name))

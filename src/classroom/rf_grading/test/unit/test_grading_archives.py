@@ -72,7 +72,7 @@ def test_paths_that_lead_out_are_refused(name):
     (tarred([("a.py", b"")], kind=tarfile.FIFOTYPE), "x.tgz", "not a file"),
     (zipped([("a.py", b"1"), ("./a.py", b"2")]), "x.zip", "two files named a.py"),
     (zipped([("a.py", b"#" * (2 << 20))]), "x.zip", "a.py with more than"),
-    (zipped([("%d.py" % k, b"") for k in range(archives.MOST_FILES + 1)]), "x.zip", "more than 200 programs"),
+    (zipped([("%d.py" % k, b"") for k in range(archives.MAX_FILES + 1)]), "x.zip", "more than 200 programs"),
 ])
 def test_other_archives_are_refused_with_a_sentence(content, name, said):
     with pytest.raises(archives.BadArchive, match=said):

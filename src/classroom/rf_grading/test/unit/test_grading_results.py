@@ -199,7 +199,7 @@ class FakeRecording:
 
 def test_the_picture_moves_from_the_first_to_the_last_record():
     found = motion.of_run(FakeRecording(1000), FakeRobot())
-    assert len(found["times"]) == motion.MOST_FRAMES
+    assert len(found["times"]) == motion.MAX_FRAMES
     assert (found["times"][0], found["times"][-1]) == (0.0, 9.99)
     assert found["left"][0][0] == [0, 0, 500] and found["left"][-1][-1] == [400, 999, 500]
     root = ElementTree.fromstring(drawing.of_run(found))

@@ -5,7 +5,7 @@ import sys
 import rospy
 
 import baxter_interface.startup
-from command_line.options import MOST_SECONDS, number
+from command_line.options import MAX_SECONDS, number
 
 from .move_service import REFUSALS
 from .traj_client import MoveFailed, TrajClient
@@ -13,7 +13,7 @@ from .traj_client import MoveFailed, TrajClient
 
 def add_wait_option(parser, default_s):
     """``--wait SECONDS``; ``default_s`` None: until the move is over."""
-    parser.add_argument("--wait", type=number(float, 0, MOST_SECONDS), default=default_s, metavar="SECONDS",
+    parser.add_argument("--wait", type=number(float, 0, MAX_SECONDS), default=default_s, metavar="SECONDS",
                         help="how long to wait for the result, in the robot's time; the arm moves on in any case "
                              "(default: %s)"
                         % ("until it is there" if default_s is None else "%g" % default_s))

@@ -14,7 +14,7 @@ from .settings import JOINTS, arm_joint_names
 from .timing import arrival_times
 
 #: Of a playfile; the notes' have some kilobytes.
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 _COLUMNS = len(JOINTS) + 1
 
 
@@ -35,7 +35,7 @@ class Playfile(NamedTuple):
     def read(cls, path):
         """Read a file. Raises PlayfileError, OSError."""
         try:
-            text = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S)
+            text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
         except UnicodeDecodeError as error:
             raise PlayfileError("%s is not a text: %s" % (path, error)) from error
         return cls.parse(text, str(path))

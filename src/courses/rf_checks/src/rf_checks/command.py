@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rospkg
 
-from command_line.options import MOST_SEED, did_you_mean, number, seconds
+from command_line.options import MAX_SEED, did_you_mean, number, seconds
 from disk_cache.files import draft_of
 from lab_web import page_files
 from processes import isolation
@@ -64,11 +64,11 @@ def _parser():
     parser.add_argument("--list", action="store_true", help="list the exercises and end")
     parser.add_argument("--start", metavar="EXERCISE",
                         help="copy this exercise's skeleton into the current folder and end")
-    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
+    parser.add_argument("--seed", type=number(int, 0, MAX_SEED), default=0,
                         help="seed of start postures and goals (default: %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
                         help="sim: ideal drives and sensors; robot: a physical robot's (default: %(default)s)")
-    parser.add_argument("--serial", type=number(int, 0, MOST_SEED), default=0,
+    parser.add_argument("--serial", type=number(int, 0, MAX_SEED), default=0,
                         help="which robot: its mounts are its own; 0 is the drawing (default: %(default)s)")
     parser.add_argument("--wall-limit", type=seconds(), default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up ungraded after so long; a slow or busy machine needs more (default: %(default)g)")

@@ -17,7 +17,7 @@ HELPERS_ALLOWANCE_S = 0.4
 #: Time for which waits for a disk delay the world, in a whole run [s, wall]. The kernel shows a thread that waits for a
 #: child's `vfork` in the same way, and that may last for ever.
 DISK_ALLOWANCE_S = 30.0
-_LOOK_AGAIN_S, _LOOK_AGAIN_AT_MOST_S = 0.0002, 0.004
+_LOOK_AGAIN_S, _LOOK_AGAIN_AT_MAX_S = 0.0002, 0.004
 _LOADAVG = "/proc/loadavg"
 
 
@@ -140,7 +140,7 @@ class Watch:
                 program.disk_s += time.monotonic() - began
             program.renew()
             helpers.renew()
-            pause_s = min(1.2 * pause_s, _LOOK_AGAIN_AT_MOST_S)
+            pause_s = min(1.2 * pause_s, _LOOK_AGAIN_AT_MAX_S)
 
     def close(self):
         self.program.close()

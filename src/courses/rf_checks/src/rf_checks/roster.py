@@ -9,7 +9,7 @@ import unicodedata
 from typing import NamedTuple
 
 #: Students of one class; more is a mistake in the command.
-MOST_STUDENTS = 500
+MAX_STUDENTS = 500
 #: Names that the front door uses itself, and the one that stands for every lab in commands.
 INSTRUCTOR = "instructor"
 RESERVED = (INSTRUCTOR, "class", "all")
@@ -41,8 +41,8 @@ class Student(NamedTuple):
 
 def numbered(count):
     """``count`` students: student-01, student-02, ... Raises RosterError."""
-    if not 1 <= count <= MOST_STUDENTS:
-        raise RosterError("%d students; a class has 1 to %d" % (count, MOST_STUDENTS))
+    if not 1 <= count <= MAX_STUDENTS:
+        raise RosterError("%d students; a class has 1 to %d" % (count, MAX_STUDENTS))
     width = max(2, len(str(count)))
     return [Student("student-%0*d" % (width, number), "Student %d" % number) for number in range(1, count + 1)]
 
@@ -131,8 +131,8 @@ def _students(rows):
                               "name apart" % (seen[name], line, name))
         seen[name] = line
         students.append(Student(name, full_name))
-    if not 1 <= len(students) <= MOST_STUDENTS:
-        raise RosterError("the roster has %d students; a class has 1 to %d" % (len(students), MOST_STUDENTS))
+    if not 1 <= len(students) <= MAX_STUDENTS:
+        raise RosterError("the roster has %d students; a class has 1 to %d" % (len(students), MAX_STUDENTS))
     return students
 
 

@@ -22,7 +22,7 @@ SPAN = 14
 #: A program that shares this part of its own fingerprints, or of a reference's, is reported as a copy.
 COPY_SHARE = 0.5
 #: A program with fewer own fingerprints is not judged.
-LEAST_OWN = 40
+MIN_OWN = 40
 #: Calls that run code which is not in the program, with their modules.
 _OPAQUE = {"": ("exec", "eval", "compile", "__import__"), "runpy": ("run_path", "run_module"),
            "importlib": ("import_module",), "util": ("spec_from_file_location",), "machinery": ("SourceFileLoader",),
@@ -161,12 +161,12 @@ def compare(text, references, handed_out):
     """
     common = frozenset().union(*map(fingerprints, handed_out))
     own = fingerprints(text) - common
-    if len(own) < LEAST_OWN:
+    if len(own) < MIN_OWN:
         return []
     found = []
     for name, reference in references.items():
         theirs = fingerprints(reference) - common
-        if len(theirs) >= LEAST_OWN:
+        if len(theirs) >= MIN_OWN:
             both = len(own & theirs)
             found.append(Likeness(name, both / len(own), both / len(theirs)))
     return sorted(found, key=lambda one: max(one.of_program, one.of_reference), reverse=True)

@@ -8,7 +8,7 @@ import tokenize
 from pathlib import Path
 
 #: Largest size of a program [bytes, files].
-LARGEST_BYTES, MOST_FILES = 1 << 20, 50
+LARGEST_BYTES, MAX_FILES = 1 << 20, 50
 
 
 class BadSubmission(Exception):
@@ -48,8 +48,8 @@ def files(program):
                 relative = str(path.relative_to(folder))
                 if relative in found or path.is_symlink() or not path.is_file():
                     continue
-                if len(found) >= MOST_FILES:
-                    raise BadSubmission("%s imports more than %d files beside it" % (program, MOST_FILES))
+                if len(found) >= MAX_FILES:
+                    raise BadSubmission("%s imports more than %d files beside it" % (program, MAX_FILES))
                 found[relative] = read(path)
                 to_read.append(relative)
     return found

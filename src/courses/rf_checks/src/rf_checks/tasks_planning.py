@@ -23,7 +23,7 @@ _BEGIN_RAD, _SPREAD_RAD = -0.9, 0.08
 # A box in the scene is right if it reaches so far within the pillar and so far beyond it on each side [m].
 WITHIN_M, BEYOND_M = 0.005, 0.06
 #: Different boxes that a program may tell move_group of; with more of them it has not said where the pillar stands.
-MOST_BOXES = 10
+MAX_BOXES = 10
 # Edges that are all this share of the true ones are half sizes.
 _HALF, _HALF_TOLERANCE = 0.5, 0.05
 
@@ -93,7 +93,7 @@ class PlanAround:
 
     @staticmethod
     def _knows(pillar, told):
-        return len(told) <= MOST_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
+        return len(told) <= MAX_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
 
     def foremost(self, call, run):
         return self._about_scene(call, run) if _touched(run.recording) else None
@@ -119,7 +119,7 @@ class PlanAround:
         if PlanAround._knows(pillar, told):
             return None
         end = "; the arm ran into it" if _touched(run.recording) else ""
-        if len(told) > MOST_BOXES:
+        if len(told) > MAX_BOXES:
             return Fault("too_many_boxes", "move_group was told of %s%s: one stands there, with the numbers on "
                          "the command line" % (counted(len(told), "box", "boxes"), end))
         if not told:

@@ -26,7 +26,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _METRES = re.compile(r"(%s)\s*m(?:et(?:er|re)s?)?\b" % _NUMBER.pattern)
 _JOINT = re.compile(r"\b(?:left|right)_[sew][0-2]\b")
 #: Numbers of a line that may be the distance: beside it a program prints the angle, and perhaps the verdict's number.
-MOST_NUMBERS = 3
+MAX_NUMBERS = 3
 _NOT_ROW = re.compile(r"[^\s\d.,;\[\]()eE+-]")
 
 
@@ -172,7 +172,7 @@ class Unreachable:
             return bool(named) and named <= set(failure.joints)
         numbers = [float(word) for word in _METRES.findall(said) or _NUMBER.findall(said)]
         return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m)
-                   for number in numbers[:MOST_NUMBERS])
+                   for number in numbers[:MAX_NUMBERS])
 
     def slip(self, call, run, robot):
         requests = run.recording.ik_requests()

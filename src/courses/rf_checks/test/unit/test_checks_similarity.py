@@ -61,7 +61,7 @@ def test_programs_of_other_people_are_no_copies(folder):
 
 def test_what_notebooks_show_may_be_used():
     shown = similarity.notebook_code(WORKSPACE / "src/courses/rf_lab2/notebooks/7_waving.ipynb")
-    assert len(similarity.fingerprints(shown)) > similarity.LEAST_OWN
+    assert len(similarity.fingerprints(shown)) > similarity.MIN_OWN
     assert notes(shown) == []
 
 

@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from command_line.options import MOST_SEED, MOST_WORKERS, counted, did_you_mean, number, seconds
+from command_line.options import MAX_SEED, MAX_WORKERS, counted, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
@@ -23,10 +23,10 @@ PROGRESS_S, LINE_S = 0.5, 30.0
 SILENT_S, SILENT_FACTOR = 60.0, 5.0
 BAR_WIDTH = 30
 # Python itself needs the least [GB].
-LEAST_GB, MOST_GB = 0.1, 1e6
-MOST_RECYCLE = 10**9
+MIN_GB, MAX_GB = 0.1, 1e6
+MAX_RECYCLE = 10**9
 # Most seeds of one batch, whose results are held in memory.
-MOST_SEEDS = 10_000_000
+MAX_SEEDS = 10_000_000
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 
@@ -38,16 +38,16 @@ def seeds_of(text):
             first, colon, last = part.partition(":")
             first = int(first or 0) if colon else int(first)
             last = int(last) if colon else first + 1
-            if not 0 <= first < last <= MOST_SEED + 1:
+            if not 0 <= first < last <= MAX_SEED + 1:
                 raise ValueError
             count += last - first
             parts.append(range(first, last))
     except ValueError:
         raise argparse.ArgumentTypeError("seeds are numbers from 0 to %d, such as 0:1000, 7 or 0:10,20:30, not %.60r"
-                                         % (MOST_SEED, text)) from None
-    if count > MOST_SEEDS:
+                                         % (MAX_SEED, text)) from None
+    if count > MAX_SEEDS:
         raise argparse.ArgumentTypeError("%d seeds are too many for one batch; at most %d are run, so make it several"
-                                         % (count, MOST_SEEDS))
+                                         % (count, MAX_SEEDS))
     return list(dict.fromkeys(seed for part in parts for seed in part))
 
 
@@ -75,13 +75,13 @@ def parse(argv):
                         help="a parameter of the job; may be repeated")
     parser.add_argument("--engine", choices=ENGINES, default="processes", help="default: processes of this machine")
     parser.add_argument("--address", metavar="HOST:PORT", help="the head of a Ray cluster; without it Ray runs here")
-    parser.add_argument("--workers", type=number(int, 1, MOST_WORKERS), default=os.cpu_count(), metavar="N",
+    parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count(), metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
     parser.add_argument("--time-limit", type=seconds(), metavar="S", help="longest wall time of an episode")
-    parser.add_argument("--memory", type=number(float, LEAST_GB, MOST_GB), metavar="GB",
+    parser.add_argument("--memory", type=number(float, MIN_GB, MAX_GB), metavar="GB",
                         help="most memory of a worker with all its processes (default: its share of %d %%%% of this "
                              "machine's; on a cluster: no limit but Ray's own)" % (100 * keeping.SHARE))
-    parser.add_argument("--recycle", type=number(int, 1, MOST_RECYCLE), default=200, metavar="N",
+    parser.add_argument("--recycle", type=number(int, 1, MAX_RECYCLE), default=200, metavar="N",
                         help="a worker is replaced after N episodes (default %(default)s)")
     parser.add_argument("--retry-failed", action="store_true", help="also run seeds again that failed before")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: .baxter/batch/JOB.jsonl")

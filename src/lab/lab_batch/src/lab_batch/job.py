@@ -14,7 +14,7 @@ from . import keeping
 # sys.exit() in a job, or in a library that it calls, ends an episode and not its worker.
 _OF_JOBS = (Exception, SystemExit)
 # Of an array of NumPy that becomes a list: all results of a batch are in memory.
-MOST_NUMBERS = 1_000_000
+MAX_NUMBERS = 1_000_000
 
 
 class ResultError(Exception):
@@ -159,9 +159,9 @@ def _plain(name, value):
 
 
 def _of_numpy(value):
-    if getattr(value, "size", 0) > MOST_NUMBERS:
+    if getattr(value, "size", 0) > MAX_NUMBERS:
         raise TypeError("it is an array of %d numbers; the most is %d, so write it to a file and return the file's name"
-                        % (value.size, MOST_NUMBERS))
+                        % (value.size, MAX_NUMBERS))
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError("it has an object of type %s; numbers, texts, None, lists and dictionaries were expected"

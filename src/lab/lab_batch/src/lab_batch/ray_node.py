@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from command_line.options import MOST_WORKERS, number
+from command_line.options import MAX_WORKERS, number
 
 from . import ray_engine
 from .job import JobError
@@ -35,7 +35,7 @@ def parse(argv):
     parser.add_argument("--listen", required=True, metavar="ADDRESS",
                         help="this machine's address in the cluster's network")
     parser.add_argument("--port", type=number(int, 1, 65535), default=PORT, help="of the head (default: %(default)s)")
-    parser.add_argument("--cpus", type=number(int, 0, MOST_WORKERS), default=os.cpu_count(), metavar="N",
+    parser.add_argument("--cpus", type=number(int, 0, MAX_WORKERS), default=os.cpu_count(), metavar="N",
                         help="episodes at a time on this machine (default: one for each processor, %(default)s)")
     return parser.parse_args(argv)
 

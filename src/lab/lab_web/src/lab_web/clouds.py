@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 #: Points of one cloud that a page gets.
-MOST_POINTS = 20000
+MAX_POINTS = 20000
 #: The first number of a frame with points; poses of the scene have their revision there [uint32].
 MARK = 0xFFFFFFFF
 # Of sensor_msgs/PointField.
@@ -20,7 +20,7 @@ class CloudError(Exception):
     """A message that is no cloud with x, y and z; the text says why."""
 
 
-def points_of(message, most=MOST_POINTS):
+def points_of(message, most=MAX_POINTS):
     """(points [m], float32 (n, 3); colours, uint8 (n, 3) red first) of a PointCloud2: every k-th row and column, so
     that at most ``most`` remain, without those that were not measured. Raises CloudError.
     """

@@ -16,7 +16,7 @@ from web_bridge.errors import Refused
 from web_bridge.websocket import BufferedSocket, token_of
 
 #: Pages at a time.
-MOST_PAGES = 100
+MAX_PAGES = 100
 #: An operation of a page is small [bytes].
 _LARGEST_OPERATION = 65536
 #: A file from a page, such as ten minutes of both arms [bytes].
@@ -61,7 +61,7 @@ class Pages:
 
     @property
     def is_full(self):
-        return len(self._sockets) >= MOST_PAGES
+        return len(self._sockets) >= MAX_PAGES
 
     def opened(self, socket):
         self._sockets[socket.number] = socket
@@ -275,7 +275,7 @@ class PageSocket(BufferedSocket):
         self.number = next(self._numbers)
 
     def prepare(self):
-        self.let_in(self._pages.access, self._pages.is_full, MOST_PAGES)
+        self.let_in(self._pages.access, self._pages.is_full, MAX_PAGES)
 
     def open(self, *_):
         self.start_writing(self._pages.loop_thread)

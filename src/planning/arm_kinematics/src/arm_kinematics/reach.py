@@ -22,7 +22,7 @@ PART = 128
 # Of the search. Parts of another number do not belong to the same map.
 _METHOD = 2
 # A million cells take a day. A request for far more is a mistake, and would not fit into memory.
-_MOST_CELLS = 10_000_000
+_MAX_CELLS = 10_000_000
 
 
 class ReachError(KinematicsError):
@@ -53,9 +53,9 @@ class MapSettings:
             raise ReachError("cell, orientations and starts must be positive and finite, got %g m, %d and %d"
                              % (self.cell_m, self.orientations, self.starts))
         cells = math.prod((high - low) / self.cell_m for low, high in zip(self.lower, self.upper, strict=True))
-        if cells > _MOST_CELLS:
+        if cells > _MAX_CELLS:
             raise ReachError("the volume has %.2g cells of %g m, more than %d; take larger cells"
-                             % (cells, self.cell_m, _MOST_CELLS))
+                             % (cells, self.cell_m, _MAX_CELLS))
         if self.tool is not None and not 1e-9 < np.linalg.norm(self.tool) < math.inf:
             raise ReachError("the tool must point somewhere, e.g. 0 0 -1 for down, got %s" % (self.tool,))
 

@@ -16,9 +16,9 @@ from urdf_model.transforms import quaternion_from_matrix
 # Rows that are written to HDF5 at a time.
 _ROWS = 65536
 # Of a map in a file; the largest that reach makes has a tenth of it.
-MOST_BYTES = 2_000_000_000
+MAX_BYTES = 2_000_000_000
 # A capability map has a cone for a cell with at most this share of its orientations, and a sphere for one with more.
-_MOST_IN_CONE = 0.2
+_MAX_IN_CONE = 0.2
 # Reuleaux's measures of a cone: its opening angle is pi divided by one of these.
 _CONES = np.arange(2.0, 10.5, 0.5)
 _CONE, _SPHERE = 1.0, 2.0
@@ -73,7 +73,7 @@ class ReachMap:
         """Return the map in ``path``: reach.npz, or the folder that holds it. Raises ReachError, OSError."""
         path = Path(path)
         path = path / "reach.npz" if path.is_dir() else path
-        check_file(path, MOST_BYTES)
+        check_file(path, MAX_BYTES)
         try:
             with np.load(path) as data:
                 missing = [name for name in _REQUIRED if name not in data]
@@ -173,7 +173,7 @@ class ReachMap:
         reached, centres = reached[some], centres[some]
         rows = np.zeros((len(reached), 10))
         rows[:, 0], rows[:, 1], rows[:, 3:6], rows[:, 9] = _SPHERE, 100.0 * reached.mean(axis=1), centres, 1.0
-        thin = reached.mean(axis=1) <= _MOST_IN_CONE
+        thin = reached.mean(axis=1) <= _MAX_IN_CONE
         reached, directions = reached[thin], self.rotations[:, :, 2]
         axes = reached @ directions
         lengths = np.linalg.norm(axes, axis=1)

@@ -10,7 +10,7 @@ from command_line.options import counted
 from urdf_model.transforms import rigid, rpy_matrix
 
 # Places times poses, and poses of a task: more take minutes and gigabytes.
-_MOST_LOOKUPS, _MOST_POSES = 200_000_000, 100_000
+_MAX_LOOKUPS, _MAX_POSES = 200_000_000, 100_000
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def table_poses(width_m, depth_m, step_m, rotations):
     if not (0.0 < width_m < math.inf and 0.0 < depth_m < math.inf and step_m > 0.0):
         raise ReachError("a table has a positive width and depth, got %g and %g m" % (width_m, depth_m))
     counts = [max(2, math.ceil(size / step_m) + 1) for size in (depth_m, width_m)]
-    if math.prod(counts) * len(rotations) > _MOST_POSES:
+    if math.prod(counts) * len(rotations) > _MAX_POSES:
         raise ReachError("a table of %g by %g m with a point every %g m has %s; take a larger step"
                          % (width_m, depth_m, step_m, counted(math.prod(counts) * len(rotations), "pose")))
     xs, ys = (np.linspace(-0.5 * size, 0.5 * size, count)
@@ -80,7 +80,7 @@ def best_places(reach_map, poses, region, most=10):
     ordered by ``spare``, then as the region has them. Raises ReachError.
     """
     places = math.prod(region.shape) * len(region.yaws)
-    if places * len(poses) > _MOST_LOOKUPS:
+    if places * len(poses) > _MAX_LOOKUPS:
         raise ReachError("%s and %s are too many; take a larger step or a smaller region"
                          % (counted(places, "place"), counted(len(poses), "pose")))
     positions = region.positions()

@@ -19,7 +19,7 @@ _HALVINGS = 8
 _RADIANS_PER_METRE = 3.5
 # Greatest distance of joint values between two calls of ``accept`` [rad or m, in any joint].
 _RESOLUTION = 0.05
-_MOST_STEPS = 20000
+_MAX_STEPS = 20000
 # Least number of points for a meaningful mean step, which the jump threshold multiplies.
 _FEWEST_FOR_JUMPS = 10
 # First a descent from the previous step; then more starts, of which the solution nearest to the previous step counts.
@@ -73,9 +73,9 @@ def cartesian_path(model, group, start, link, waypoints, steps):
     waypoints = [follower.pose(i, waypoint) for i, waypoint in enumerate(waypoints)]
     here = follower.pose_of_link(follower.q)
     pieces = [_pieces(a, b) for a, b in zip([here, *waypoints], waypoints, strict=False)]
-    if len(pieces) > _MOST_STEPS or not sum(pieces) / _MOST_STEPS <= max_step:
+    if len(pieces) > _MAX_STEPS or not sum(pieces) / _MAX_STEPS <= max_step:
         raise CartesianError("%d waypoints over %g m in steps of %g m are too many points, the most is %d; make the "
-                             "steps larger" % (len(pieces), sum(pieces), max_step, _MOST_STEPS))
+                             "steps larger" % (len(pieces), sum(pieces), max_step, _MAX_STEPS))
     # The small subtraction keeps 0.3 / 0.1 from being rounded up to four.
     counts = [max(1, math.ceil(piece / max_step - 1e-6)) for piece in pieces]
     points, done, reason = [follower.q], [0.0], None

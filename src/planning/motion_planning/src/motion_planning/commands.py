@@ -6,7 +6,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from command_line.options import MOST_SEED, number
+from command_line.options import MAX_SEED, number
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
 from motion_planning.exact import ExactChecker
@@ -16,7 +16,7 @@ from motion_planning.srdf import element_of, with_disabled_pairs
 from urdf_model import description_text
 
 # Most random states of an SRDF, which take a day.
-MOST_TRIALS = 10**8
+MAX_TRIALS = 10**8
 
 
 def collisions_updater(arguments=None):
@@ -28,12 +28,12 @@ def collisions_updater(arguments=None):
     parser.add_argument("--srdf", type=Path, required=True, help="SRDF file to be changed; or xacro, with --output")
     parser.add_argument("--output", type=Path, help="file to write in place of --srdf")
     parser.add_argument("--lines", action="store_true", help="print the elements and write nothing")
-    parser.add_argument("--trials", type=number(int, 1, MOST_TRIALS), default=TRIALS,
+    parser.add_argument("--trials", type=number(int, 1, MAX_TRIALS), default=TRIALS,
                         help="random states (default: %(default)s)")
     parser.add_argument("--min-collision-fraction", type=number(float, 0, 1, above=True), default=ALWAYS_SHARE,
                         dest="share",
                         help="share of random states in which what touches always does (default: %(default)s)")
-    parser.add_argument("--seed", type=number(int, 0, MOST_SEED), default=0,
+    parser.add_argument("--seed", type=number(int, 0, MAX_SEED), default=0,
                         help="of the random states (default: %(default)s)")
     options = parser.parse_args(arguments)
     if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:

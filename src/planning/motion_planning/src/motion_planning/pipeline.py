@@ -12,7 +12,7 @@ import numpy as np
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.errors import PlanningError
 from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
-from motion_planning.planners.planning import LEAST_FOR_SCENE_S, SHARE_OF_SEARCH
+from motion_planning.planners.planning import MIN_FOR_SCENE_S, SHARE_OF_SEARCH
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
 
@@ -26,7 +26,7 @@ _GOALS, _MORE_GOALS_S = 8, 0.02
 # Share of the allowed time for goal postures, and number of random states around a start in collision.
 _SHARE_FOR_GOALS, _JIGGLES = 0.5, 100
 # Number of paths to time before the request fails, if timed trajectories are not valid.
-_MOST_PATHS = 4
+_MAX_PATHS = 4
 # Greatest number of contacts in a sentence.
 _NAMED = 3
 
@@ -166,7 +166,7 @@ class _Planning:
             try:
                 return self._timed(scene, lead, paths.pop(0))
             except PlanningFailure as failure:
-                if failure.code != Code.INVALID_MOTION_PLAN or not paths and attempt >= _MOST_PATHS:
+                if failure.code != Code.INVALID_MOTION_PLAN or not paths and attempt >= _MAX_PATHS:
                     raise
                 if not paths:
                     self._look_up()
@@ -408,7 +408,7 @@ class _Planning:
 
     def _look_up_shapes(self):
         self._look_up()
-        if self._elapsed() > max(self.query.allowed_time, LEAST_FOR_SCENE_S):
+        if self._elapsed() > max(self.query.allowed_time, MIN_FOR_SCENE_S):
             raise PlanningFailure(Code.TIMED_OUT, "time was over after %.2f s, while the shapes of %d objects were "
                                   "prepared; those that are done are kept, so that another request gets further"
                                   % (self._elapsed(), len(self.query.scene.objects)))

@@ -430,7 +430,7 @@ def test_a_proof_is_right_and_found_where_there_is_room(mine, other):
         there = [fcl.CollisionObject(shape, fcl.Transform(turn, place))
                  for shape, turn, place in zip(fcl_shapes, turns, places, strict=True)]
         centres = [place + turn @ bound.centre for place, turn, bound in zip(places, turns, bounds, strict=True)]
-        found = apart.pair_apart(forms[0], 0, turns[0], centres[0], forms[1], 0, turns[1], centres[1], stack)
+        found = apart.pair_apart(forms[0], (0, turns[0], centres[0]), forms[1], (0, turns[1], centres[1]), stack)
         touch = fcl.collide(*there)
         assert not (found and touch)
         if not touch and fcl.distance(*there) > 0.02:

@@ -45,7 +45,7 @@ def test_move_changes_poses_alone(scene):
     np.testing.assert_array_equal(start.moved("box", at(5.0)).objects["box"].pose, at(5.0))
     inside = start.moved("box", at(5.0), [at(0.1)]).objects["box"]
     assert inside.shapes[0][1][0, 3] == 0.1 and inside.shapes[0][0] is start.objects["box"].shapes[0][0]
-    with pytest.raises(SceneError, match="has 1 shapes, but 2 poses"):
+    with pytest.raises(SceneError, match="has 1 shape, but 2 poses"):
         start.moved("box", at(5.0), [at(), at()])
     with pytest.raises(SceneError, match="no object 'bix'; did you mean 'box'"):
         start.moved("bix", at())

@@ -125,7 +125,7 @@ def soup(count, size=1.0):
                          ids=["large triangles", "huge", "a point", "a hair"])
 def test_a_mesh_costs_no_more_than_its_bound(mesh, monkeypatch):
     """2,000 triangles of a metre are 250 million samples at the usual distance."""
-    monkeypatch.setattr(sphere_model, "_MOST_POINTS", 50_000)
+    monkeypatch.setattr(sphere_model, "_MAX_POINTS", 50_000)
     monkeypatch.setattr(covers, "OF_OBJECTS", covers.Bound(50_000, 100_000, 2_000_000, 2_000))
     made = []
     points_on = covers.points_on
@@ -169,7 +169,7 @@ def test_a_held_object_of_any_size_gets_few_spheres_that_contain_it(solid, late)
 
 
 def test_a_held_object_of_many_shapes_gets_few_spheres_that_contain_it(monkeypatch):
-    monkeypatch.setattr(tables, "_MOST_HALVINGS", 6)
+    monkeypatch.setattr(tables, "_MAX_HALVINGS", 6)
     corners = np.random.default_rng(2).normal(size=(50, 3))
     held = WorldObject("h", np.eye(4), tuple((Box((0.01, 0.01, 0.01)), pose(corner)) for corner in corners))
     coarse = set()

@@ -9,7 +9,7 @@ from motion_planning.errors import PlanningError
 FOLLOW, GRIPPER, FAKE = "FollowJointTrajectory", "GripperCommand", "fake"
 _FAKE_TYPES = ("interpolate", "via points", "last point")
 # Greatest number of sets of controllers to try one by one; above it, the search is greedy.
-_MOST_TO_COMBINE = 12
+_MAX_TO_COMBINE = 12
 
 
 # What serves well-known actions, for configurations that do not say it: (beginning, end of the action's name, command).
@@ -104,7 +104,7 @@ def choose(controllers, joints, alive=lambda controller: True):
         return (sum(not answering[controller.action] for controller in chosen), len(chosen),
                 len(moved) - len(set(moved)), sum(not controller.default for controller in chosen), len(moved))
 
-    if len(useful) > _MOST_TO_COMBINE:
+    if len(useful) > _MAX_TO_COMBINE:
         return _greedy(useful, joints)
     best = None
     for size in range(1, len(useful) + 1):

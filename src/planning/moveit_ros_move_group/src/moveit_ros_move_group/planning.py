@@ -22,7 +22,7 @@ from moveit_ros_move_group.convert.constraints import constraint_set_of
 # [s], if a request has none.
 _USUAL_TIME_S = 5.0
 # Remarks on planners that were logged already; each is logged once.
-_MOST_REMARKS = 1000
+_MAX_REMARKS = 1000
 
 
 class Planner:
@@ -120,7 +120,7 @@ class Planner:
         planner, remarks = planner_of(kind_of(asked, pipe.planners),
                                       pipe.settings(request.group_name, config_name(asked)))
         for remark in remarks:
-            if remark not in self._remarks and len(self._remarks) < _MOST_REMARKS:
+            if remark not in self._remarks and len(self._remarks) < _MAX_REMARKS:
                 self._remarks.add(remark)
                 rospy.logwarn("%s", remark)
         return planner

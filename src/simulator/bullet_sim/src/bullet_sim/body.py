@@ -240,9 +240,9 @@ class Body:
             raise BulletSimError("a mass of %g kg cannot be set; expected a positive number" % mass)
         within(bounds.MASS, mass, "the mass of link '%s'" % body)
         within(bounds.INERTIA, inertia.ravel(), "the inertia of link '%s'" % body)
-        if mass < bounds.LEAST_MASS_KG:
+        if mass < bounds.MIN_MASS_KG:
             raise BulletSimError(
-                "a mass of %g kg cannot be set; expected at least %g kg" % (mass, bounds.LEAST_MASS_KG)
+                "a mass of %g kg cannot be set; expected at least %g kg" % (mass, bounds.MIN_MASS_KG)
             )
         offset = self.merged.frames[body].offset
         rotation = offset[:3, :3]
@@ -261,9 +261,9 @@ class Body:
             moments = np.linalg.eigvalsh(inertia)
         if moments.min() <= 0.0:
             raise BulletSimError("the inertia %s has a moment that is not positive" % inertia.tolist())
-        if moments.min() < bounds.LEAST_INERTIA_PER_MASS_M2 * mass:
+        if moments.min() < bounds.MIN_INERTIA_PER_MASS_M2 * mass:
             raise BulletSimError("the inertia %s has a moment of %g kg m^2; expected at least %g for a mass of %g kg"
-                                 % (inertia.tolist(), moments.min(), bounds.LEAST_INERTIA_PER_MASS_M2 * mass, mass))
+                                 % (inertia.tolist(), moments.min(), bounds.MIN_INERTIA_PER_MASS_M2 * mass, mass))
         if is_turned or not np.allclose(centre, link.inertial.centre, rtol=0.0, atol=1e-9):
             self._rebuild_with(link, Inertial(mass, centre, inertia))
         else:

@@ -232,7 +232,7 @@ def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     given = link.inertial.mass
     mass, moments, axes = moving_inertial(link.inertial)
-    if given < bounds.LEAST_MASS_KG:
+    if given < bounds.MIN_MASS_KG:
         warn("link '%s' moves and has %s mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
              % (link.name, "hardly any" if given > 0.0 else "no", mass))
     return mass, moments, rigid(axes, link.inertial.centre)

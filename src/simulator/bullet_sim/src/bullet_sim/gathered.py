@@ -18,7 +18,7 @@ from urdf_model import Box, Cylinder, Mesh, Sphere
 from .mesh_loading import even_directions, parts_as_wavefront
 
 #: PyBullet's limit for one body (MAX_COMPOUND_COLLISION_SHAPES).
-MOST_SHAPES = 16
+MAX_SHAPES = 16
 # Bullet keeps this distance around convex bodies that come from a file [m]; bodies that have none are made smaller.
 _MARGIN_M = 0.001
 # Of a cylinder's ends, and of a ball: 1 - cos(pi / 32) = 0.5 %, and no direction is more than 0.1 rad from a point.
@@ -38,14 +38,14 @@ class Part(NamedTuple):
 
 
 def gathered(parts, keep):
-    """Return a list of at most MOST_SHAPES Parts with the same collision geometry as ``parts``.
+    """Return a list of at most MAX_SHAPES Parts with the same collision geometry as ``parts``.
 
     ``keep(key, lines)`` returns the path of a file that holds the result of ``lines()``, cached under ``key``.
     """
-    if len(parts) <= MOST_SHAPES:
+    if len(parts) <= MAX_SHAPES:
         return parts
     order = sorted(parts, key=lambda part: _ORDER.index(type(part.geometry)))
-    few, many = order[: MOST_SHAPES - 2], order[MOST_SHAPES - 2 :]
+    few, many = order[: MAX_SHAPES - 2], order[MAX_SHAPES - 2 :]
     for hollow, lines in ((True, _triangles), (False, _bodies)):
         chosen = [part for part in many if part.hollow == hollow]
         if chosen:

@@ -13,12 +13,12 @@ ASSUMED_MASS_KG = 1e-3
 def moving_inertial(inertial):
     """Return mass [kg], principal moments (3,) [kg m^2] and their axes (3, 3) of a moving link as the physics uses it.
 
-    A mass below ``bounds.LEAST_MASS_KG`` becomes ASSUMED_MASS_KG, and a moment is at least
-    ``bounds.LEAST_INERTIA_PER_MASS_M2`` times the mass.
+    A mass below ``bounds.MIN_MASS_KG`` becomes ASSUMED_MASS_KG, and a moment is at least
+    ``bounds.MIN_INERTIA_PER_MASS_M2`` times the mass.
     """
-    mass = inertial.mass if inertial.mass >= bounds.LEAST_MASS_KG else ASSUMED_MASS_KG
+    mass = inertial.mass if inertial.mass >= bounds.MIN_MASS_KG else ASSUMED_MASS_KG
     moments, axes = principal_axes(inertial.inertia)
-    return mass, np.maximum(moments, bounds.LEAST_INERTIA_PER_MASS_M2 * mass), axes
+    return mass, np.maximum(moments, bounds.MIN_INERTIA_PER_MASS_M2 * mass), axes
 
 
 def mass_matrix_of(model):

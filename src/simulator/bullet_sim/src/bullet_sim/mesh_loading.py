@@ -14,16 +14,16 @@ from urdf_model import bounds, read_file, refuse_entities
 from .thinning import outermost, thin_out
 
 #: Limits of what is read.
-MOST_BYTES = 100_000_000
-MOST_TRIANGLES = 2_000_000
-MOST_BYTES_BESIDE = 10_000_000  # of each file that a mesh names
+MAX_BYTES = 100_000_000
+MAX_TRIANGLES = 2_000_000
+MAX_BYTES_BESIDE = 10_000_000  # of each file that a mesh names
 # The formats of Gazebo and rviz, and some more. No archives: their content may be endless.
 _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
 # Pictures whose brightness is a height.
 _HEIGHTS = ("png", "jpg", "jpeg")
-_MOST_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants them
+_MAX_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants them
 # Rows of a terrain to look at: simplifying one of 513 rows takes a minute of processor time, one of 201 some seconds.
-_MOST_DRAWN_ROWS = 201
+_MAX_DRAWN_ROWS = 201
 # Materials and buffers that a mesh may name, and pictures, of which only the names are read.
 _BESIDE = (".mtl", ".bin")
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".gif", ".tif", ".tiff")
@@ -31,12 +31,12 @@ PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".gif", ".tif", ".tiff")
 #: The part of a mesh that is all of it, for :func:`load_scene`.
 WHOLE = ("", False)
 # So many names of parts are in a message.
-_MOST_NAMED = 12
+_MAX_NAMED = 12
 
 #: Limits of collision shapes: with more triangles, making the shape of a fixed body takes the loop more than 20 ms; so
 #: does a convex shape with more points.
-MOST_HOLLOW_TRIANGLES = 12_000
-MOST_HULL_POINTS = 6_000
+MAX_HOLLOW_TRIANGLES = 12_000
+MAX_HULL_POINTS = 6_000
 # Directions in which a hull with more points keeps its outermost one: neighbours are 0.09 rad apart, so that at most
 # 0.1 % of its size is cut off (1 - cos 0.045).
 _HULL_DIRECTIONS = 1_500
@@ -60,7 +60,7 @@ class _Beside:
         path = (self._folder / name).resolve()
         if path.suffix.lower() not in _BESIDE or self._folder.resolve() not in path.parents:
             raise FileNotFoundError(name)
-        return read_file(path, MOST_BYTES_BESIDE)
+        return read_file(path, MAX_BYTES_BESIDE)
 
     __getitem__ = get
 
@@ -80,7 +80,7 @@ def load_scene(path, part=WHOLE, textures=False):
     kind = path.suffix[1:].lower()
     if kind not in _FORMATS + _HEIGHTS:
         raise MeshError("it is in the format '%s'; expected one of %s" % (kind, ", ".join(_FORMATS)))
-    content = read_file(path, MOST_BYTES)
+    content = read_file(path, MAX_BYTES)
     if kind in _HEIGHTS:
         heights = _with_fewer_rows(_heights(content)) if textures else _heights(content)
         return trimesh.Scene(trimesh.Trimesh(*_terrain(heights), process=False))
@@ -98,8 +98,8 @@ def load_scene(path, part=WHOLE, textures=False):
     for name in scene.graph.geometry_nodes:
         copies, mesh = len(scene.graph.geometry_nodes[name]), scene.geometry[name]
         triangles += copies * len(getattr(mesh, "faces", ()))
-        if triangles > MOST_TRIANGLES:
-            raise MeshError("it holds more than %d triangles" % MOST_TRIANGLES)
+        if triangles > MAX_TRIANGLES:
+            raise MeshError("it holds more than %d triangles" % MAX_TRIANGLES)
         vertices = np.asarray(mesh.vertices)
         farthest_m = np.abs(vertices).max(initial=0.0) * unit_m
         if not farthest_m <= bounds.POSITION.high:
@@ -110,7 +110,7 @@ def load_scene(path, part=WHOLE, textures=False):
         middle = np.eye(4)
         middle[:3, 3] = -np.mean(scene.bounds, axis=0)
         scene.apply_transform(middle)
-    if triangles <= MOST_HOLLOW_TRIANGLES:
+    if triangles <= MAX_HOLLOW_TRIANGLES:
         # Merging equal corners takes as long as all the rest; a mesh that is decimated does not need it.
         for mesh in scene.geometry.values():
             if len(getattr(mesh, "faces", ())):
@@ -134,15 +134,15 @@ def _heights(content):
     from PIL import Image
 
     with Image.open(io.BytesIO(content)) as picture:
-        if not 4 <= picture.width * picture.height <= _MOST_HEIGHTS or min(picture.size) < 2:
+        if not 4 <= picture.width * picture.height <= _MAX_HEIGHTS or min(picture.size) < 2:
             raise MeshError("it has %d x %d heights; expected 2 x 2 to 1025 x 1025" % picture.size)
         values = np.asarray(picture if picture.mode.startswith(("I", "F")) else picture.convert("L"), dtype=float)
     return values / (values.max() or 1.0)
 
 
 def _with_fewer_rows(heights):
-    """At most :data:`_MOST_DRAWN_ROWS` of the rows and columns, with the first and the last of them."""
-    chosen = [np.linspace(0, count - 1, min(count, _MOST_DRAWN_ROWS)).round().astype(int) for count in heights.shape]
+    """At most :data:`_MAX_DRAWN_ROWS` of the rows and columns, with the first and the last of them."""
+    chosen = [np.linspace(0, count - 1, min(count, _MAX_DRAWN_ROWS)).round().astype(int) for count in heights.shape]
     return heights[np.ix_(*chosen)]
 
 
@@ -232,7 +232,7 @@ def _group(content, part):
 
 
 def _no_part(part, names):
-    return MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MOST_NAMED]) or "none"))
+    return MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MAX_NAMED]) or "none"))
 
 
 def to_wavefront(path, target, planes, part=WHOLE):
@@ -254,15 +254,15 @@ def to_wavefront(path, target, planes, part=WHOLE):
         _write(target, parts_as_wavefront([[tuple(point) for point in points.tolist()] for points in parts]))
         return ""
     remark = ""
-    if len(faces) > MOST_HOLLOW_TRIANGLES:
+    if len(faces) > MAX_HOLLOW_TRIANGLES:
         _write(target + ".hull", _cloud(hull_points(outermost(np.asarray(mesh.vertices)))))
-        vertices, thinned = thin_out(np.asarray(mesh.vertices), faces, MOST_HOLLOW_TRIANGLES)
+        vertices, thinned = thin_out(np.asarray(mesh.vertices), faces, MAX_HOLLOW_TRIANGLES)
         remark = "it is thinned out from %d triangles to %d to collide with" % (len(faces), len(thinned))
         faces = thinned
     else:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-        if len(vertices) > MOST_HULL_POINTS:
+        if len(vertices) > MAX_HULL_POINTS:
             _write(target + ".hull", _cloud(hull_points(vertices)))
     lines = ["o mesh"]
     lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in vertices]
@@ -274,7 +274,7 @@ def to_wavefront(path, target, planes, part=WHOLE):
 def hull_points(points):
     """Return a subset of ``points`` (n, 3) with nearly the same convex hull; all if there are few."""
     points = np.asarray(points, dtype=float)
-    if len(points) <= MOST_HULL_POINTS:
+    if len(points) <= MAX_HULL_POINTS:
         return points
     directions = even_directions(_HULL_DIRECTIONS)
     best, outermost = np.full(_HULL_DIRECTIONS, -np.inf), np.zeros(_HULL_DIRECTIONS, dtype=int)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from .quiet_pybullet import pybullet
 
 # A limb with fewer joints joins another one: a multibody costs something, too.
-_LEAST_JOINTS = 4
+_MIN_JOINTS = 4
 # Groups of joints that are remembered. A robot drives a few of them at every tick.
-_MOST_SHARES = 64
+_MAX_SHARES = 64
 
 
 class Place(NamedTuple):
@@ -34,8 +34,8 @@ def limbs(merged, separate):
     for number, joint in enumerate(joints):
         limb_of[joint.child] = limb_of.get(joint.parent, joint.child)
         found.setdefault(limb_of[joint.child], []).append(number)
-    large = [limb for limb in found.values() if len(limb) >= _LEAST_JOINTS]
-    small = [number for limb in found.values() if len(limb) < _LEAST_JOINTS for number in limb]
+    large = [limb for limb in found.values() if len(limb) >= _MIN_JOINTS]
+    small = [number for limb in found.values() if len(limb) < _MIN_JOINTS for number in limb]
     if len(large) < 2:
         return [list(range(len(joints)))]
     least = min(large, key=len)
@@ -140,7 +140,7 @@ class Parts:
         key = index.dtype, index.tobytes()
         shares = self._shares.get(key)
         if shares is None:
-            if len(self._shares) >= _MOST_SHARES:
+            if len(self._shares) >= _MAX_SHARES:
                 self._shares.clear()
             shares = self._shares[key] = self._make_share(index.tolist())
         return shares

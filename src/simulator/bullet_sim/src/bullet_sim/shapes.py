@@ -18,14 +18,14 @@ from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 from .errors import LOG, BulletSimError
 from .gathered import Part, corners, gathered, without_margin
 from .limited import MESHES, LimitError
-from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
+from .mesh_loading import MAX_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = b"4"
 #: Largest number for one body; with more, making it takes the loop more than 50 ms.
-_MOST_SHAPES_OF_BODY = 1000
+_MAX_SHAPES_OF_BODY = 1000
 # Room [bytes] for a mesh as text, with its hull: so many times the file that it is made from, which may be binary,
 # between these bounds; larger meshes are thinned out.
 _GROWTH, _ROOM = 4, (100_000, 20_000_000)
@@ -75,7 +75,7 @@ class MeshCache:
 
     def _target(self, path, planes, part):
         asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
-        content = read_file(path, MOST_BYTES) + asked.encode() + _VERSION
+        content = read_file(path, MAX_BYTES) + asked.encode() + _VERSION
         return self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
 
     def keep(self, key, lines):
@@ -157,7 +157,7 @@ class MeshFiles:
         if path is None:
             raise BulletSimError("mesh %s cannot be found%s" % (mesh.filename, _reason(mesh.filename)))
         try:
-            check_file(path, MOST_BYTES)
+            check_file(path, MAX_BYTES)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be used: %s" % (mesh.filename, error.strerror)) from None
         return path
@@ -170,14 +170,14 @@ class MeshFiles:
         return self._cache.wavefront(self.path(mesh), planes, hollow, (mesh.submesh, mesh.centred))
 
     def parts(self, shapes, concave, mesh_cuts=None):
-        """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MOST_SHAPES`` Part.
+        """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MAX_SHAPES`` Part.
 
         ``concave``, ``mesh_cuts``: as for ``ShapeStore.compound``. Raises BulletSimError for too many shapes, and for a
         mesh that cannot be found or read.
         """
-        if len(shapes) > _MOST_SHAPES_OF_BODY:
+        if len(shapes) > _MAX_SHAPES_OF_BODY:
             raise BulletSimError("link '%s', with what is fixed to it, has %d collision shapes; expected at most %d"
-                                 % (shapes[0].link, len(shapes), _MOST_SHAPES_OF_BODY))
+                                 % (shapes[0].link, len(shapes), _MAX_SHAPES_OF_BODY))
         parts = []
         for shape in shapes:
             geometry, origin, file, planes = shape.geometry, shape.origin, None, ()

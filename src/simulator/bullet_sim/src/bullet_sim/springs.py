@@ -8,7 +8,7 @@ import numpy as np
 from .quiet_pybullet import pybullet
 
 # A spring swings with sqrt(stiffness / inertia); above 2 / time step an explicit step adds energy. Half of it is safe.
-_MOST_TURN_PER_STEP = 1.0
+_MAX_TURN_PER_STEP = 1.0
 
 
 class JointSprings:
@@ -28,7 +28,7 @@ class JointSprings:
 
     def step_changed(self, time_step_s):
         """Adapt the bounds to a new length of a tick [s]."""
-        self.stiffness = np.minimum(self._wanted, self._inertia * (_MOST_TURN_PER_STEP / time_step_s) ** 2)
+        self.stiffness = np.minimum(self._wanted, self._inertia * (_MAX_TURN_PER_STEP / time_step_s) ** 2)
 
     def bounded(self):
         """Return {joint's name: (stiffness as written, stiffness that acts)} of the springs that are too stiff."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import BulletSimError, Pose, World
-from bullet_sim.gathered import MOST_SHAPES
+from bullet_sim.gathered import MAX_SHAPES
 from urdf_model import parse_urdf
 
 STEP_M = 0.3
@@ -46,7 +46,7 @@ def row(kinds, cube, moves):
 
 @pytest.mark.parametrize("moves", [False, True])
 @pytest.mark.parametrize("kinds", [
-    [kind] * 40 for kind in SHAPES] + [["mesh", "box", "cylinder", "sphere"] * 10, ["box"] * (MOST_SHAPES + 1)],
+    [kind] * 40 for kind in SHAPES] + [["mesh", "box", "cylinder", "sphere"] * 10, ["box"] * (MAX_SHAPES + 1)],
     ids=["boxes", "cylinders", "balls", "meshes", "mixed", "one_more"])
 def test_every_shape_of_many_is_where_it_belongs_and_as_large(world, cube, kinds, moves):
     world.spawn(row(kinds, cube, moves), "row", Pose((0.0, 0.0, 1.0)))
@@ -69,7 +69,7 @@ def test_something_rests_on_a_shape_that_was_gathered(world, cube):
 
 
 def test_few_shapes_stay_what_they_are(world, cube, tmp_path):
-    world.spawn(row(["box", "sphere"] * (MOST_SHAPES // 2), cube, moves=True), "row")
+    world.spawn(row(["box", "sphere"] * (MAX_SHAPES // 2), cube, moves=True), "row")
     assert not list(tmp_path.rglob("*.obj"))
 
 

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from bullet_sim import BulletSimError, MeshCache, MeshFiles, Pose, World
-from bullet_sim.mesh_loading import MOST_HOLLOW_TRIANGLES, MOST_HULL_POINTS, MeshError, hull_points, to_wavefront
+from bullet_sim.mesh_loading import MAX_HOLLOW_TRIANGLES, MAX_HULL_POINTS, MeshError, hull_points, to_wavefront
 from urdf_model import Mesh, parse_urdf
 
 NO_ROOM = os.strerror(errno.ENOSPC)  # in the user's language
@@ -127,7 +127,7 @@ def test_materials_outside_of_the_folder_are_not_read(tmp_path, cache):
 def test_a_large_mesh_is_thinned_out_and_says_so(tmp_path, cache, told):
     path = write_stl(tmp_path / "large.stl", *bumpy_ball(354))  # 250,632 triangles
     points, triangles = points_of(cache.wavefront(path))
-    assert 0.8 * MOST_HOLLOW_TRIANGLES < triangles <= MOST_HOLLOW_TRIANGLES
+    assert 0.8 * MAX_HOLLOW_TRIANGLES < triangles <= MAX_HOLLOW_TRIANGLES
     assert np.abs(np.linalg.norm(points, axis=1) - 0.99).max() < 0.03
     assert len(told) == 1 and "thinned out from 250632 triangles" in told[0]
     hull, _ = points_of(cache.wavefront(path, hollow=False))
@@ -144,7 +144,7 @@ def test_a_usual_mesh_stays_as_it_is(tmp_path, cache, told):
 
 
 def test_a_hull_keeps_its_size():
-    points = np.random.default_rng(1).normal(size=(MOST_HULL_POINTS * 5, 3))
+    points = np.random.default_rng(1).normal(size=(MAX_HULL_POINTS * 5, 3))
     points /= np.linalg.norm(points, axis=1)[:, None]
     kept = hull_points(points)
     assert len(kept) <= 1_500

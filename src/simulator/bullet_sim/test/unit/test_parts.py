@@ -53,7 +53,7 @@ def both(request, monkeypatch):
 
     def each(**options):
         for least, count in ((4, 2), (100, 1)):
-            monkeypatch.setattr(parts, "_LEAST_JOINTS", least)
+            monkeypatch.setattr(parts, "_MIN_JOINTS", least)
             world = World()
             model = world.spawn(parse_urdf(description(*request.param)), "two", Pose((0.0, 0.0, 1.0)), static=True,
                                 **options)

@@ -9,7 +9,7 @@ from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
 
 #: Fastest belt [m/s].
-MOST_M_S = 2.0
+MAX_M_S = 2.0
 
 
 class ConveyorBelt(ModelPlugin):
@@ -35,7 +35,7 @@ class ConveyorBelt(ModelPlugin):
         text = context.element_text("speed", "0.1")
         self._speed = self._checked(text)
         if self._speed is None:
-            raise PluginError("%s: <speed> is '%s', expected -%g to %g m/s" % (self._what, text, MOST_M_S, MOST_M_S))
+            raise PluginError("%s: <speed> is '%s', expected -%g to %g m/s" % (self._what, text, MAX_M_S, MAX_M_S))
         self._commands = context.subscription(context.element_text("commandTopic", "conveyor/command"), Float64)
 
     def update(self, time_s, dt):
@@ -46,7 +46,7 @@ class ConveyorBelt(ModelPlugin):
         speed = self._checked(message.data)
         if speed is None:
             self.context.log.warn_throttle(1.0, "%s: a speed of %s was commanded, expected -%g to %g m/s"
-                                           % (self._what, message.data, MOST_M_S, MOST_M_S))
+                                           % (self._what, message.data, MAX_M_S, MAX_M_S))
         else:
             self._speed = speed
 
@@ -57,4 +57,4 @@ class ConveyorBelt(ModelPlugin):
             speed = float(value)
         except ValueError:
             return None
-        return speed if math.isfinite(speed) and abs(speed) <= MOST_M_S else None
+        return speed if math.isfinite(speed) and abs(speed) <= MAX_M_S else None

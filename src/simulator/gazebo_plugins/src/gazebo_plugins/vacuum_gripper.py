@@ -10,13 +10,13 @@ from gazebo_ros.sensor_plugins import PacedSensor
 #: Distances between link frames [m] within which a body is attracted, and sticks.
 REACH_M, STICKS_M = 0.05, 0.01
 #: Largest pull [N]; it is 1 N m / distance.
-MOST_N = 20.0
+MAX_N = 20.0
 
 
 def pull(away):
     """The force (3,) [N] on something from which the gripper is ``away`` (3,) [m]."""
     distance = float(np.linalg.norm(away))
-    return min(1.0 / distance, MOST_N) * away / distance if distance > 0.0 else np.zeros(3)
+    return min(1.0 / distance, MAX_N) * away / distance if distance > 0.0 else np.zeros(3)
 
 
 class VacuumGripper(PacedSensor):

@@ -43,9 +43,9 @@ _JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": G
                 "prismatic": GetJointPropertiesResponse.PRISMATIC}
 # Largest number of wrenches and efforts at a time. Only a program that never ends one reaches it, and each one costs
 # time in every tick.
-_MOST_JOBS = 1000
+_MAX_JOBS = 1000
 # A hand has one pointer.
-_MOST_DRAGS = 20
+_MAX_DRAGS = 20
 # Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
 _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel")
 
@@ -105,7 +105,7 @@ class BodyServices:
         except _REFUSALS as error:
             self._log.warn_throttle(5.0, "/gazebo/drag: %s" % error)
             return
-        if target not in self._drags and len(self._drags) >= _MOST_DRAGS:
+        if target not in self._drags and len(self._drags) >= _MAX_DRAGS:
             self._log.warn_throttle(5.0, "/gazebo/drag: %s are pulled already, expected less"
                                     % counted(len(self._drags), "link"))
             return
@@ -183,7 +183,7 @@ class BodyServices:
 
     @staticmethod
     def _make_room(jobs):
-        if len(jobs) >= _MOST_JOBS:
+        if len(jobs) >= _MAX_JOBS:
             raise ValueError("%d are under way already, expected less; give them a duration, or clear them "
                              "(clear_body_wrenches, clear_joint_forces)" % len(jobs))
 

@@ -13,7 +13,7 @@ FORGET_S = 0.5
 # the model then hangs 4 cm below the target.
 _FREQUENCY = 15.0
 # The largest acceleration that the spring gives the model [m/s^2].
-_MOST_ACCELERATION = 60.0
+_MAX_ACCELERATION = 60.0
 # A model that is fixed in the world is pulled as if it had this mass at most [kg]: by at most 200 N, as by a person.
 _FIXED_KG = 3.5
 # In one step, damping and spring change the velocity of the link alone by at most about these shares: more would make
@@ -68,7 +68,7 @@ def spring_wrench(masses, away, velocity, turn_rate, step_s):
     stiffness = min(masses.model * _FREQUENCY ** 2, _SPRING_SHARE * masses.grip / step_s ** 2)
     damping = min(2.0 * masses.model * _FREQUENCY, _DAMPING_SHARE * masses.grip / step_s)
     force = stiffness * np.asarray(away) - damping * np.asarray(velocity)
-    size, most = float(np.linalg.norm(force)), min(masses.model * _MOST_ACCELERATION, bounds.FORCE.high)
+    size, most = float(np.linalg.norm(force)), min(masses.model * _MAX_ACCELERATION, bounds.FORCE.high)
     if size > most:
         force = force * (most / size)
     return force, -min(_TURN_DAMPING, _DAMPING_SHARE * masses.own_share / step_s) * (masses.inertia @ turn_rate)

@@ -20,7 +20,7 @@ YIELD_PERIOD_S = 0.004
 LATE_S, LONGER_AFTER_S, SHORTER_AFTER_S = 0.05, 0.3, 30.0
 # prctl(2): how late Linux may wake a sleeping thread, to wake several at once. Its default is 0.05 ms.
 _PR_SET_TIMERSLACK = 29
-_LEAST_SLACK_NS = 1
+_MIN_SLACK_NS = 1
 
 
 def ticks_between(rate, tick_rate):
@@ -39,7 +39,7 @@ def wake_on_time():
     """Make the kernel wake the calling thread on time, not up to 0.05 ms later. Does nothing on systems other than
     Linux."""
     with contextlib.suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, _LEAST_SLACK_NS, 0, 0, 0)
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, _MIN_SLACK_NS, 0, 0, 0)
 
 
 class Pacer:

@@ -22,7 +22,7 @@ MAX_WALL_SNAPSHOT_RATE = 100.0
 # The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s]. In a
 # world that is late they always do, or those of the longer time where they do so anyway; the clock has a message for
 # each such time.
-MOST_AT_ONCE_S, MOST_LATE_AT_ONCE_S = 0.010, 0.020
+MAX_AT_ONCE_S, MAX_LATE_AT_ONCE_S = 0.010, 0.020
 # That a world is late is told after so many windows of the meter. It stays late for 30 s at least, and most machines
 # are too busy while a lab starts.
 TOLD_AFTER_WINDOWS = 45
@@ -69,7 +69,7 @@ class Publications:
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
         # Who gets the time less often than each tick sees no difference; commands wait a little longer.
-        most, most_late = (max(1, int(time_s * tick_rate + 1e-6)) for time_s in (MOST_AT_ONCE_S, MOST_LATE_AT_ONCE_S))
+        most, most_late = (max(1, int(time_s * tick_rate + 1e-6)) for time_s in (MAX_AT_ONCE_S, MAX_LATE_AT_ONCE_S))
         usual = min(self._clock_divisor, most)
         self._simulation.turn_lengths = usual, most if usual < most else most_late
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)

@@ -6,7 +6,7 @@ import numpy as np
 
 #: Largest number of rays per tick [about 5 us each]: a larger scan takes several ticks, as a real scanner's sweep does.
 RAYS_PER_TICK = 32
-_MOST_RAYS = 100000
+_MAX_RAYS = 100000
 _ONCE_ROUND = 2.0 * math.pi + 0.01  # [rad]; descriptions round it up
 
 
@@ -28,9 +28,9 @@ class RayPattern:
         self._ray, self._what = ray, what
         self.columns, self.angle_min, self.angle_max = self._span("scan/horizontal", 640)
         self.rows, low, high = self._span("scan/vertical", 1)
-        if self.rows * self.columns > _MOST_RAYS:
+        if self.rows * self.columns > _MAX_RAYS:
             raise RayPatternError("%s casts %d rays; expected at most %d"
-                                  % (what, self.rows * self.columns, _MOST_RAYS))
+                                  % (what, self.rows * self.columns, _MAX_RAYS))
         self.range_min, self.range_max = self._number("range/min", 0.0), self._number("range/max", 10.0)
         if not 0.0 <= self.range_min < self.range_max:
             raise RayPatternError("%s reaches from %g to %g m; expected 0 <= min < max"

@@ -16,7 +16,7 @@ import numpy as np
 from lxml import etree
 
 from bullet_sim import BulletSimError, Pose, with_stand_ins
-from bullet_sim.gathered import MOST_SHAPES
+from bullet_sim.gathered import MAX_SHAPES
 from bullet_sim.solids import with_solids
 from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
@@ -340,7 +340,7 @@ class Spawner:
 def _slow_bodies(merged):
     """The names of the bodies whose collision shape is a file: a mesh, or the file that gathers more shapes than
     PyBullet takes."""
-    return [link.name for link in merged.links.values() if len(link.collisions) > MOST_SHAPES
+    return [link.name for link in merged.links.values() if len(link.collisions) > MAX_SHAPES
             or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 

@@ -11,7 +11,7 @@ from sensor_renderer.topics import ReconfigureServer
 
 #: Parameters below this name are for all cameras, those below a camera's own name for this one.
 ALL_CAMERAS = "/sensor_renderer"
-_MOST_BLUR_PICTURES, _MOST_ELECTRONS = 64, 1e6
+_MAX_BLUR_PICTURES, _MAX_ELECTRONS = 64, 1e6
 
 
 def _camera_settings(noise):
@@ -22,9 +22,9 @@ def _camera_settings(noise):
                 "[s]; moving things are blurred; 0: an ideal shutter"),
         Setting("gain", ideal.gain, *GAINS_DB, "[dB]; 6 doubles the light"),
         Setting("auto_exposure", ideal.auto_exposure, meaning="the gain follows the brightness of the pictures"),
-        Setting("blur_pictures", ideal.blur_pictures, 1, _MOST_BLUR_PICTURES, "moments of an exposure that are drawn"),
-        Setting("full_well", ideal.full_well, 0.0, _MOST_ELECTRONS, "electrons of a white pixel; 0: no shot noise"),
-        Setting("read_noise", ideal.read_noise, 0.0, _MOST_ELECTRONS, "standard deviation [electrons], with full_well"),
+        Setting("blur_pictures", ideal.blur_pictures, 1, _MAX_BLUR_PICTURES, "moments of an exposure that are drawn"),
+        Setting("full_well", ideal.full_well, 0.0, _MAX_ELECTRONS, "electrons of a white pixel; 0: no shot noise"),
+        Setting("read_noise", ideal.read_noise, 0.0, _MAX_ELECTRONS, "standard deviation [electrons], with full_well"),
         Setting("noise_mean", mean, -1.0, 1.0, "of normal noise on the values of pixels, of 1.0"),
         Setting("noise_stddev", deviation, 0.0, 1.0, "of normal noise on the values of pixels, of 1.0"),
         Setting("learning_topics", False, meaning="masks, depth and optical flow as topics"),

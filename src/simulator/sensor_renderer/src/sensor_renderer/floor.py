@@ -5,7 +5,7 @@ import numpy as np
 from sensor_renderer.mirror import FLOOR_HALF_M
 
 # Light more slanted than this (sine of its angle to the floor) throws shadows over too much of it.
-_LEAST_SLANT = 0.15
+_MIN_SLANT = 0.15
 # The corners of a rectangle counter-clockwise, as signs; two triangles of it; and the ring between two rectangles,
 # of which the outer has the corners 4 to 7.
 _SIGNS = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
@@ -58,7 +58,7 @@ def on_floor(matrix, corners, away):
     and y (4, 2) on the floor, counter-clockwise; None where the column hardly meets it."""
     upright = matrix[:3, 2]
     slant = float(away @ upright)
-    if abs(slant) < _LEAST_SLANT:
+    if abs(slant) < _MIN_SLANT:
         return None
     along = (matrix[:3, 3] - corners) @ upright / slant
     met = (corners + along[:, None] * away - matrix[:3, 3]) @ matrix[:3, :2]

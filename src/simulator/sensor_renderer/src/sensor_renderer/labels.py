@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 #: Largest numbers of the masks; a class beyond is counted as the last one.
-MOST_CLASSES, MOST_MODELS = 255, 65535
+MAX_CLASSES, MAX_MODELS = 255, 65535
 NOTHING = "nothing"
 # Names that differ by such an ending belong to one class: block_1, block-2, block3, block_clone.
 _ENDING = re.compile(r"([_-]?\d+|_clone)+$")
@@ -21,15 +21,15 @@ class Labels:
         self._patterns = [(name, tuple(patterns)) for name, patterns in classes]
         self._classes = {NOTHING: 0}
         for name, _ in self._patterns:
-            self._number(self._classes, name, MOST_CLASSES)
+            self._number(self._classes, name, MAX_CLASSES)
         self._models = {NOTHING: 0}
 
     def cover(self, models):
         """Give every model in ``models`` (names) its numbers."""
         for model in models:
             if model not in self._models:
-                self._number(self._models, model, MOST_MODELS)
-                self._number(self._classes, self._class_of(model), MOST_CLASSES)
+                self._number(self._models, model, MAX_MODELS)
+                self._number(self._classes, self._class_of(model), MAX_CLASSES)
 
     @property
     def models(self):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 #: Largest number of lamps beside the sun; more are ignored. Of those that cast shadows, the strongest few do.
-MOST_LAMPS, MOST_SHADOWS = 8, 2
+MAX_LAMPS, MAX_SHADOWS = 8, 2
 #: Nearest distance to a lamp at which something casts a shadow [m].
 LAMP_NEAR_M = 0.04
 # The sun of a world without lights: direction, colour and specular colour of Gazebo's model "sun".
@@ -54,7 +54,7 @@ class Lamp(NamedTuple):
         depth = 0.5 + 0.5 * (far + near) / (far - near), far * near / (far - near)
         return {"lamp_place": (*self.place, 1.0), "lamp_colour": self.colour, "lamp_shine": self.shine,
                 "lamp_fade": (*self.fade[:3], min(self.fade[3], 1e9)), "lamp_beam": self.beam, "lamp_cone": self.cone,
-                "lamp_depth": (*depth, float(self.shadow or 0), float(MOST_SHADOWS))}
+                "lamp_depth": (*depth, float(self.shadow or 0), float(MAX_SHADOWS))}
 
 
 class Light(NamedTuple):
@@ -93,14 +93,14 @@ class Light(NamedTuple):
         return cls(tuple(listed.get("ambient") or _AMBIENT), tuple(background or _HORIZON),
                    bool(listed.get("sky") or not background), _to(sun["direction"]), _colour(sun), _shine(sun),
                    bool(sun["cast_shadows"] and shadows),
-                   _lamps([light for light in lights if light is not sun][:MOST_LAMPS], shadows))
+                   _lamps([light for light in lights if light is not sun][:MAX_LAMPS], shadows))
 
 
 def _lamps(lights, shadows):
     """The list of :class:`Lamp`; the strongest of those that cast shadows get the maps."""
     casting = [number for number, light in enumerate(lights)
                if shadows and light["cast_shadows"] and light["type"] != "directional"]
-    casting = sorted(casting, key=lambda number: -sum(lights[number]["diffuse"]))[:MOST_SHADOWS]
+    casting = sorted(casting, key=lambda number: -sum(lights[number]["diffuse"]))[:MAX_SHADOWS]
     return tuple(_lamp(light, casting.index(number) if number in casting else None)
                  for number, light in enumerate(lights))
 

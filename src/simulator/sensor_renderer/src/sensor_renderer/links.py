@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sensor_renderer.mirror import MOST_UNUSED
+from sensor_renderer.mirror import MAX_UNUSED
 from sensor_renderer.sides import indexed
 from world_picture.reduction import reduced
 from world_picture.results import ResultCache
@@ -17,10 +17,10 @@ from world_picture.results import ResultCache
 # of colour, where the half of it would cost a tenth more. In pictures of depth, whose values are compared with
 # millimetres, also in metres.
 _FINE_PX, _LIVE_PX = 0.5, 1.0
-_MOST_IN_DEPTH_M = 0.001
+_MAX_IN_DEPTH_M = 0.001
 # Share of the plain triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
 # be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
-_CASTER_SHARE, _CASTER_LEAST = 0.2, 60
+_CASTER_SHARE, _CASTER_MIN = 0.2, 60
 _CASTER_M = 0.003
 # Part of the names of cached results: increase it when other triangles cast shadows or show their backs.
 _VERSION = 1
@@ -120,11 +120,11 @@ class Links:
     def _forget_unused(self):
         """Release the links of models that are gone, if they are many: with other sizes or colours, each was another
         one. A few stay, for models that come again."""
-        if len(self._links) <= MOST_UNUSED:
+        if len(self._links) <= MAX_UNUSED:
             return
         used = {id(link) for links in self._links_of.values() for link in links}
         unused = [key for key, link in self._links.items() if id(link) not in used]
-        for key in unused[:max(len(unused) - MOST_UNUSED, 0)]:
+        for key in unused[:max(len(unused) - MAX_UNUSED, 0)]:
             _release(self._links.pop(key))
 
     def prepare(self, mirror):
@@ -137,7 +137,7 @@ class Links:
         """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
         for a picture of ``depth``."""
         error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, pinhole.near) / pinhole.fx
-        return self._level(link, min(error_m, _MOST_IN_DEPTH_M) if depth else error_m)
+        return self._level(link, min(error_m, _MAX_IN_DEPTH_M) if depth else error_m)
 
     def _level(self, link, error_m):
         step = bisect.bisect_right(link.steps, error_m)
@@ -240,7 +240,7 @@ def _release(link):
 def _thinned(rows):
     """The corners (3 m, 3) of the triangles that cast the shadow of a mesh."""
     faces = np.arange(len(rows)).reshape(-1, 3)
-    vertices, faces = reduced(rows[:, :3].astype(float), faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
+    vertices, faces = reduced(rows[:, :3].astype(float), faces, max(_CASTER_MIN, round(_CASTER_SHARE * len(faces))))
     return vertices[faces].reshape(-1, 3).astype(np.float32)
 
 

@@ -23,7 +23,7 @@ _WHITE = (1.0, 1.0, 1.0, 1.0)
 #: Gloss of what does not say: paint and plastic.
 GLOSS = 0.3
 #: So many shapes of models that are gone are kept, for models that come again.
-MOST_UNUSED = 100
+MAX_UNUSED = 100
 # Of a round thing, one pixel in sixteen has a surface so slanted that its depth is off by this many times the distance
 # from the surface, or more.
 _SLANTED = 4.0
@@ -263,10 +263,10 @@ class Mirror:
         self.version += 1
 
     def _forget_unused(self):
-        if len(self._parts) > MOST_UNUSED:
+        if len(self._parts) > MAX_UNUSED:
             used = {part.key for body in self.bodies.values() for parts in body.parts for part in parts}
             unused = [key for key in self._parts if key not in used]
-            for key in unused[:max(len(unused) - MOST_UNUSED, 0)]:
+            for key in unused[:max(len(unused) - MAX_UNUSED, 0)]:
                 del self._parts[key]
 
     def set_state(self, values):

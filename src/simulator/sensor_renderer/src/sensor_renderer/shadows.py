@@ -5,12 +5,12 @@ import weakref
 
 import numpy as np
 
-from sensor_renderer.light import LAMP_NEAR_M, MOST_SHADOWS
+from sensor_renderer.light import LAMP_NEAR_M, MAX_SHADOWS
 from sensor_renderer.programs import draw, matrix_bytes
 
 # Half of the map's side in the world [m] grows in steps of this factor, so that it seldom changes while a camera moves.
 _STEP = 2.0 ** 0.25
-_LEAST_HALF_M, _MOST_HALF_M = 1.0, 8.0
+_MIN_HALF_M, _MAX_HALF_M = 1.0, 8.0
 # How far behind the furthest thing that casts shadows a camera sees any on the floor [m].
 _BEYOND_M = 1.5
 # Texels along the map's border to which nothing is drawn: outside of the map is no shadow.
@@ -53,7 +53,7 @@ class Shadows:
         self._up = np.cross(away, self._right)
         if self._lamp_map is None and any(lamp.shadow is not None for lamp in light.lamps):
             side = self._pixels // 2
-            self._lamp_map, self._lamp_buffer = self._depth_map(6 * side, MOST_SHADOWS * side)
+            self._lamp_map, self._lamp_buffer = self._depth_map(6 * side, MAX_SHADOWS * side)
 
     def draw(self, mirror, casters, pinhole, pose):
         """Draw the maps for the view of a camera at ``pose`` (4, 4). ``casters``: (link, matrix, packed matrix) of all
@@ -81,7 +81,7 @@ class Shadows:
         turn = np.array([self._right, self._up, self._away])
         places, radii = spheres[0] @ turn.T, spheres[1]
         low, high = self._region(spheres, places, pinhole, pose)
-        half = float(np.clip(np.max(high - low) / 2.0, _LEAST_HALF_M, _MOST_HALF_M))
+        half = float(np.clip(np.max(high - low) / 2.0, _MIN_HALF_M, _MAX_HALF_M))
         half = _STEP ** math.ceil(math.log(half, _STEP) - 1e-9)
         texel = 2.0 * half / (self._pixels - 2 * _BORDER)
         centre = np.round((low + high) / 2.0 / texel) * texel
@@ -146,10 +146,10 @@ class Shadows:
                 self._lamp_buffer.viewport = column * side, lamp.shadow * side, side, side
                 self._draw_from(clip, near)
             if lamp.type == "spot":
-                tile = np.diag([1.0 / 6.0, 1.0 / MOST_SHADOWS, 1.0, 1.0])
-                tile[1, 3] = lamp.shadow / MOST_SHADOWS
+                tile = np.diag([1.0 / 6.0, 1.0 / MAX_SHADOWS, 1.0, 1.0])
+                tile[1, 3] = lamp.shadow / MAX_SHADOWS
                 self.lamp_matrices[number] = tile @ _HALVED @ clips[0]
-        self._lamp_buffer.viewport = 0, 0, 6 * side, MOST_SHADOWS * side
+        self._lamp_buffer.viewport = 0, 0, 6 * side, MAX_SHADOWS * side
 
     def _draw_from(self, to_clip, casters):
         self._program["to_clip"].write(matrix_bytes(to_clip))

@@ -15,7 +15,7 @@ _COLUMNS = 6
 # Spheres that just touch a picture's edge are a little smaller than it.
 _ROOM = 1.01
 # A shadow may miss triangles whose backs have no more than so many pixels in all of these pictures together.
-_MOST_MISSED = 10
+_MAX_MISSED = 10
 
 _VERTEX = """
 #version 330
@@ -63,7 +63,7 @@ class Sides:
         Of a mesh with few triangles nearly all touch one that shows its back; to draw them all twice costs more than
         to leave nothing out. Shadows differ by three pixels in a picture of 640 x 400.
         """
-        return self._pixels(points, centre, radius)[1] > _MOST_MISSED
+        return self._pixels(points, centre, radius)[1] > _MAX_MISSED
 
     def _pixels(self, points, centre, radius):
         """The number of pixels of each triangle's front and back in all pictures: int (2, m)."""

@@ -3,9 +3,9 @@
 from PIL import Image
 
 #: Pixels of all pictures together, at most: 256 MB of memory. When they are used up, further ones are reduced.
-MOST_PIXELS = 48_000_000
+MAX_PIXELS = 48_000_000
 # No picture is reduced below this side.
-_LEAST_SIDE = 64
+_MIN_SIDE = 64
 
 
 class Textures:
@@ -15,7 +15,7 @@ class Textures:
         #: The context.
         self.context = context
         self._textures = {}
-        self._left = MOST_PIXELS
+        self._left = MAX_PIXELS
         self._white = None
 
     def of(self, path):
@@ -35,13 +35,13 @@ class Textures:
         for texture in self._textures.values():
             texture.release()
         self._textures = {}
-        self._left = MOST_PIXELS
+        self._left = MAX_PIXELS
 
     def _read(self, path):
         with Image.open(path) as picture:
             reduced = picture.convert("RGBA")
         side = max(reduced.size)
-        while side > _LEAST_SIDE and reduced.width * reduced.height > self._left:
+        while side > _MIN_SIDE and reduced.width * reduced.height > self._left:
             side //= 2
             reduced.thumbnail((side, side))
         self._left = max(self._left - reduced.width * reduced.height, 0)

@@ -5,7 +5,7 @@ import pytest
 
 from sensor_renderer.floor import on_floor
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.light import MOST_LAMPS, Light
+from sensor_renderer.light import MAX_LAMPS, Light
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model.transforms import pose_matrix
@@ -228,9 +228,9 @@ def test_the_shaded_part_of_the_floor_is_where_the_light_meets_it():
 
 def test_strange_lights_do_no_harm():
     nowhere = lamp("directional", direction=[0, 0, 0], cast_shadows=True)
-    many = [lamp("point") for _ in range(MOST_LAMPS + 5)]
+    many = [lamp("point") for _ in range(MAX_LAMPS + 5)]
     light = Light.of_scene({"lights": [nowhere, *many, lamp("spot", spot=None)]})
-    assert light.sun == (0.0, 0.0, 0.0) and len(light.lamps) == MOST_LAMPS
+    assert light.sun == (0.0, 0.0, 0.0) and len(light.lamps) == MAX_LAMPS
     assert np.isfinite(light.to_sun).all()
     first, second = lamp("directional"), lamp("directional", diffuse=[1, 0, 0], cast_shadows=True)
     light = Light.of_scene({"lights": [first, second]})

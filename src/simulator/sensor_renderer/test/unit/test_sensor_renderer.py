@@ -13,7 +13,7 @@ from lab_testing.meshes import sphere
 from sensor_renderer import triangles
 from sensor_renderer.errors import SensorError
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.mirror import MOST_UNUSED, Mirror
+from sensor_renderer.mirror import MAX_UNUSED, Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.tiny_renderer import TinyRenderer
 from urdf_model import Box, Cylinder, Sphere
@@ -166,7 +166,7 @@ def test_models_that_come_and_go_leave_little_behind(tmp_path):
     renderer, mirror = GlRenderer(), Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
     pinhole = Pinhole.from_field_of_view(40, 30, 1.0, 0.05, 20.0)
     first = None
-    for number in range(MOST_UNUSED + 30):
+    for number in range(MAX_UNUSED + 30):
         urdf = CUBE.replace("0.1 0.1 0.1", "%g 0.1 0.1" % (0.11 + 0.001 * number)).replace("0.9 0 0", "0.9 %g 0" % (
             0.001 * number))
         mirror.set_scene([{"name": name, "urdf": text, "joints": []} for name, text in (
@@ -177,7 +177,7 @@ def test_models_that_come_and_go_leave_little_behind(tmp_path):
         first = first or weakref.ref(mirror.bodies["cube0"].parts[0][0].triangles)
         shown = {part.key for body in mirror.bodies.values() for parts in body.parts for part in parts}
         assert shown <= mirror._parts.keys()
-    assert first() is None and len(mirror._parts) <= MOST_UNUSED + 2 >= len(renderer._links._links) - 1
+    assert first() is None and len(mirror._parts) <= MAX_UNUSED + 2 >= len(renderer._links._links) - 1
     renderer.close()
 
 

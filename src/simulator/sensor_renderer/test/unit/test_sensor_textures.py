@@ -372,7 +372,7 @@ def test_without_pictures_there_is_no_program_for_them(renderer, tmp_path):
 
 
 def test_pictures_take_bounded_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("sensor_renderer.textures.MOST_PIXELS", 70_000)
+    monkeypatch.setattr("sensor_renderer.textures.MAX_PIXELS", 70_000)
     for number in range(3):
         Image.new("RGB", (256, 256), (number, 0, 0)).save(tmp_path / ("%d.png" % number))
     made = GlRenderer()

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
-from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
+from bullet_sim.mesh_loading import MAX_BYTES, MAX_BYTES_BESIDE, WHOLE
 from disk_cache.files import DRAFT, remove_drafts, spare_folder, try_room
 from urdf_model import read_file
 from world_picture import reduction
@@ -111,7 +111,7 @@ class DrawingCache:
     def _index(self, what, path, name, kind, write, *arguments):
         """The path of the file ``name`` that ``write(path, folder, *arguments)`` makes of the file at ``path``."""
         try:
-            content = read_file(path, MOST_BYTES)
+            content = read_file(path, MAX_BYTES)
         except OSError as error:
             raise DrawingError("%s %s cannot be read: %s" % (what, path, error.strerror)) from error
         key = "%s-%d%s" % (_digest(path, content), _VERSION, kind)
@@ -156,7 +156,7 @@ def _digest(path, content):
     if str(path).lower().endswith(".obj"):
         for name in _MATERIALS.findall(content):
             try:
-                digest.update(read_file(Path(path).parent / os.fsdecode(name), MOST_BYTES_BESIDE))
+                digest.update(read_file(Path(path).parent / os.fsdecode(name), MAX_BYTES_BESIDE))
             except (OSError, ValueError):  # the mesh is drawn without; a name may hold a zero byte
                 continue
     return digest.hexdigest()[:32]

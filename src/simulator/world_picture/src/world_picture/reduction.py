@@ -47,7 +47,7 @@ _FEWEST = 24
 _WORTH = 0.85
 # A place in a picture counts as the same within this share of it; surfaces of less than its square have no picture.
 _SAME_UV = 1e-5
-_LEAST_IN_PICTURE = _SAME_UV ** 2
+_MIN_IN_PICTURE = _SAME_UV ** 2
 # Width of the strips that hold borders, as a share of the mesh's size.
 _STRIP = 0.02
 
@@ -311,7 +311,7 @@ def _samples(mesh):
     return _Samples(np.concatenate([vertices[few], vertices[corners].mean(axis=1)]),
                     np.concatenate([few, corners[:, 0]]), on_surface,
                     np.concatenate([mesh.uv[few], mesh.uv[corners].mean(axis=1)]),
-                    np.sqrt(on_surface / np.maximum(in_picture, _LEAST_IN_PICTURE)))
+                    np.sqrt(on_surface / np.maximum(in_picture, _MIN_IN_PICTURE)))
 
 
 def _kept_by(share, values, weights):

@@ -12,7 +12,7 @@ from disk_cache.files import cache_home, draft_of
 #: This variable names a folder as :func:`cache_folder` has them, which is only read: results of another user.
 READY = "BULLET_GAZEBO_READY"
 #: Most results that are kept. Models of ever other sizes, as for data sets, would fill the disk.
-MOST_KEPT = 5000
+MAX_KEPT = 5000
 _FOLDER = "results"
 
 
@@ -45,7 +45,7 @@ def open_to_all(path):
 
 class ResultCache:
     """Arrays on disk, under a hash of what they were calculated from. Several processes may use a folder at a time; a
-    folder that cannot be written to keeps nothing. Of more than :data:`MOST_KEPT` results, those that were used last
+    folder that cannot be written to keeps nothing. Of more than :data:`MAX_KEPT` results, those that were used last
     are kept."""
 
     def __init__(self, folder=None):
@@ -82,8 +82,8 @@ class ResultCache:
             with contextlib.suppress(FileNotFoundError):  # another process makes room as well
                 used_at.append((entry.stat().st_mtime_ns, entry))
         # A tenth at once, so that the next ones find room.
-        if len(used_at) > MOST_KEPT:
-            for _, path in sorted(used_at)[:len(used_at) - MOST_KEPT + MOST_KEPT // 10]:
+        if len(used_at) > MAX_KEPT:
+            for _, path in sorted(used_at)[:len(used_at) - MAX_KEPT + MAX_KEPT // 10]:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(path)
 

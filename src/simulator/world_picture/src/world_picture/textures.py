@@ -8,9 +8,9 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 
 #: Pixels of the longer side of a picture, at most; larger ones are reduced.
-MOST_PIXELS = 1024
+MAX_PIXELS = 1024
 # Larger pictures are not read: they would take more memory than the process has.
-_MOST_READ = 100_000_000
+_MAX_READ = 100_000_000
 _FORMATS = ("PNG", "JPEG", "TGA", "BMP", "GIF", "TIFF")
 
 
@@ -19,7 +19,7 @@ class TextureError(Exception):
 
 
 class Texture(NamedTuple):
-    """``path``: a PNG file of at most :data:`MOST_PIXELS` a side; ``colour``: its mean (red, green, blue from 0 to
+    """``path``: a PNG file of at most :data:`MAX_PIXELS` a side; ``colour``: its mean (red, green, blue from 0 to
     1)."""
 
     path: str
@@ -54,12 +54,12 @@ def write_texture(path, folder):
 
     try:
         with Image.open(path, formats=_FORMATS) as picture:
-            if picture.width * picture.height > _MOST_READ:
+            if picture.width * picture.height > _MAX_READ:
                 raise TextureError("it has %d x %d pixels; expected at most %d million"
-                                   % (*picture.size, _MOST_READ // 1_000_000))
+                                   % (*picture.size, _MAX_READ // 1_000_000))
             reduced = save_reduced(picture, Path(folder) / "picture.png")
     except Image.DecompressionBombError:
-        raise TextureError("it has more pixels than expected, at most %d million" % (_MOST_READ // 1_000_000)) from None
+        raise TextureError("it has more pixels than expected, at most %d million" % (_MAX_READ // 1_000_000)) from None
     except (OSError, SyntaxError, ValueError) as error:
         raise TextureError("it is no picture in one of the formats %s: %s" % (", ".join(_FORMATS), error)) from None
     pixels = np.asarray(reduced, dtype=float)[..., :3]
@@ -68,9 +68,9 @@ def write_texture(path, folder):
 
 
 def save_reduced(picture, path):
-    """Write ``picture``, of Pillow, to the PNG file at ``path`` with at most :data:`MOST_PIXELS` a side; return it."""
+    """Write ``picture``, of Pillow, to the PNG file at ``path`` with at most :data:`MAX_PIXELS` a side; return it."""
     has_holes = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
     reduced = picture.convert("RGBA" if has_holes else "RGB")
-    reduced.thumbnail((MOST_PIXELS, MOST_PIXELS))
+    reduced.thumbnail((MAX_PIXELS, MAX_PIXELS))
     reduced.save(path, compress_level=1)
     return reduced

@@ -72,7 +72,7 @@ def test_a_damaged_file_is_replaced(tmp_path, calculate, content):
 
 
 def test_those_that_were_used_last_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr("world_picture.results.MOST_KEPT", 20)
+    monkeypatch.setattr("world_picture.results.MAX_KEPT", 20)
     cache = ResultCache(tmp_path)
     for number in range(20):
         cache.array("sum-1", (number,), Counted(np.array([number])))

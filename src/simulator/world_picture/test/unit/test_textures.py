@@ -82,7 +82,7 @@ def test_what_is_no_picture_is_named(tmp_path, monkeypatch):
     with pytest.raises(drawing.DrawingError, match="picture .*b.png cannot be read"):
         drawing.DrawingCache(tmp_path / "cache").texture(tmp_path / "b.png")
     Image.new("L", (200, 100)).save(path)
-    monkeypatch.setattr(textures, "_MOST_READ", 10_000)
+    monkeypatch.setattr(textures, "_MAX_READ", 10_000)
     with pytest.raises(textures.TextureError, match="200 x 100 pixels"):
         textures.write_texture(path, tmp_path)
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 9_000)

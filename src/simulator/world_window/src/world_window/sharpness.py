@@ -4,7 +4,7 @@
 #: Sizes of a picture, as shares of the window's width and height.
 SCALES = (1.0, 0.75, 0.5, 0.375, 0.25)
 #: A picture at less than half of the window's width and height keeps so many pixels: only large windows get them.
-LEAST_PIXELS = 640 * 400
+MIN_PIXELS = 640 * 400
 #: Pictures should take no longer than this [s]: with the pauses of the viewer, 20 come a second.
 GOAL_S = 0.04
 # So many pictures in a row decide.
@@ -22,7 +22,7 @@ class Sharpness:
 
     def take(self, spent_s, pixels):
         """A picture of the present size took ``spent_s`` [s, wall]; the window has so many ``pixels``."""
-        allowed = [scale for scale in SCALES if scale >= 0.5 or scale ** 2 * pixels >= LEAST_PIXELS]
+        allowed = [scale for scale in SCALES if scale >= 0.5 or scale ** 2 * pixels >= MIN_PIXELS]
         place = min(SCALES.index(self.scale), len(allowed) - 1)
         larger = allowed[max(place - 1, 0)]
         self._slow = self._slow + 1 if spent_s > GOAL_S else 0

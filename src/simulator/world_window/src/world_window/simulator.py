@@ -17,7 +17,7 @@ from world_window.overlay import Contact
 # How long a service may take to appear, and an advance to begin [s, wall].
 _WAIT_S = 2.0
 #: Steps that one press of the button makes at most.
-MOST_STEPS = 100000
+MAX_STEPS = 100000
 
 
 class Simulator:
@@ -44,7 +44,7 @@ class Simulator:
     def step(self, ticks):
         """Pause, then make ``ticks`` steps."""
         self._call("/gazebo/pause_physics", Empty)
-        self._call("/gazebo/advance", AdvanceTicks, min(int(ticks), MOST_STEPS), [], _WAIT_S)
+        self._call("/gazebo/advance", AdvanceTicks, min(int(ticks), MAX_STEPS), [], _WAIT_S)
 
     def reset_world(self):
         """Put all models back to their start; time goes on."""

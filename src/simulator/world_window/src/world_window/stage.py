@@ -27,7 +27,7 @@ _CLICK_PX = 4
 # Where nothing is under the pointer, things count as this far away [m].
 _EMPTY_M = 3.0
 # The first view shows at least this much of the world in each direction [m].
-_LEAST_VIEW_M = 0.8
+_MIN_VIEW_M = 0.8
 _ORBIT_RAD_PER_PX = 0.006
 _ZOOM_PER_STEP, _ZOOM_PER_PX = 0.85, 0.99
 
@@ -246,7 +246,7 @@ class Stage:
         if low is None:
             self.eye = FIRST_EYE
         else:
-            missing = np.maximum(_LEAST_VIEW_M - (high - low), 0.0) / 2.0
+            missing = np.maximum(_MIN_VIEW_M - (high - low), 0.0) / 2.0
             position, target = overview(low - missing, high + missing, self.pinhole.width / self.pinhole.height,
                                         FIELD_OF_VIEW_RAD)
             self.eye = Eye.looking_at(position, target)

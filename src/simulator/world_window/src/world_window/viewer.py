@@ -16,7 +16,7 @@ from world_window.sharpness import Sharpness
 from world_window.stage import Stage
 
 #: At most so many pictures a second; where drawing takes longer, it takes at most this share of the time.
-MOST_RATE, DRAWING_SHARE = 30.0, 0.8
+MAX_RATE, DRAWING_SHARE = 30.0, 0.8
 # How often a simulator is looked for [s], and the message of a pull is repeated [s].
 _SEEK_S, _PULL_S = 0.25, 0.05
 # Times and names in the status line are renewed this often [s].
@@ -93,7 +93,7 @@ class Viewer(threading.Thread):
             except SnapshotError as error:
                 self._warn(str(error))
             self._spent_s = time.monotonic() - began
-            next_at = began + max(1.0 / MOST_RATE, self._spent_s / DRAWING_SHARE)
+            next_at = began + max(1.0 / MAX_RATE, self._spent_s / DRAWING_SHARE)
         if self._renderer is not None:
             self._renderer.close()
 

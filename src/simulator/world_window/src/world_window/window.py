@@ -17,7 +17,7 @@ from PyQt5.QtWidgets import (
 )
 
 from world_window.canvas import Canvas
-from world_window.simulator import MOST_STEPS
+from world_window.simulator import MAX_STEPS
 from world_window.stage import RIGHT, Stage
 
 _MESSAGE_MS = 8000
@@ -155,7 +155,7 @@ class Window(QMainWindow):
         self._pause = self._action(bar, "Pause", "Space", "pause the world, or let it go on", self._pause_or_go_on)
         self._action(bar, "Step", ".", "make some steps, then pause", lambda: simulator.step(self._steps.value())
                      ).setIcon(icon(QStyle.SP_MediaSkipForward))
-        self._steps = QSpinBox(minimum=1, maximum=MOST_STEPS, value=1, toolTip="steps of the button")
+        self._steps = QSpinBox(minimum=1, maximum=MAX_STEPS, value=1, toolTip="steps of the button")
         self._steps.setFocusPolicy(Qt.ClickFocus)
         self._steps.editingFinished.connect(self.canvas.setFocus)
         bar.addWidget(self._steps)

@@ -35,7 +35,7 @@ from lab_testing import web_clients
 from lab_testing.skipping import skip
 from lab_testing.waiting import stretched, wait_for_message, wait_until
 from lab_testing.web_robot import NAMES, POSITIONS, WebRobot, address_of
-from web_bridge.services import MOST_AT_ONCE, MOST_OF_ALL
+from web_bridge.services import MAX_AT_ONCE, MAX_OF_ALL
 
 HERE = Path(__file__).parent
 
@@ -233,12 +233,12 @@ class RosbridgeTest(unittest.TestCase):
     def test_calls_of_clients_that_have_gone_take_no_place(self):
         release, asked = threading.Event(), []
         service = rospy.Service("/lab/never", SetBool, lambda request: asked.append(1) or release.wait(stretched(60)))
-        for clients in range(1, MOST_OF_ALL // MOST_AT_ONCE + 2):
+        for clients in range(1, MAX_OF_ALL // MAX_AT_ONCE + 2):
             client = Client()
-            for number in range(MOST_AT_ONCE):
+            for number in range(MAX_AT_ONCE):
                 client.send("call_service", service="/lab/never", args={}, id=number)
             # The first client's calls are over by the time at which the last one's need their place.
-            wait_until(lambda clients=clients: len(asked) == clients * MOST_AT_ONCE, "the calls")
+            wait_until(lambda clients=clients: len(asked) == clients * MAX_AT_ONCE, "the calls")
             client.socket.close()
         wait_until(lambda: Client().call("/lab/enable", data=True)[0], "an answer to another client")
         release.set()

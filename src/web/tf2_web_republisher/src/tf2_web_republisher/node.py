@@ -14,7 +14,7 @@ from tf2_web_republisher.watch import Audience, FrameWatch, Schedule, period_of
 # A goal ends when nobody has listened to the feedback for this long [s]: pages go without cancelling theirs.
 GONE_S = 10.0
 # Goals at a time; then the oldest ends. Pages that come and go while another one listens leave theirs behind.
-MOST_GOALS = 500
+MAX_GOALS = 500
 
 
 class Republisher:
@@ -57,8 +57,8 @@ class Republisher:
         self._goals[name] = handle, send
         handle.set_accepted()
         self._schedule.add(send, period_of(goal.rate))
-        if len(self._goals) > MOST_GOALS:
-            self._end(list(self._goals)[0], "there are more than %d goals; this was the oldest" % MOST_GOALS)
+        if len(self._goals) > MAX_GOALS:
+            self._end(list(self._goals)[0], "there are more than %d goals; this was the oldest" % MAX_GOALS)
 
     def _end(self, name, why):
         handle, send = self._goals.pop(name, (None, None))

@@ -75,7 +75,7 @@ def test_goals_end_when_nobody_listens(served, monkeypatch):
 
 
 def test_of_too_many_goals_the_oldest_ends(served, monkeypatch):
-    monkeypatch.setattr(node, "MOST_GOALS", 2)
+    monkeypatch.setattr(node, "MAX_GOALS", 2)
     handles = [Handle(str(number)) for number in range(4)]
     for handle in handles:
         served._server.begin(handle)

@@ -15,7 +15,7 @@ from web_bridge.frames import cbor, json_text, packed_png, split
 #: From the weakest to the strongest.
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 #: Subscriptions of one client to one topic, which differ in their ids; each change looks at all of them.
-MOST_OF_A_TOPIC = 1000
+MAX_OF_A_TOPIC = 1000
 #: Bytes of latched messages that are kept for clients that subscribe later, for each publisher.
 LARGEST_LATCHED = 64 << 20
 
@@ -103,7 +103,7 @@ class ClientFeed:
     def add(self, name, wish):
         """A subscription; one of the same name is replaced. Raises BridgeError for one too many."""
         with self._lock:
-            if name not in self._wishes and len(self._wishes) >= MOST_OF_A_TOPIC:
+            if name not in self._wishes and len(self._wishes) >= MAX_OF_A_TOPIC:
                 raise BridgeError("this client has %s to %s already; unsubscribe from those that are not "
                                   "needed any more" % (counted(len(self._wishes), "subscription"), self._topic))
             self._wishes[name] = wish

@@ -15,17 +15,17 @@ from web_bridge.errors import BridgeError, FrameError, shown
 from web_bridge.values import from_tag
 
 #: Fragments that are not complete: bytes and messages of one client; beyond, the oldest message is dropped.
-MOST_BYTES_PENDING, MOST_PENDING = 64 << 20, 100
-MOST_FRAGMENTS = 100000
+MAX_BYTES_PENDING, MAX_PENDING = 64 << 20, 100
+MAX_FRAGMENTS = 100000
 #: Fragments of one message to a client; each takes time and memory beside its data, for all clients.
-MOST_FRAGMENTS_SENT = 10000
+MAX_FRAGMENTS_SENT = 10000
 #: Operations in one frame. Programs send one; a text of 64 MB can hold millions, which take gigabytes.
-MOST_OPERATIONS = 10000
+MAX_OPERATIONS = 10000
 #: Lists and objects in one frame: an empty one is a byte or two of the frame, and a hundred times that in memory. A
 #: marker with a point for each of a million places has as many.
-MOST_CONTAINERS = 1000000
+MAX_CONTAINERS = 1000000
 # Values in a binary frame that may have more of them: they are counted one by one.
-_MOST_COUNTED = 2000000
+_MAX_COUNTED = 2000000
 _CONTAINER_HEADS = bytes(range(0x80, 0xC0))
 #: What a fragment takes beside its data [bytes].
 _FRAGMENT_BYTES = 200
@@ -56,8 +56,8 @@ def read_frame(frame):
 
 
 def _read_json(text):
-    if text.count("[") + text.count("{") > MOST_CONTAINERS:
-        raise FrameError("a frame with more than %d lists and objects" % MOST_CONTAINERS)
+    if text.count("[") + text.count("{") > MAX_CONTAINERS:
+        raise FrameError("a frame with more than %d lists and objects" % MAX_CONTAINERS)
     found, at = [], 0
     try:
         while at < len(text):
@@ -65,8 +65,8 @@ def _read_json(text):
                 at += 1
                 continue
             value, at = _DECODER.raw_decode(text, at)
-            if len(found) == MOST_OPERATIONS:
-                raise FrameError("a frame with more than %d operations" % MOST_OPERATIONS)
+            if len(found) == MAX_OPERATIONS:
+                raise FrameError("a frame with more than %d operations" % MAX_OPERATIONS)
             found.append(_operation(value))
     except (ValueError, RecursionError) as error:
         if isinstance(error, FrameError):
@@ -103,7 +103,7 @@ def _read_cbor(data):
 
 def _limit_containers(data):
     """Raise FrameError where CBOR ``data`` has too many lists and objects; else leave everything to the decoder."""
-    if len(data) - len(data.translate(None, _CONTAINER_HEADS)) <= MOST_CONTAINERS:
+    if len(data) - len(data.translate(None, _CONTAINER_HEADS)) <= MAX_CONTAINERS:
         return  # so many bytes at most begin one
     at = values = containers = 0
     while at < len(data):
@@ -116,9 +116,9 @@ def _limit_containers(data):
         containers += kind in (4, 5)
         if kind in (2, 3) and extra < 28:
             at += number
-        if containers > MOST_CONTAINERS or values > _MOST_COUNTED:
+        if containers > MAX_CONTAINERS or values > _MAX_COUNTED:
             raise FrameError("a frame with more than %d lists and objects, or %d values"
-                             % (MOST_CONTAINERS, _MOST_COUNTED))
+                             % (MAX_CONTAINERS, _MAX_COUNTED))
 
 
 def _operation(value):
@@ -188,9 +188,9 @@ def split(text, size):
     """
     if not size or len(text) <= size:
         return [text]
-    if len(text) > size * MOST_FRAGMENTS_SENT:
+    if len(text) > size * MAX_FRAGMENTS_SENT:
         raise FrameError("in fragments of %d characters it would be more than %d; a larger fragment_size is needed"
-                         % (size, MOST_FRAGMENTS_SENT))
+                         % (size, MAX_FRAGMENTS_SENT))
     name, total = "fragment:%d" % next(_NUMBERS), math.ceil(len(text) / size)
     return [json_text({"op": "fragment", "id": name, "data": text[i * size:(i + 1) * size], "num": i, "total": total})
             for i in range(total)]
@@ -212,9 +212,9 @@ class Fragments:
         if not isinstance(name, str | int) or not isinstance(data, str):
             raise FrameError("a fragment needs id and data, a text")
         # 0.11.17 itself sends total as a float.
-        if not _whole(num) or not _whole(total) or not 0 <= num < total <= MOST_FRAGMENTS:
+        if not _whole(num) or not _whole(total) or not 0 <= num < total <= MAX_FRAGMENTS:
             raise FrameError("fragment %s of %s: num must be from 0 to total - 1, and total at most %d"
-                             % (shown(num), shown(total), MOST_FRAGMENTS))
+                             % (shown(num), shown(total), MAX_FRAGMENTS))
         self._forget()
         entry = self._pending.setdefault(name, [self._clock(), total, {}, 0])
         if entry[1] != total:
@@ -233,7 +233,7 @@ class Fragments:
         while self._pending:
             oldest = next(iter(self._pending.values()))
             held = sum(entry[3] for entry in self._pending.values())
-            if oldest[0] >= limit and held <= MOST_BYTES_PENDING and len(self._pending) <= MOST_PENDING:
+            if oldest[0] >= limit and held <= MAX_BYTES_PENDING and len(self._pending) <= MAX_PENDING:
                 return
             self._pending.popitem(last=False)
 

@@ -17,9 +17,9 @@ from web_bridge.errors import BridgeError
 #: Quality of a JPEG, 0 to 100, and compression of a PNG, 0 to 9, where a client does not say them.
 JPEG_QUALITY, PNG_COMPRESSION = 95, 3
 #: Forms in which one image is kept: each may have 50 MB, and clients may ask for any number of sizes.
-MOST_FORMS = 8
+MAX_FORMS = 8
 #: Of a compressed image, which may be a thousandth of its pixels.
-MOST_PIXELS = 64_000_000
+MAX_PIXELS = 64_000_000
 _MACHINE_IS_BIG_ENDIAN = sys.byteorder == "big"
 #: Encoding -> (bits of a channel, channels, conversion to OpenCV's order of colours or None).
 _COLOURS = {
@@ -72,7 +72,7 @@ class Picture:
         """The image in a form; in the loop. Raises BridgeError where it cannot be shown."""
         if form not in self._frames:
             self._frames[form] = asyncio.get_running_loop().run_in_executor(self._pool, self._encode, form)
-            if len(self._frames) > MOST_FORMS:
+            if len(self._frames) > MAX_FORMS:
                 del self._frames[next(iter(self._frames))]
         # One client that goes away must not end the work for the others.
         return await asyncio.shield(self._frames[form])
@@ -111,7 +111,7 @@ def decoded(message):
         pixels = None
         if message.data:
             try:
-                check_picture(bytes(message.data), MOST_PIXELS)
+                check_picture(bytes(message.data), MAX_PIXELS)
             except OSError as error:
                 raise PictureError("its %d bytes of format %r are not shown: %s" % (
                     len(message.data), message.format, error.strerror)) from None

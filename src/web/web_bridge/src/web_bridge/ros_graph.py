@@ -20,7 +20,7 @@ from web_bridge.publications import FirstMessages
 
 #: What is published within this time after a topic was advertised also reaches subscribers that connect within it [s].
 _FIRST_S = 1.0
-_MOST_FIRST, _MOST_FIRST_BYTES = 100, 8 << 20
+_MAX_FIRST, _MAX_FIRST_BYTES = 100, 8 << 20
 #: Age of the master's list of types that a new subscription is compared with [s]: a client with 1,000 subscriptions
 #: does not ask for the whole list 1,000 times.
 _TYPES_S = 0.2
@@ -241,7 +241,7 @@ class _Publisher(rospy.SubscribeListener):
         self.new_message = message_class(type_name)
         self._lock = threading.Lock()
         self._until = time.monotonic() + _FIRST_S
-        self._first = None if latched else FirstMessages(_MOST_FIRST, _MOST_FIRST_BYTES)
+        self._first = None if latched else FirstMessages(_MAX_FIRST, _MAX_FIRST_BYTES)
         self._publisher = rospy.Publisher(topic, self.new_message, subscriber_listener=self, latch=latched,
                                           queue_size=queue_size, tcp_nodelay=True)
 

@@ -7,9 +7,9 @@ from collections import deque
 from web_bridge.errors import BridgeError, ServiceFailed, shown
 
 #: Calls of one client that are under way at a time; further ones wait, up to a number.
-MOST_AT_ONCE, MOST_WAITING = 16, 1000
+MAX_AT_ONCE, MAX_WAITING = 16, 1000
 #: Calls of all clients that are under way at a time: services that never answer must not take all threads.
-MOST_OF_ALL = 256
+MAX_OF_ALL = 256
 
 
 class Call:
@@ -38,7 +38,7 @@ class Call:
 class CallPool:
     """Runs the calls of all clients, each in a separate thread, because a service may take as long as it likes."""
 
-    def __init__(self, most_at_once=MOST_AT_ONCE, most_waiting=MOST_WAITING, most_of_all=MOST_OF_ALL):
+    def __init__(self, most_at_once=MAX_AT_ONCE, most_waiting=MAX_WAITING, most_of_all=MAX_OF_ALL):
         self._limits = (most_at_once, most_waiting, most_of_all)
         self._lock = threading.Lock()
         self._running = {}  # client -> set of Call

@@ -8,7 +8,7 @@ from rospy_fixes.hidden_tokens import hide_in_logs
 
 #: Connections that are no WebSocket: streams of cameras, files, clients that have not asked for anything yet. They need
 #: no token, so their number and their memory are limited.
-MOST_CONNECTIONS = 700
+MAX_CONNECTIONS = 700
 #: A request's body; no server here expects any [bytes].
 LARGEST_BODY = 64 << 10
 #: A connection without a complete request is closed after this time [s].
@@ -38,7 +38,7 @@ def listen(loop_thread, application, endpoint, wait, complain):
 
 
 class LimitedServer(httpserver.HTTPServer):
-    """Beyond MOST_CONNECTIONS a new one closes the oldest: without descriptors, tornado's loop would try to accept
+    """Beyond MAX_CONNECTIONS a new one closes the oldest: without descriptors, tornado's loop would try to accept
     without a pause, and connections that say nothing must not keep others out.
     """
 
@@ -48,7 +48,7 @@ class LimitedServer(httpserver.HTTPServer):
         self._streams = {}  # the oldest first
 
     def handle_stream(self, stream, address):
-        if len(self._streams) >= MOST_CONNECTIONS:
+        if len(self._streams) >= MAX_CONNECTIONS:
             oldest = next(iter(self._streams))
             del self._streams[oldest]
             oldest.close()

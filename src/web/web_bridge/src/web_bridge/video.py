@@ -18,7 +18,7 @@ from web_bridge.access import Access, host_of, origin_of
 from web_bridge.cameras import COMPRESSED, IMAGE
 from web_bridge.errors import BridgeError, NoSuchTopic, Refused, shown
 from web_bridge.pictures import JPEG_QUALITY, PNG_COMPRESSION, Form
-from web_bridge.websocket import MOST_CLIENTS, token_of
+from web_bridge.websocket import MAX_CLIENTS, token_of
 
 _LOG = logging.getLogger("web_bridge")
 BOUNDARY = "boundarydonotcross"
@@ -28,7 +28,7 @@ SNAPSHOT_S = 10.0
 _UNSENT_BYTES = 128 << 10
 _LARGEST_SIDE = 4096
 #: What all streams together hold for clients that have not read it yet [bytes].
-MOST_HELD_BYTES = 256 << 20
+MAX_HELD_BYTES = 256 << 20
 _ENCODED_ELSEWHERE = ("vp8", "vp9", "h264")
 #: Type of a stream -> what its images are encoded as; quality where none is given, and the largest.
 _TYPES = {"mjpeg": ("jpeg", JPEG_QUALITY, 100), "png": ("png", PNG_COMPRESSION, 9),
@@ -134,13 +134,13 @@ class VideoServer:
         self._held_bytes = 0
 
     def hold(self, stream, size):
-        """``stream`` holds ``size`` bytes for its client. Beyond MOST_HELD_BYTES the streams that hold most end."""
+        """``stream`` holds ``size`` bytes for its client. Beyond MAX_HELD_BYTES the streams that hold most end."""
         self._held_bytes += size - self._held.get(stream, 0)
         self._held[stream] = size
-        while self._held_bytes > MOST_HELD_BYTES:
+        while self._held_bytes > MAX_HELD_BYTES:
             largest = max(self._held, key=self._held.get)
             _LOG.warning("a stream ends: clients that do not read hold more than %d MB, and its image has %d MB",
-                         MOST_HELD_BYTES >> 20, self._held[largest] >> 20)
+                         MAX_HELD_BYTES >> 20, self._held[largest] >> 20)
             self.release(largest)
             largest.close()
 
@@ -284,8 +284,8 @@ class StreamHandler(_Handler):
     async def answer(self):
         server = self._server
         query = read_query(self.last_argument, server.options.default_type)
-        if len(server.streams) >= MOST_CLIENTS:
-            raise QueryError(503, "%d streams are open, which is the limit" % MOST_CLIENTS)
+        if len(server.streams) >= MAX_CLIENTS:
+            raise QueryError(503, "%d streams are open, which is the limit" % MAX_CLIENTS)
         topic, form = await server.source(query)
         headers = {**_NOT_KEPT, **self.cross_origin()}
         stream = Stream(self.detach(), topic, form, server)

@@ -23,7 +23,7 @@ _LOG = logging.getLogger("web_bridge")
 #: Threads for operations that may wait for the master.
 _THREADS = 16
 #: Clients at a time; a page that opens connections without end must not use up the descriptors.
-MOST_CLIENTS = 500
+MAX_CLIENTS = 500
 
 
 class SocketOptions(NamedTuple):
@@ -61,7 +61,7 @@ class Clients:
 
     @property
     def is_full(self):
-        return len(self._open) >= MOST_CLIENTS
+        return len(self._open) >= MAX_CLIENTS
 
     def __len__(self):
         return len(self._open)
@@ -191,7 +191,7 @@ class ClientSocket(BufferedSocket):
         raise NotImplementedError
 
     def prepare(self):
-        self.let_in(self._clients.options.access, self._clients.is_full, MOST_CLIENTS)
+        self.let_in(self._clients.options.access, self._clients.is_full, MAX_CLIENTS)
 
     def get_compression_options(self):
         return {} if self._clients.options.use_compression else None

@@ -8,7 +8,7 @@ from std_msgs.msg import Int32, String
 
 from web_bridge.codec import Codec
 from web_bridge.errors import BridgeError
-from web_bridge.feeds import MOST_OF_A_TOPIC, Arrival, Feeds, Wish
+from web_bridge.feeds import MAX_OF_A_TOPIC, Arrival, Feeds, Wish
 from web_bridge.outgoing import OutgoingBuffer
 
 TOPIC = "/chatter"
@@ -103,7 +103,7 @@ def test_the_last_client_takes_the_subscription_along(lab):
 
 
 def test_a_client_has_a_limited_number_of_subscriptions_to_a_topic(lab):
-    for number in range(MOST_OF_A_TOPIC):
+    for number in range(MAX_OF_A_TOPIC):
         lab.subscribe(str(number))
     with pytest.raises(BridgeError, match="this client has 1000 subscriptions to .* already; unsubscribe"):
         lab.subscribe("one more")

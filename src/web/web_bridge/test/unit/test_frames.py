@@ -39,9 +39,9 @@ def test_no_tag_but_those_of_numeric_arrays_is_read():
 
 
 def test_a_frame_of_millions_of_operations_is_refused():
-    assert len(read_frame("{}" * frames.MOST_OPERATIONS)) == frames.MOST_OPERATIONS
+    assert len(read_frame("{}" * frames.MAX_OPERATIONS)) == frames.MAX_OPERATIONS
     with pytest.raises(FrameError, match="more than 10000 operations"):
-        read_frame("{}" * (frames.MOST_OPERATIONS + 1))
+        read_frame("{}" * (frames.MAX_OPERATIONS + 1))
 
 
 def test_a_large_integer_is_refused_without_a_traceback():
@@ -88,7 +88,7 @@ def test_a_picture_of_many_chunks_takes_no_longer():
 @pytest.mark.parametrize("encode", [json.dumps, cbor2.dumps], ids=["json", "cbor"])
 @pytest.mark.parametrize("thing", [{}, []], ids=["objects", "lists"])
 def test_lists_and_objects_in_a_frame_have_a_limit(monkeypatch, encode, thing):
-    monkeypatch.setattr(frames, "MOST_CONTAINERS", 1000)
+    monkeypatch.setattr(frames, "MAX_CONTAINERS", 1000)
     assert read_frame(encode({"a": [thing] * 998}))
     with pytest.raises(FrameError, match="more than 1000 lists and objects"):
         read_frame(encode({"a": [thing] * 999}))
@@ -96,14 +96,14 @@ def test_lists_and_objects_in_a_frame_have_a_limit(monkeypatch, encode, thing):
 
 @pytest.mark.parametrize("size", [10, 200, 60000, 70000])
 def test_only_lists_and_objects_of_cbor_count_not_bytes_like_theirs(monkeypatch, size):
-    monkeypatch.setattr(frames, "MOST_CONTAINERS", 6)
+    monkeypatch.setattr(frames, "MAX_CONTAINERS", 6)
     found = {"data": b"\xa0" * size, "name": "\u0080" * size, "n": [2 ** 60, -2 ** 20, 200.5, None],
              "o": {"p": []}}
     assert read_frame(cbor2.dumps(found)) == [found]
-    monkeypatch.setattr(frames, "MOST_CONTAINERS", 3)
+    monkeypatch.setattr(frames, "MAX_CONTAINERS", 3)
     with pytest.raises(FrameError, match="more than 3 lists"):
         read_frame(cbor2.dumps(found))
-    monkeypatch.setattr(frames, "_MOST_COUNTED", 12)
+    monkeypatch.setattr(frames, "_MAX_COUNTED", 12)
     with pytest.raises(FrameError, match="or 12 values"):
         read_frame(cbor2.dumps({"data": b"\xa0" * size, "n": list(range(20))}))
 
@@ -137,7 +137,7 @@ def test_halves_do_not_pile_up():
 
 def test_empty_fragments_do_not_pile_up(monkeypatch):
     # Of 64 MiB it would need too many.
-    monkeypatch.setattr(frames, "MOST_BYTES_PENDING", 10_000)
+    monkeypatch.setattr(frames, "MAX_BYTES_PENDING", 10_000)
     fragments = Fragments(lambda: 0.0, 10.0)
     for number in range(2000):
         fragments.add({"id": number // 20, "data": "", "num": number % 20, "total": 21})

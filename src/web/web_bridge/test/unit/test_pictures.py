@@ -174,5 +174,5 @@ def test_an_image_is_kept_in_a_limited_number_of_forms(monkeypatch):
             assert (await picture.encoded(Form(width=width))).data == b"file"
         return len(picture._frames)
     with ThreadPoolExecutor(2) as pool:
-        assert asyncio.run(ask()) == pictures.MOST_FORMS
+        assert asyncio.run(ask()) == pictures.MAX_FORMS
     assert encoded == [*range(1, 1001), 1]

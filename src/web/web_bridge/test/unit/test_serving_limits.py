@@ -74,7 +74,7 @@ def test_a_connection_without_a_complete_request_is_closed(text):
 
 
 def test_connections_that_say_nothing_keep_nobody_out(served, monkeypatch):
-    monkeypatch.setattr(serving, "MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(serving, "MAX_CONNECTIONS", 3)
     silent = [served.connect() for _ in range(3)]
     request = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
     asking = served.connect(request)
@@ -87,7 +87,7 @@ def test_connections_that_say_nothing_keep_nobody_out(served, monkeypatch):
 
 
 def test_connections_that_have_ended_do_not_count(served, monkeypatch):
-    monkeypatch.setattr(serving, "MOST_CONNECTIONS", 3)
+    monkeypatch.setattr(serving, "MAX_CONNECTIONS", 3)
     silent = served.connect()
     for _ in range(5):
         # Closed by the server, one after the other.

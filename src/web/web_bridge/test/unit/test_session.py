@@ -14,7 +14,7 @@ from lab_testing.waiting import wait_until
 from web_bridge.access import Access, Rules
 from web_bridge.errors import ServiceFailed
 from web_bridge.frames import packed_png, split
-from web_bridge.services import MOST_AT_ONCE
+from web_bridge.services import MAX_AT_ONCE
 
 
 def values(lab, topic="/chatter"):
@@ -142,9 +142,9 @@ def test_calls_of_a_client_that_has_gone_take_no_place(lab):
     client, release = lab.connect(), threading.Event()
     asked = []
     lab.graph.services["/slow"] = ("std_srvs/SetBool", lambda request: asked.append(1) or release.wait(6000))
-    for number in range(MOST_AT_ONCE + 1):
+    for number in range(MAX_AT_ONCE + 1):
         client.send("call_service", service="/slow", id=number)
-    wait_until(lambda: len(asked) == MOST_AT_ONCE, "the calls")
+    wait_until(lambda: len(asked) == MAX_AT_ONCE, "the calls")
     client.socket.close()
     wait_until(lambda: not lab.bridge.calls.under_way, "the end of the calls")
     release.set()

@@ -156,7 +156,7 @@ def test_a_client_that_does_not_read_gets_the_newest_and_holds_up_nobody(lab):
 
 
 def test_streams_of_clients_that_do_not_read_hold_a_limited_amount(lab, monkeypatch, caplog):
-    monkeypatch.setattr(video, "MOST_HELD_BYTES", 40 << 20)
+    monkeypatch.setattr(video, "MAX_HELD_BYTES", 40 << 20)
     small = lab.stream()
     # 24 MB each, more than the kernel keeps for a connection.
     large = [lab.stream("topic=%s&type=png&quality=0&width=4000&height=%d" % (IMAGE, height))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable
 
 PERIOD_S = 60.0
 # A line quotes what others send. Its longest text [characters]; kinds that are remembered, the oldest are forgotten.
-LONGEST_LINE, MOST_KINDS = 1000, 1000
+LONGEST_LINE, MAX_KINDS = 1000, 1000
 
 
 def printable(text: str) -> str:
@@ -39,7 +39,7 @@ class EventLog:
                 return
             self._kinds.pop(kind, None)
             self._kinds[kind] = now, 0
-            if len(self._kinds) > MOST_KINDS:
+            if len(self._kinds) > MAX_KINDS:
                 del self._kinds[next(iter(self._kinds))]
         text = printable(text)
         with contextlib.suppress(Exception):  # what the log meets must not end the thread that serves others

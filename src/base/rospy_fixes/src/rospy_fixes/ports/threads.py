@@ -18,7 +18,7 @@ RETRY_S = 0.1
 #: The ending of the name of the status on /diagnostics; before it stands the node's name, or what it is called there.
 STATUS_NAME = "threads"
 # Kinds of threads that are told apart; beyond it, the oldest is forgotten. Longest text of an error [characters].
-_MOST_PLACES, _LONGEST_TEXT = 100, 300
+_MAX_PLACES, _LONGEST_TEXT = 100, 300
 
 
 def lasting(faults: ThreadFaults, place: str, loop: Callable, retry_s: float = RETRY_S) -> Callable:
@@ -58,7 +58,7 @@ class ThreadFaults:
         with self._lock:
             count, _ = self._places.get(place, (0, ""))
             self._places[place] = count + 1, text
-            if len(self._places) > _MOST_PLACES:
+            if len(self._places) > _MAX_PLACES:
                 del self._places[next(iter(self._places))]
         self.news.set()
         self._events.add(("thread", place), "thread %s: %s; %s" % (place, text, consequence))

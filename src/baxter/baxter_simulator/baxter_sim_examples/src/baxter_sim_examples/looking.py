@@ -19,7 +19,7 @@ _AROUND = 3.0
 # Sides that a block may seem to have, as shares of its true side.
 _SIDES = (0.75, 1.3)
 # Range readings of which this many, or more, tell something [m].
-_LEAST_READINGS, _NOTHING_M = 5, 1.0
+_MIN_READINGS, _NOTHING_M = 5, 1.0
 # A reading that is farther from the others is wrong, or is that of another surface [m].
 _OUTLIER_M = 0.015
 
@@ -100,7 +100,7 @@ def table_height(sensor_m, readings):
     """Height [m] of what is below a range sensor that looks straight down from height `sensor_m` [m]: by the mean of
     those of its readings [m] that are near their median. Raises NotSeen where fewer than five say something."""
     heard = [reading for reading in readings if reading < _NOTHING_M]
-    if len(heard) < _LEAST_READINGS:
+    if len(heard) < _MIN_READINGS:
         raise NotSeen("the range sensor at %.2f m sees no table: %d of %s have an echo" % (
             sensor_m, len(heard), counted(len(readings), "reading")))
     heard = np.array(heard)

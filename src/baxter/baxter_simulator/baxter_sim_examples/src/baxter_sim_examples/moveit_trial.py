@@ -17,7 +17,7 @@ from .scene import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_SIZE_M, TABLE_TOP_M, TABLE
 ARM, READY, FINGER = "left_arm", "left_neutral", "l_gripper_l_finger_joint"
 OTHER_ARM = "right_arm"
 # Length of the hand's approach and retreat, desired and least [m].
-_WAY_M, _LEAST_WAY_M = 0.12, 0.06
+_WAY_M, _MIN_WAY_M = 0.12, 0.06
 # Beyond the joint's limits: as wide as the fingers go, and as far as the block lets them [m].
 _OPEN_M, _CLOSED_M = 1.0, -1.0
 _PLANNING_S = 20.0
@@ -128,7 +128,7 @@ def _place(spot):
 
 def _way(message, frame, direction):
     message.direction.header.frame_id, message.direction.vector.z = frame, direction
-    message.desired_distance, message.min_distance = _WAY_M, _LEAST_WAY_M
+    message.desired_distance, message.min_distance = _WAY_M, _MIN_WAY_M
 
 
 def _fingers(opening):

@@ -7,7 +7,7 @@ import numpy as np
 from command_line.options import counted
 
 # So often a plane is fitted at most; a few times are usual.
-_MOST_FITS = 20
+_MAX_FITS = 20
 
 
 class NoPlane(Exception):
@@ -51,7 +51,7 @@ def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
         raise NoPlane("no three of the %s span a plane" % counted(len(points), "point"))
     # Fitted again to the points near the fitted plane: a plane through three noisy points is tilted, and so are the
     # borders of the points near it.
-    for _ in range(_MOST_FITS):
+    for _ in range(_MAX_FITS):
         plane = _fitted(points, best, upwards, tolerance_m)
         if (plane.inliers == best).all() or plane.inliers.sum() < 3:
             break

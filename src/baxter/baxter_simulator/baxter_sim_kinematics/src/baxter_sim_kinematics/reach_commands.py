@@ -24,11 +24,11 @@ from baxter_sim_kinematics.commands import (
     tell,
     with_numbers,
 )
-from command_line.options import MOST_WORKERS, number
+from command_line.options import MAX_WORKERS, number
 from command_line.user_files import PIPE_WAIT_S, read_text
 
 # Of a file of poses.
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 
 
 def _reach_parser():
@@ -51,7 +51,7 @@ def _reach_parser():
     parser.add_argument("--hdf5", action="store_true",
                         help="write reach.h5 and capability.h5 as well, in the layouts of Reuleaux")
     parser.add_argument("--out", type=Path, default=Path("reach"), help="folder (default: reach)")
-    parser.add_argument("--jobs", type=number(int, 1, MOST_WORKERS), default=len(os.sched_getaffinity(0)),
+    parser.add_argument("--jobs", type=number(int, 1, MAX_WORKERS), default=len(os.sched_getaffinity(0)),
                         help="processes (default: all cores)")
     return parser
 
@@ -230,7 +230,7 @@ def _is_solved(chain, pose, checker):
 
 def _task_poses(path):
     poses = []
-    for row, line in enumerate(read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines(), 1):
+    for row, line in enumerate(read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines(), 1):
         words = line.replace(",", " ").replace(";", " ").split()
         if not words or words[0].startswith("#"):
             continue

@@ -17,7 +17,7 @@ _STEPS = 25
 _DAMPING, _LONGEST = 1e-4, 0.5
 # Smaller residuals count as zero [rad or m].
 _NONE = 1e-10
-_LEAST_COSINE = 0.05
+_MIN_COSINE = 0.05
 
 
 class Manifold:
@@ -157,7 +157,7 @@ def _of_angles(angles):
     y, then the new z."""
     sine_x, cosine_x = math.sin(angles[0]), math.cos(angles[0])
     sine_y, cosine_y = math.sin(angles[1]), math.cos(angles[1])
-    cosine_y = math.copysign(max(abs(cosine_y), _LEAST_COSINE), cosine_y)
+    cosine_y = math.copysign(max(abs(cosine_y), _MIN_COSINE), cosine_y)
     about_z = np.array([0.0, -sine_x / cosine_y, cosine_x / cosine_y])
     return np.array([np.array([1.0, 0.0, 0.0]) - sine_y * about_z, [0.0, cosine_x, sine_x], about_z])
 

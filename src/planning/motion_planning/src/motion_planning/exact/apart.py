@@ -30,10 +30,12 @@ def stack():
 
 
 @compiled
-def pair_apart(one, i, turn_a, place_a, other, j, turn_b, place_b, waiting):
-    """Whether shape i of the forms ``one`` is proven to be apart from shape j of ``other``. turn (3, 3), place (3,): of
-    the bounds' axes and centre. False only means that there is no proof.
+def pair_apart(one, here, other, there, waiting):
+    """Whether a shape of the forms ``one`` is proven to be apart from one of ``other``. here, there: the shape's index,
+    and the turn (3, 3) and place (3,) of its bounds' axes and centre. False only means that there is no proof.
     """
+    i, turn_a, place_a = here
+    j, turn_b, place_b = there
     kinds_a, firsts_a, counts_a, nodes_a = one
     kinds_b, firsts_b, counts_b, nodes_b = other
     waiting[0, 0], waiting[0, 1] = 0, 0
@@ -48,7 +50,7 @@ def pair_apart(one, i, turn_a, place_a, other, j, turn_b, place_b, waiting):
         centre_a, centre_b = _moved(turn_a, place_a, box_a), _moved(turn_b, place_b, box_b)
         ends_a, ends_b = 2 * a + 1 >= counts_a[i], 2 * b + 1 >= counts_b[j]
         # Many steps for each box of a tree would take longer than a look at its parts.
-        if _convex_apart(kinds_a[i], turn_a, centre_a, box_a[3:], kinds_b[j], turn_b, centre_b, box_b[3:],
+        if _convex_apart((kinds_a[i], turn_a, centre_a, box_a[3:]), (kinds_b[j], turn_b, centre_b, box_b[3:]),
                          _STEPS if ends_a and ends_b else 0):
             continue
         if ends_a and ends_b or count + 2 > _ROOM:
@@ -78,8 +80,12 @@ def _size(box):
 
 
 @compiled
-def _convex_apart(kind_a, turn_a, centre_a, half_a, kind_b, turn_b, centre_b, half_b, steps):
-    """Whether a plane between two convex shapes is found, in some ``steps`` beyond that of their boxes."""
+def _convex_apart(one, other, steps):
+    """Whether a plane between two convex shapes (kind, turn, centre, half sides) is found, in some ``steps`` beyond
+    that of their boxes.
+    """
+    kind_a, turn_a, centre_a, half_a = one
+    kind_b, turn_b, centre_b, half_b = other
     if kind_b == PLANE:
         return _apart_from_plane(kind_a, turn_a, centre_a, half_a, turn_b, centre_b)
     if kind_a == PLANE:

@@ -218,8 +218,8 @@ class ExactChecker:
     def _unproven(self, query, postures):
         """List of [number of a posture (p, n), i, j], as from kernels.unproven, without allowed pairs."""
         kinematics, _, base = query.robot
-        arguments = ((kinematics, base), postures, query.movers.arrays, query.pairs, query.moving, query.fixed.arrays,
-                     query.poses)
+        arguments = ((kinematics, base), postures, query.movers.arrays, (query.pairs, *query.moving),
+                     query.fixed.arrays, query.poses)
         count = kernels.unproven(*arguments, self._rows)
         if count > len(self._rows):
             self._rows = np.empty((2 * count, 3), dtype=np.int64)

@@ -13,7 +13,7 @@ from urdf_model import Box, Cylinder, Plane, Sphere
 
 _KINDS = {Sphere: apart.SPHERE, Cylinder: apart.CYLINDER, Cone: apart.CONE, Plane: apart.PLANE}
 # The greatest number of triangles or cubes in a leaf of a shape's tree of boxes, and the most levels of such a tree.
-_IN_A_LEAF, _MOST_LEVELS = 4, 14
+_IN_A_LEAF, _MAX_LEVELS = 4, 14
 #: Half the side of a plane's box [m]: larger than any scene.
 _ENDLESS = 1e6
 
@@ -65,7 +65,7 @@ def form_of(shape, bounds):
     else:
         side = 0.5 * shape.boxes[:, 3:]
         low, high = shape.boxes[:, :3] - side, shape.boxes[:, :3] + side
-    levels = min(_MOST_LEVELS, max(0, math.ceil(math.log2(len(low) / _IN_A_LEAF))))
+    levels = min(_MAX_LEVELS, max(0, math.ceil(math.log2(len(low) / _IN_A_LEAF))))
     middle, order = low + high, np.arange(len(low))[None]
     # Each level cuts all groups in half along their longest sides; where they are not equal, one is in both halves.
     for _ in range(levels):

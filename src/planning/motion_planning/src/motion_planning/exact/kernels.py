@@ -51,16 +51,16 @@ def fill_poses(robot, movers, poses):
 
 
 @compiled
-def unproven(robot, postures, movers, pairs, moving, fixed, poses, out):
+def unproven(robot, postures, movers, checked, fixed, poses, out):
     """Fill ``out`` (o, 3) with what may touch; return how many rows there are, which may be more than ``out`` has.
 
     robot: kinematics, base. postures (p, n). A row is the index of a posture and two movers, or a mover and -1 - the
-    fixed shape, that are not proven to be apart. pairs (p, 2): movers that are checked against each other; moving: the
-    indices of the links that differ between postures, and of the movers on them, which are checked against fixed
+    fixed shape, that are not proven to be apart. checked: pairs (p, 2) of movers that are checked against each other;
+    the indices of the links that differ between postures, and of the movers on them, which are checked against fixed
     shapes. Fills ``poses`` (m, 4, 4), of the last posture.
     """
     kinematics, base = robot
-    links, active = moving
+    pairs, links, active = checked
     work = _work_arrays(kinematics, poses)
     rotations, places = work[2], work[3]
     halves, radii, forms = movers[3], movers[4], movers[5]
@@ -78,7 +78,7 @@ def unproven(robot, postures, movers, pairs, moving, fixed, poses, out):
             reach = radii[i] + radii[j] + 1e-6
             if _square(places[i], places[j]) <= reach * reach and boxes_meet(
                     rotations[i], places[i], halves[i], rotations[j], places[j], halves[j]) and not pair_apart(
-                    forms, i, rotations[i], places[i], forms, j, rotations[j], places[j], stack):
+                    forms, (i, rotations[i], places[i]), forms, (j, rotations[j], places[j]), stack):
                 if found < out.shape[0]:
                     out[found, 0], out[found, 1], out[found, 2] = p, i, j
                 found += 1
@@ -91,7 +91,7 @@ def unproven(robot, postures, movers, pairs, moving, fixed, poses, out):
                     reach = radii[i] + 1e-6
                     if _square_to_box(places[i], turns[k], centres[k], sides[k]) <= reach * reach and boxes_meet(
                             rotations[i], places[i], halves[i], turns[k], centres[k], sides[k]) and not pair_apart(
-                            forms, i, rotations[i], places[i], fixed_forms, k, turns[k], centres[k], stack):
+                            forms, (i, rotations[i], places[i]), fixed_forms, (k, turns[k], centres[k]), stack):
                         if found < out.shape[0]:
                             out[found, 0], out[found, 1], out[found, 2] = p, i, -1 - k
                         found += 1

@@ -13,7 +13,7 @@ ROBOT, OBJECT, ATTACHED = "robot", "object", "attached"
 #: Fixed shapes of one chunk: all of them are passed over when the chunk's ball is far away.
 _CHUNK = 32
 # Greatest number of pairs of shapes that move with the robot.
-_MOST_PAIRS = 5_000_000
+_MAX_PAIRS = 5_000_000
 
 
 class Part(NamedTuple):
@@ -108,10 +108,10 @@ class Movers:
         numbers = [np.array(some) for some in of.values()]
         apart = np.argwhere(np.triu(~may, 1))
         count = sum(len(numbers[a]) * len(numbers[b]) for a, b in apart)
-        if count > _MOST_PAIRS:
+        if count > _MAX_PAIRS:
             raise PlanningError("the robot holds objects of %d shapes, %d pairs of which would have to be checked; at "
                                 "most %d are. Join shapes to a mesh, or allow what is held to touch"
-                                % (len(self.parts), count, _MOST_PAIRS))
+                                % (len(self.parts), count, _MAX_PAIRS))
         found = [np.stack(np.meshgrid(numbers[a], numbers[b], indexing="ij"), axis=-1).reshape(-1, 2) for a, b in apart]
         if not found:
             return np.empty((0, 2), dtype=np.int64)

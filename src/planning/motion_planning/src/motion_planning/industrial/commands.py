@@ -19,15 +19,15 @@ PLANNERS = ("PTP", "LIN", "CIRC")
 
 # Steps of inverse kinematics along a path [m], [rad]; and their least number.
 _STEP_M, _STEP_RAD, _FEWEST_STEPS = 0.01, 0.05, 8
-_MOST_STEPS = 3000
+_MAX_STEPS = 3000
 # Allowed distance of the link from its path, also between the trajectory's points [m], [rad].
 DEVIATION_M, DEVIATION_RAD = 5e-4, 5e-3
 # Where it is checked, between two points of a trajectory.
 _BETWEEN = np.array([0.2, 0.5, 0.8])
 # Greatest number of halvings until it holds, and greatest number of points before.
-_HALVINGS, _MOST_POINTS = 6, 2000
+_HALVINGS, _MAX_POINTS = 6, 2000
 # Greatest factor by which lines and arcs are slowed down for the joints' limits, and margin of each slowing.
-_MOST_STRETCH, _MORE = 20.0, 1.002
+_MAX_STRETCH, _MORE = 20.0, 1.002
 # A command with smaller motions of all joints [rad or m], or of its link [m or rad], is already done.
 _NOTHING = 1e-6
 # Greatest distance of checked states [rad or m, in any joint], and number of them between two calls of ``stop``.
@@ -132,7 +132,7 @@ def in_time(way, limits=None, stretch=1.0):
     if not way.moves:
         still = way.curve.at(np.zeros(1))[0]
         return Timed(np.zeros(1), still, np.zeros_like(still), np.zeros_like(still)), profile, stretch
-    intervals = min(max(2, math.ceil(profile.duration / (0.5 * WINDOW_S))), _MOST_POINTS)
+    intervals = min(max(2, math.ceil(profile.duration / (0.5 * WINDOW_S))), _MAX_POINTS)
     for _ in range(_HALVINGS + 1):
         timed = _points(way, profile, np.linspace(0.0, profile.duration, intervals + 1))
         if _deviation(way, profile, timed) <= 1.0:
@@ -147,7 +147,7 @@ def in_time(way, limits=None, stretch=1.0):
     excess = _excess(way, timed)
     if excess <= 1.0:
         return timed, profile, stretch
-    if stretch * excess > _MOST_STRETCH:
+    if stretch * excess > _MAX_STRETCH:
         raise _too_slow(way, timed, stretch * excess)
     return in_time(way, limits, stretch * excess * _MORE)
 
@@ -240,9 +240,9 @@ def _followed(path, follower, start, doing):
     """The Spline of joints along ``path``; doing: (planner, stop())."""
     planner, stop = doing
     steps = max(_FEWEST_STEPS, math.ceil(path.length / _STEP_M), math.ceil(path.angle / _STEP_RAD))
-    if steps > _MOST_STEPS:
+    if steps > _MAX_STEPS:
         raise PlanningFailure(Code.INVALID_GOAL_CONSTRAINTS, "the way is %.1f m long; the most is %.1f m"
-                              % (path.length, _MOST_STEPS * _STEP_M))
+                              % (path.length, _MAX_STEPS * _STEP_M))
     points = [start]
     for step in range(steps):
         if stop():

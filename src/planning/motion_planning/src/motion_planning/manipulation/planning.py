@@ -18,7 +18,7 @@ _STEP_M, _CORNER, _RESOLUTION = 0.02, 0.001, 0.02
 # Greatest further motion of a hand that must come as close as possible [m].
 _CLOSEST_M = 1.0
 # Number of the arm's postures after which a candidate is rejected: all, and those without collision at the grasp.
-_MOST_POSTURES, _MOST_FREE_POSTURES = 40, 6
+_MAX_POSTURES, _MAX_FREE_POSTURES = 40, 6
 # Greatest share of the remaining time for one candidate while there are others.
 _SHARE = 0.5
 # Number of rejected candidates in a sentence.
@@ -180,7 +180,7 @@ class _Attempt:
             self.fallen = fallen
         self.tried += 1
         self.free += fallen.stage != CONTACT
-        if self.tried >= _MOST_POSTURES or self.free >= _MOST_FREE_POSTURES or self.tools.stop():
+        if self.tried >= _MAX_POSTURES or self.free >= _MAX_FREE_POSTURES or self.tools.stop():
             raise self.fallen
 
     def _ways_through(self, scene, state):

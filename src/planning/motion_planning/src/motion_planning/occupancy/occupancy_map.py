@@ -12,7 +12,7 @@ from urdf_model.transforms import inverse
 # through it, and the greatest value of a cell. A cell at 0 is removed.
 _HIT, _MISS, _MOST = 0.85, -0.4, 3.5
 # Cells that can be taken from elsewhere: a tenth of a gigabyte.
-_MOST_CELLS = 5e6
+_MAX_CELLS = 5e6
 
 
 class View(NamedTuple):
@@ -84,8 +84,8 @@ class OccupancyMap:
                                  % (octree.resolution, self.resolution))
             wide = np.rint(octree.boxes[:, 3] / self.resolution).astype(np.int64)
             count = float((wide.astype(float) ** 3).sum())
-            if count > _MOST_CELLS:
-                raise ValueError("it fills %.3g cells; at most %.3g can be kept" % (count, _MOST_CELLS))
+            if count > _MAX_CELLS:
+                raise ValueError("it fills %.3g cells; at most %.3g can be kept" % (count, _MAX_CELLS))
             lowest = np.rint(octree.boxes[:, :3] / self.resolution - 0.5 * wide[:, None]).astype(np.int64)
             parts = [low + np.indices((n, n, n)).reshape(3, -1).T for low, n in zip(lowest, wide, strict=True)]
             cells = np.concatenate(parts) + kernels.MIDDLE

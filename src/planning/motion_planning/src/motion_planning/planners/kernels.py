@@ -151,13 +151,14 @@ def _without_idle(path, count):
 
 
 @compiled
-def shortcut(tables, path, count, numbers, step, tries, misses, single):
+def shortcut(tables, path, count, numbers, step, effort):
     """Shorten a path in place between two random points of it, if that is free and saves enough: all joints on a
     straight line, or one random joint while the others stay on their way (Geraerts and Overmars 2007).
 
-    path (room, k), of which the first ``count`` rows count; each success adds at most 2 rows. Ends after ``tries`` or
-    after ``misses`` in a row. single: the share of tries with one joint. Returns the new count.
+    path (room, k), of which the first ``count`` rows count; each success adds at most 2 rows. effort: the number of
+    tries, that of misses in a row which ends them, and the share of tries with one joint. Returns the new count.
     """
+    tries, misses, single = effort
     room, k = path.shape
     work = work_arrays(tables[0])
     a, b = np.empty(k, np.float32), np.empty(k, np.float32)

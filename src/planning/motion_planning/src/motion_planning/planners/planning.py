@@ -23,7 +23,7 @@ _SHARE_OF_SPHERES = 0.7
 # The share of the time after which what is not yet prepared of a scene is made as coarse as possible, and the same in
 # s for requests without a limit. The preparation ends after all of the time, or this time [s] if that is longer, since
 # scenes of thousands of objects must be planned for on slow machines too; the search has at least this share.
-_SHARE_OF_TABLES, _TABLES_S, LEAST_FOR_SCENE_S, SHARE_OF_SEARCH = 0.4, 5.0, 20.0, 0.3
+_SHARE_OF_TABLES, _TABLES_S, MIN_FOR_SCENE_S, SHARE_OF_SEARCH = 0.4, 5.0, 20.0, 0.3
 # The share of the time within which a path may be made shorter.
 _SHARE_TO_IMPROVE = 0.5
 # After exact geometry has refused a path, the search is repeated with states on its edges closer by this factor each
@@ -144,7 +144,7 @@ class _Planning:
         self.begin = self.last = search.clock()
         self.times = {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
-        end = self.begin + max(search.allowed_time, LEAST_FOR_SCENE_S)
+        end = self.begin + max(search.allowed_time, MIN_FOR_SCENE_S)
         preparing = Run(search.seed, end, search.clock, search.stop)
         self.checker = checker_of(search.exact, scene, self.group, Patience(
             lambda: not self._left(_SHARE_OF_TABLES), lambda: preparing.check("the scene was prepared for planning")))

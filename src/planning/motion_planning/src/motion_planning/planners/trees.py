@@ -14,7 +14,7 @@ from motion_planning.planners.errors import NoPath
 REACH = 0.5
 #: Number of samples between two checks of the clock: about 2 ms.
 SAMPLES = 1000
-_LEAST_ROOM, _MOST_ROOM = 4096, 1 << 20
+_MIN_ROOM, _MAX_ROOM = 4096, 1 << 20
 _ALL = (1 << 64) - 1
 # Shortcuts: total tries, failed tries in a row.
 _TRIES, _MISSES = 200, 30
@@ -108,12 +108,12 @@ def improve(path, checker, run):
     return path
 
 
-def _shorter(path, checker, numbers, how):
-    """how: tries, misses, share of a single joint, see ``kernels.shortcut``."""
+def _shorter(path, checker, numbers, effort):
+    """effort: as of ``kernels.shortcut``."""
     count = len(path.points)
-    points = np.empty((count + 2 * how[0] + 2, path.points.shape[1]), np.float32)
+    points = np.empty((count + 2 * effort[0] + 2, path.points.shape[1]), np.float32)
     points[:count] = path.points
-    count = kernels.shortcut(checker.tables, points, count, numbers, np.float32(checker.resolution), *how)
+    count = kernels.shortcut(checker.tables, points, count, numbers, np.float32(checker.resolution), effort)
     return path._replace(points=points[:count].astype(float))
 
 
@@ -129,7 +129,7 @@ def _numbers(seed):
 
 def _seeds(start, goals, seed):
     """Trees that consist of their roots."""
-    room = max(_LEAST_ROOM, 2 * len(goals) + 16)
+    room = max(_MIN_ROOM, 2 * len(goals) + 16)
     room += -room % 16
     nodes, parents = np.empty((2, len(start), room), np.float32), np.full((2, room), -1, np.int32)
     numbers = _numbers(seed)
@@ -141,7 +141,7 @@ def _seeds(start, goals, seed):
 def _roomier(trees):
     nodes, parents, numbers = trees
     room = 4 * nodes.shape[2]
-    if room > _MOST_ROOM:
+    if room > _MAX_ROOM:
         raise NoPath("a path was looked for until memory was full: %d samples were drawn" % numbers[6])
     more = np.empty((2, nodes.shape[1], room), np.float32)
     more[:, :, : nodes.shape[2]] = nodes

@@ -18,7 +18,7 @@ _SPACING = 0.5
 _BETWEEN = 0.75 * _SPACING
 # Greatest number of samples times centres of a box or cylinder, estimated by its area and volume: larger ones get a
 # larger tolerance. Long and thin ones have more samples than that, at most by this factor.
-_MOST, _MOST_IF_THIN = 40_000_000, 8
+_MOST, _MAX_IF_THIN = 40_000_000, 8
 # Samples of a mesh are at most this far from each of its points, and voxels have this size [tolerances].
 _MESH_SPACING, _MESH_CELL = 0.3, 0.6
 # Half of the largest side [m].
@@ -29,7 +29,7 @@ _SIDES, _CUBES = 0.8, 0.3
 # Number of samples of a mesh that are made at a time, which bounds memory.
 _AT_ONCE = 500_000
 # The outside of a mesh is extended by at most so many sweeps; what they do not reach in a maze counts as inside.
-_MOST_SWEEPS = 24
+_MAX_SWEEPS = 24
 #: Added to each radius [m]: rounding error of single floats.
 ROUNDING = 2e-5
 
@@ -155,7 +155,7 @@ class _solid_box:
         # Estimated number of samples and centres; a large solid is sampled more coarsely.
         area, volume = 8.0 * (half * np.roll(half, 1)).sum(), 8.0 * half.prod()
         while (area / (tolerance * _SPACING) ** 2) * (volume / tolerance**3 + area / tolerance**2) > _MOST or \
-                _distances(half, tolerance) > _MOST_IF_THIN * _MOST:
+                _distances(half, tolerance) > _MAX_IF_THIN * _MOST:
             tolerance *= 1.25
         spacing, self.tolerance = tolerance * _SPACING, tolerance
         self.between = spacing * _BETWEEN / _SPACING
@@ -367,7 +367,7 @@ def voxels(samples, pitch, fill=True):
     outside[0], outside[-1], outside[:, 0], outside[:, -1], outside[:, :, 0], outside[:, :, -1] = (True,) * 6
     outside &= ~full
     count = -1
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(_MAX_SWEEPS):
         if count == outside.sum():
             break
         count = outside.sum()

@@ -32,14 +32,14 @@ from urdf_model import Box, Cylinder, Mesh
 TOLERANCE_M = 0.01
 _THIN_SHARE = 0.35
 # ... but not less than this share of the tolerance.
-_LEAST_SHARE = 0.4
+_MIN_SHARE = 0.4
 #: Boxes that replace a mesh have sides of this size and its multiples [m]...
 MESH_CELL_M = 0.006
 # ... or larger ones, so that the longest side of the mesh has at most this many.
-_MOST_CELLS = 150
+_MAX_CELLS = 150
 # Greatest number of boxes of a mesh and of samples on it, and the growth of the cells where one of the two is exceeded.
-_MOST_BOXES, _COARSER = 20_000, 1.6
-_MOST_POINTS, _LARGER = 8_000_000, 1.25
+_MAX_BOXES, _COARSER = 20_000, 1.6
+_MAX_POINTS, _LARGER = 8_000_000, 1.25
 # Boxes reach beyond the samples in their cells by this share of a cell, the distance of samples.
 _SHARE_BEYOND = 0.3
 # A shape without time for more is covered by balls around this many parts of its longest side.
@@ -47,7 +47,7 @@ _PARTS = 4
 # Boxes and spheres that are coarser than usual by more than this factor are worth a remark.
 _REMARKABLE = 1.3
 # Tables of robots and of links that stand still; maps of pairs of links; tables of whole scenes, which are large.
-_MOST_KEPT, _MOST_MAPS, _MOST_SCENES = 400, 10_000, 4
+_MAX_KEPT, _MAX_MAPS, _MAX_SCENES = 400, 10_000, 4
 # What is kept on disk is made by these.
 _SOURCES = [Path(__file__).with_name(name) for name in ("cover.py", "covering.py", "pair_maps.py")]
 
@@ -70,7 +70,7 @@ class SphereModel:
         self._parts, self._spheres, self._fixed = parts, {}, {}
         #: What was made for a key: ``kept(key, make)`` returns ``make()``, made again only when many others have been
         #: asked for since; ``maps`` and ``scenes`` the same for maps of pairs of links, and for tables of whole scenes.
-        self.kept, self.maps, self.scenes = Kept(_MOST_KEPT), Kept(_MOST_MAPS), Kept(_MOST_SCENES)
+        self.kept, self.maps, self.scenes = Kept(_MAX_KEPT), Kept(_MAX_MAPS), Kept(_MAX_SCENES)
 
     @classmethod
     def of(cls, model, meshes, tolerance=TOLERANCE_M):
@@ -142,7 +142,7 @@ def fitting(parts, tolerance):
     """Return the tolerance [m] for parts of these sizes: thin parts get a closer fit."""
     half = [0.5 * min(geometry.size) for geometry, _ in parts if isinstance(geometry, Box)]
     half += [min(geometry.radius, 0.5 * geometry.length) for geometry, _ in parts if isinstance(geometry, Cylinder)]
-    return tolerance * float(np.clip(_THIN_SHARE * min(half, default=np.inf) / tolerance, _LEAST_SHARE, 1.0))
+    return tolerance * float(np.clip(_THIN_SHARE * min(half, default=np.inf) / tolerance, _MIN_SHARE, 1.0))
 
 
 class Boxes:
@@ -174,13 +174,13 @@ def mesh_boxes(parts, cell):
     metres."""
     (mesh, _), = parts
     vertices, triangles = used_corners(mesh.vertices, mesh.triangles)
-    cell = wanted = max(cell, float(np.ptp(vertices, axis=0).max()) / _MOST_CELLS)
+    cell = wanted = max(cell, float(np.ptp(vertices, axis=0).max()) / _MAX_CELLS)
     while True:
-        while sample_count(vertices, triangles, _SHARE_BEYOND * cell) > _MOST_POINTS:
+        while sample_count(vertices, triangles, _SHARE_BEYOND * cell) > _MAX_POINTS:
             cell *= _LARGER
         full, lowest = voxels(points_on(vertices, triangles, _SHARE_BEYOND * cell), cell)
         try:
-            boxes = boxes_of_cells(full, lowest, cell, beyond=_SHARE_BEYOND * cell, most=_MOST_BOXES)
+            boxes = boxes_of_cells(full, lowest, cell, beyond=_SHARE_BEYOND * cell, most=_MAX_BOXES)
             return np.concatenate([[[[cell, wanted, 0.0], [0.0, 0.0, 0.0]]], boxes])
         except CoverError:
             cell *= _COARSER

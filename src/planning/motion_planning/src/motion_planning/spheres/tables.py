@@ -25,7 +25,7 @@ _MERGED = 1.25
 # Number of spheres that are checked one by one.
 _FEW_SPHERES = 4
 # Levels of halving that give a held object's greatest number of spheres, 4096: the robot has some hundred.
-_MOST_HALVINGS = 12
+_MAX_HALVINGS = 12
 _ENDLESS = Patience()
 # Number of robots with a group that are split at a time.
 _splits = Kept(16)
@@ -453,9 +453,9 @@ def _spheres_of(item, tolerance, patience, coarse):
         if beyond is not None:
             coarse.add("spheres that reach up to %.3g m beyond it" % beyond)
     spheres = np.concatenate(found) if found else np.empty((0, 4))
-    if len(spheres) > 2**_MOST_HALVINGS:
-        coarse.add("%d spheres instead of %d" % (2**_MOST_HALVINGS, len(spheres)))
-        return np.array([ball(some, steps=12) for some in _halved(spheres, _MOST_HALVINGS)])
+    if len(spheres) > 2**_MAX_HALVINGS:
+        coarse.add("%d spheres instead of %d" % (2**_MAX_HALVINGS, len(spheres)))
+        return np.array([ball(some, steps=12) for some in _halved(spheres, _MAX_HALVINGS)])
     return spheres
 
 

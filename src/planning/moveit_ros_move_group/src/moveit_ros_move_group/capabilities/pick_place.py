@@ -50,7 +50,7 @@ _STATE_TIMEOUT_S = 1.0
 # Tolerance [rad or m] between the path's end and the start of the approach.
 _JOINED = 1e-4
 # If move_group itself chooses the place: length of the vertical approach and retreat, desired and least [m].
-_WAY_M, _LEAST_WAY_M = 0.1, 0.03
+_WAY_M, _MIN_WAY_M = 0.1, 0.03
 
 
 class PickPlace:
@@ -346,7 +346,7 @@ class _Place(_Job):
         for way, direction in ((place.pre_place_approach, -1.0), (place.post_place_retreat, 1.0)):
             way.direction.header.frame_id = self.context.model.frame
             way.direction.vector.z = direction
-            way.desired_distance, way.min_distance = _WAY_M, _LEAST_WAY_M
+            way.desired_distance, way.min_distance = _WAY_M, _MIN_WAY_M
         return place
 
     def _candidate(self, one, name, scene):

@@ -17,7 +17,7 @@ from motion_planning.scene import like
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of, mesh_shape_of, shape_of
 
 # Least and greatest number of corners of a cone of sight; least radius of a target [m].
-_LEAST_SIDES, _MOST_SIDES, _NO_RADIUS = 3, 100, 1e-12
+_MIN_SIDES, _MAX_SIDES, _NO_RADIUS = 3, 100, 1e-12
 # The quaternion of an orientation may be off by this much, as in MoveIt.
 _ROUNDED = 1e-3
 
@@ -135,12 +135,12 @@ def _visibility(message, scene, reader, remarks):
     target, sensor = message.target_pose, message.sensor_pose
     if abs(message.target_radius) <= _NO_RADIUS:
         raise _LeftOut("a visibility constraint has a target without radius")
-    if message.cone_sides < _LEAST_SIDES:
-        remarks.append("a cone of sight has %s; %d are taken" % (counted(message.cone_sides, "side"), _LEAST_SIDES))
+    if message.cone_sides < _MIN_SIDES:
+        remarks.append("a cone of sight has %s; %d are taken" % (counted(message.cone_sides, "side"), _MIN_SIDES))
     seen = reader.frame(scene, target.header.frame_id) @ matrix_of(target.pose, "the visibility's target")
     # The sensor moves with the robot: its frame is looked up in each state.
     return VisibilityTarget(abs(message.target_radius), seen, matrix_of(sensor.pose, "the visibility's sensor"),
                             sensor_frame=sensor.header.frame_id.lstrip("/"),
-                            cone_sides=min(max(_LEAST_SIDES, message.cone_sides), _MOST_SIDES),
+                            cone_sides=min(max(_MIN_SIDES, message.cone_sides), _MAX_SIDES),
                             view_axis=message.sensor_view_direction, max_view_angle=message.max_view_angle,
                             max_range_angle=message.max_range_angle, weight=_weight(message))

@@ -15,7 +15,7 @@ from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
 _POSTURE_S = 0.5
 # The grasp for a goal without grasps: distance in front of the object's origin along x [m], and the length of approach
 # and retreat, desired and least [m].
-_IN_FRONT_M, _WAY_M, _LEAST_WAY_M = 0.2, 0.2, 0.1
+_IN_FRONT_M, _WAY_M, _MIN_WAY_M = 0.2, 0.2, 0.1
 
 
 def grasp_candidate(grasp, name, scene, reader, link):
@@ -57,7 +57,7 @@ def usual_grasp(target, frame, hand):
     for way, axis in ((grasp.pre_grasp_approach, "x"), (grasp.post_grasp_retreat, "z")):
         way.direction.header.frame_id = frame
         setattr(way.direction.vector, axis, 1.0)
-        way.desired_distance, way.min_distance = _WAY_M, _LEAST_WAY_M
+        way.desired_distance, way.min_distance = _WAY_M, _MIN_WAY_M
     if hand:
         far = np.finfo(float).max
         grasp.pre_grasp_posture = JointTrajectory(joint_names=list(hand),

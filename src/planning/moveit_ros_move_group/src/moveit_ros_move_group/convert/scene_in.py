@@ -26,7 +26,7 @@ _OPERATIONS = {CollisionObject.ADD: "ADD", CollisionObject.REMOVE: "REMOVE", Col
 
 
 # Number of refused parts of a message after which its rest is left out.
-_MOST_ERRORS = 1000
+_MAX_ERRORS = 1000
 
 
 class SceneReader:
@@ -215,8 +215,8 @@ class SceneReader:
         """[make(message), ...] of the valid ones; ``errors`` gets the reasons for the others."""
         made = []
         for message in messages:
-            if len(errors) >= _MOST_ERRORS:
-                errors.append("after %d errors the rest of the message is left out" % _MOST_ERRORS)
+            if len(errors) >= _MAX_ERRORS:
+                errors.append("after %d errors the rest of the message is left out" % _MAX_ERRORS)
                 break
             try:
                 made.append(make(message))

@@ -12,7 +12,7 @@ from web_bridge.foxglove.wire import entries, number
 #: How clients may publish; services have the first.
 ENCODINGS = ("ros1", "json")
 #: Topics that one client publishes, and parameters that it watches.
-MOST_CHANNELS, MOST_PARAMETERS = 1000, 20000
+MAX_CHANNELS, MAX_PARAMETERS = 1000, 20000
 _QUEUE = 100
 
 
@@ -192,8 +192,8 @@ class FoxgloveSession:
             raise FieldError("encoding is %s; %s are known" % (shown(encoding), " and ".join(ENCODINGS)))
         if name in self._channels:
             raise BridgeError("channel %d is advertised already, for %s" % (name, self._channels[name].topic))
-        if len(self._channels) >= MOST_CHANNELS:
-            raise BridgeError("this client publishes %d topics, which is the limit" % MOST_CHANNELS)
+        if len(self._channels) >= MAX_CHANNELS:
+            raise BridgeError("this client publishes %d topics, which is the limit" % MAX_CHANNELS)
         topic = self._bridge.graph.resolve(topic)
         self._rules.check_publish(topic)
         self._bridge.publications.advertise(self, name, topic, type_name, (False, _QUEUE))
@@ -318,8 +318,8 @@ class FoxgloveSession:
         names = {self._bridge.graph.resolve(name) for name in entries(operation, "parameterNames", str)}
         for name in names:
             self._rules.check_parameter(name)
-        if len(self._watched | names) > MOST_PARAMETERS:
-            raise Refused("a client may watch %d parameters" % MOST_PARAMETERS)
+        if len(self._watched | names) > MAX_PARAMETERS:
+            raise Refused("a client may watch %d parameters" % MAX_PARAMETERS)
         self._watched |= names
         self._bridge.watch_parameters(self, sorted(names))
 

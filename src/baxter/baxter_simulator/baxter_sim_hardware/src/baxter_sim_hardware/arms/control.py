@@ -52,9 +52,9 @@ SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what th
 # stopped), an arm slows down as hard as its torques allow, within these factors: see `stopping`.
 ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1": 40.0, "w2": 40.0}
 STOP_ACCELERATION_FACTOR = 3.0
-LEAST_STOP_FACTOR, MOST_STOP_FACTOR = 0.1, 16.0
+MIN_STOP_FACTOR, MAX_STOP_FACTOR = 0.1, 16.0
 
-LEAST_SHARE = 0.05  # of its speed that a joint keeps that moves in step with others; so it returns when pushed away
+MIN_SHARE = 0.05  # of its speed that a joint keeps that moves in step with others; so it returns when pushed away
 SMOOTHING_S = 0.02  # see setpoint.MovingAverage
 AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
@@ -334,7 +334,7 @@ class Arms:
                 own = limb.index
                 found[own] = hardest_stop(points.output_rate[own], inertia[np.ix_(own, own)], bias[own],
                                           self.limits.effort[own])
-        return np.clip(found, LEAST_STOP_FACTOR * points.acceleration, MOST_STOP_FACTOR * points.acceleration)
+        return np.clip(found, MIN_STOP_FACTOR * points.acceleration, MAX_STOP_FACTOR * points.acceleration)
 
     # -- one tick
 
@@ -459,7 +459,7 @@ class Arms:
 
     def _move_in_step(self, command):
         """Make the joints of a POSITION command arrive together."""
-        if shares_in_step(command.index, command.values, self._points.position, self._speeds.numbers, LEAST_SHARE):
+        if shares_in_step(command.index, command.values, self._points.position, self._speeds.numbers, MIN_SHARE):
             self._refresh_speed()
 
     def _set_mode(self, joints, mode):

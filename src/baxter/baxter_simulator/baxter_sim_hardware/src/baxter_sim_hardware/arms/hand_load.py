@@ -15,8 +15,8 @@ from urdf_model import merge_fixed
 from urdf_model.merge import combine
 
 # Bounds of what a client may say: ten times the payload of an arm, the length of an arm.
-MOST_KG, FARTHEST_M = 25.0, 1.0
-LEAST_KG = 0.001  # the frames of a bare hand weigh less in its description
+MAX_KG, FARTHEST_M = 25.0, 1.0
+MIN_KG = 0.001  # the frames of a bare hand weigh less in its description
 
 
 class HandLoad(NamedTuple):
@@ -38,7 +38,7 @@ def read_load(urdf):
     try:
         for link in urdf["link"]:
             inertial = link["inertial"]
-            mass = _number(inertial["mass"]["value"], 0.0, MOST_KG)
+            mass = _number(inertial["mass"]["value"], 0.0, MAX_KG)
             centre = [_number(value, -FARTHEST_M, FARTHEST_M)
                       for value in inertial.get("origin", {}).get("xyz", (0.0, 0.0, 0.0))]
             parts.append((mass, np.array(centre).reshape(3), np.zeros((3, 3))))
@@ -48,7 +48,7 @@ def read_load(urdf):
         raise CommandRefused(
             "configure: urdf has no weight (%s: %s); it must be {\"name\": ..., \"link\": [{\"inertial\": {\"mass\": "
             "{\"value\": 0 to %g kg}, \"origin\": {\"xyz\": [3 numbers within %g m]}}}]}" % (
-                type(error).__name__, error, MOST_KG, FARTHEST_M)) from None
+                type(error).__name__, error, MAX_KG, FARTHEST_M)) from None
     whole = combine(parts)
     return HandLoad(whole.mass, whole.centre)
 
@@ -74,7 +74,7 @@ def unknown_tool(robot, side):
                 place = to_hand @ frame.offset
                 parts.append((inertial.mass, place[:3, :3] @ inertial.centre + place[:3, 3], np.zeros((3, 3))))
     whole = combine(parts)
-    return HandLoad(whole.mass, whole.centre) if whole.mass >= LEAST_KG else NOTHING
+    return HandLoad(whole.mass, whole.centre) if whole.mass >= MIN_KG else NOTHING
 
 
 class HandLoads:
