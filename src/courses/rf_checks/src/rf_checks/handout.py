@@ -6,12 +6,16 @@ that merely lies there, as a roster or submissions: what git tracks, or, in a st
 makes none in which a name or an address of a roster would be.
 """
 import argparse
+import codecs
+import contextlib
+import itertools
 import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+import unicodedata
 from pathlib import Path
 
 from command_line.user_files import read_file
@@ -37,6 +41,9 @@ MAX_TEXT_BYTES = 20 << 20
 _CLASS = "baxter_labs/class.json"
 _ADDRESS = re.compile(r"[\w.+-]+@[\w-]+(?:\.[\w-]+)+")
 _WORD = re.compile(r"[^\W\d_]+")
+# A letter as JSON may write it; the most words of a name.
+_ESCAPE = re.compile(r"\\u([0-9a-fA-F]{4})")
+_MAX_WORDS = 6
 _STUB = '''#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """This node is an exercise of the course: ./baxter.sh check --start %(exercise)s"""
@@ -92,12 +99,47 @@ def left_here(workspace: Path) -> list[str]:
         return []
 
 
+def folded(text: str) -> str:
+    """A text as names are compared: without case, and letters with marks in one form, however it was written."""
+    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", text).casefold())
+
+
+def decoded(data: bytes) -> str:
+    """The text of a file in whatever encoding: UTF-8, UTF-16 with its mark, or an older one of the West; and once more
+    what JSON has escaped in it.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252", errors="replace")
+    plain = _ESCAPE.sub(lambda match: chr(int(match[1], 16)), text)
+    return text if plain == text else "%s\n%s" % (text, plain)
+
+
 def people(text: str, source: str) -> dict[str, str]:
-    """{full name or address, case folded: where it is from} of a roster's text. Raises roster.RosterError."""
-    found = {" ".join(_WORD.findall(student.full_name.casefold())): source for student in roster.read(text)}
+    """{full name or address, folded: where it is from} of a roster's text. Raises roster.RosterError."""
+    found = [" ".join(_WORD.findall(folded(student.full_name))) for student in roster.read(text)]
     # A single word, as of a first name or of "Student 7", is in many texts.
-    found = {name: source for name in found if " " in name}
-    return {**found, **dict.fromkeys(_ADDRESS.findall(text.casefold()), source)}
+    return dict.fromkeys([name for name in found if " " in name] + _ADDRESS.findall(folded(text)), source)
+
+
+def people_of_table(text: str, source: str) -> dict[str, str]:
+    """As `people`, of a table in any form. In a line with an address, cells of several words are names, and so are two
+    cells of one word beside each other, in either order.
+    """
+    found = []
+    for line in folded(text).splitlines():
+        addresses = _ADDRESS.findall(line)
+        if not addresses:
+            continue
+        found += addresses
+        cells = [_WORD.findall(cell) for cell in re.split(r"[,;\t|]", line) if "@" not in cell]
+        found += [" ".join(words) for words in cells if 2 <= len(words) <= _MAX_WORDS]
+        found += [" ".join(a + b) for a, b in itertools.pairwise(cells) if len(a) == len(b) == 1]
+    return dict.fromkeys(found, source)
 
 
 def known_people(workspace: Path, given: list, environment: dict) -> dict[str, str]:
@@ -117,15 +159,17 @@ def known_people(workspace: Path, given: list, environment: dict) -> dict[str, s
         for name in files:
             path = Path(folder) / name
             if name.lower().endswith((".csv", ".tsv")) and path.is_file() and path.stat().st_size <= MAX_TEXT_BYTES:
-                try:
-                    found.update(people(roster.text_of(path.read_bytes()), os.path.relpath(path, workspace)))
-                except (OSError, roster.RosterError):
-                    continue  # a table of something else
+                source = os.path.relpath(path, workspace)
+                with contextlib.suppress(OSError):
+                    text = decoded(path.read_bytes())
+                    found.update(people_of_table(text, source))
+                    with contextlib.suppress(roster.RosterError):  # it may be a table of something else
+                        found.update(people(text, source))
     states = environment.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
     try:
         students = json.loads((Path(states) / _CLASS).read_text(encoding="utf-8"))["students"]
         for _, full_name in students:
-            name = " ".join(_WORD.findall(full_name.casefold()))
+            name = " ".join(_WORD.findall(folded(full_name)))
             found.update({name: "the class of ./baxter.sh labs"} if " " in name else {})
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         pass  # no class, or of another version
@@ -134,10 +178,10 @@ def known_people(workspace: Path, given: list, environment: dict) -> dict[str, s
 
 def named_people(text: str, known: dict[str, str]) -> list[str]:
     """Those of ``known``, as `people` gives them, that a text names: also last name first, and in a file's name."""
-    folded = text.casefold()
-    words = _WORD.findall(folded)
+    plain = folded(text)
+    words = _WORD.findall(plain)
     there = set(words)
-    found = [address for address in dict.fromkeys(_ADDRESS.findall(folded)) if address in known]
+    found = [address for address in dict.fromkeys(_ADDRESS.findall(plain)) if address in known]
     joined = None
     for name in known:
         parts = name.split()
@@ -204,7 +248,7 @@ def told(target: Path, kept: list, known: dict[str, str]) -> list[str]:
         path = target / name
         text = ""
         if not path.is_symlink() and path.is_file() and path.stat().st_size <= MAX_TEXT_BYTES:
-            text = path.read_text(encoding="utf-8", errors="replace")
+            text = decoded(path.read_bytes())
         there = named_people("%s\n%s" % (name, text), known)
         if there:
             found.append("%s names %s, of %s" % (name, there[0] if len(there) == 1 else "%s and %d more" % (

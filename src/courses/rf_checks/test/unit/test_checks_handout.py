@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -123,6 +124,30 @@ def test_no_copy_names_a_student(workspace, tmp_path, name, text, source):
     with pytest.raises(handout.HandoutFailed, match="%s names" % name):
         handout.make(workspace, tmp_path / "students", given)
     assert not (tmp_path / "students").exists()
+
+
+@pytest.mark.parametrize("table", [
+    "name;email\nJürgen Müller;jm@example.edu\n".encode("cp1252"),
+    "Matrikel;Teilnehmer;E-Mail\n1;Jürgen Müller;jm@example.edu\n".encode(),
+    "Jürgen Müller\tjm@example.edu\n".encode(),
+    "7,Müller,Jürgen,jm@example.edu\n7,Müller,Jürgen,jm@example.edu\n".encode("utf-16")],
+    ids=["Latin-1", "unknown headings", "no headings", "UTF-16, a student twice"])
+@pytest.mark.parametrize("note", [
+    "by Jürgen Müller".encode(), unicodedata.normalize("NFD", "by Jürgen Müller").encode(),
+    "by Jürgen Müller".encode("utf-16"), "by Jürgen Müller".encode("cp1252"),
+    json.dumps("by Jürgen Müller").encode(), b"see jm@example.edu"],
+    ids=["plain", "decomposed", "UTF-16", "Latin-1", "JSON", "address"])
+def test_no_copy_names_a_student_in_whatever_form_table_and_text_are(tmp_path, table, note):
+    workspace = tmp_path / "workspace"
+    workspace.mkdir()
+    (workspace / handout.LIST).write_text("baxter.sh\nnote.md\n")
+    (workspace / "baxter.sh").write_text("")
+    (workspace / "class.tsv").write_bytes(table)
+    (workspace / "note.md").write_text("by somebody")
+    handout.make(workspace, tmp_path / "before")
+    (workspace / "note.md").write_bytes(note)
+    with pytest.raises(handout.HandoutFailed, match="note.md names"):
+        handout.make(workspace, tmp_path / "students")
 
 
 def test_a_roster_that_cannot_be_read_is_told(workspace, tmp_path, monkeypatch, capsys):
