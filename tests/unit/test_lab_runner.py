@@ -235,6 +235,20 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, fake_rostest, monkeypatch,
     assert detail is None or detail in tally.details[0]
 
 
+def test_the_comma_locale_is_there_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
+    run, seen = subprocess.run, []
+
+    def localedef(*words, **options):
+        done = run(*words, **options)
+        seen.append((tmp_path / comma_locale.NAME).exists())
+        run([*words[0][:-1], str(tmp_path / comma_locale.NAME)], **options)  # another worker, which is first
+        return done
+
+    monkeypatch.setattr(comma_locale.subprocess, "run", localedef)
+    comma_locale.variables(tmp_path)
+    assert seen == [False] and [path.name for path in tmp_path.iterdir()] == [comma_locale.NAME]
+
+
 def test_comma_locale_is_in_force(tmp_path):
     environment = {**os.environ, **comma_locale.variables(tmp_path)}
     program = "import locale; locale.setlocale(locale.LC_ALL, ''); print(locale.format_string('%.1f', 0.5))"

@@ -6,6 +6,7 @@ setlocale(), changes that for the whole process, and from then on strtod() in C 
 """
 
 import subprocess
+import tempfile
 from pathlib import Path
 
 NAME = "de_DE.UTF-8"
@@ -17,11 +18,19 @@ def variables(folder: Path) -> dict[str, str]:
     Raises OSError or subprocess.CalledProcessError if localedef or its sources are missing.
     """
     target = folder / NAME
-    if not (target / "LC_NUMERIC").is_file():
+    if not target.is_dir():
         folder.mkdir(parents=True, exist_ok=True)
-        # localedef only warns about unknown tokens, and then exits with 1 although it wrote the locale.
-        command = ["localedef", "--no-archive", "-c", "-i", "de_DE", "-f", "UTF-8", str(target)]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if not (target / "LC_NUMERIC").is_file():
-            raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
+        # Workers start at the same time: each makes its own, and the first one's is taken.
+        with tempfile.TemporaryDirectory(dir=folder) as drafts:
+            draft = Path(drafts, NAME)
+            # localedef only warns about unknown tokens, and then exits with 1 although it wrote the locale.
+            command = ["localedef", "--no-archive", "-c", "-i", "de_DE", "-f", "UTF-8", str(draft)]
+            done = subprocess.run(command, capture_output=True, text=True)
+            if not (draft / "LC_NUMERIC").is_file():
+                raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
+            try:
+                draft.rename(target)
+            except OSError:
+                if not target.is_dir():
+                    raise
     return {"LOCPATH": str(folder), "LC_ALL": NAME}
