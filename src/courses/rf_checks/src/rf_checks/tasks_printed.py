@@ -218,10 +218,10 @@ class IkFrame:
         reference, commanded = self.answers(run.output)
         asked, arrived, found = self._experiment(run, robot)
         return [
-            Criterion("reference frame", float(reference in ("base", "world")), 20.0,
-                      "said %s" % (reference or "nothing")),
-            Criterion("commanded frame", float(commanded in ("left_gripper", "right_gripper")), 25.0,
-                      "said %s" % (commanded or "nothing")),
+            Criterion("reference frame", float(asked and reference in ("base", "world")), 20.0,
+                      "said %s%s" % (reference or "nothing", "" if asked else "; counts with the experiment")),
+            Criterion("commanded frame", float(arrived > 0.0 and commanded in ("left_gripper", "right_gripper")), 25.0,
+                      "said %s%s" % (commanded or "nothing", "" if arrived else "; counts with the experiment")),
             Criterion("asked the service", float(asked), 15.0,
                       "yes" if asked else "no pose with a solution was asked for"),
             Criterion("went to look", arrived, 40.0, found),

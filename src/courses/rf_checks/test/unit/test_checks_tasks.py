@@ -197,7 +197,7 @@ def test_verdicts_are_graded(robot, output, asked, points, key):
 
 @pytest.mark.parametrize(("output", "moves", "points", "key"), [
     ("reference frame: base\ncommanded frame: left_gripper", True, 100.0, None),
-    ("reference frame: base\ncommanded frame: left_gripper", False, 60.0, "made_up"),
+    ("reference frame: base\ncommanded frame: left_gripper", False, 35.0, "made_up"),
     ("reference frame: torso\ncommanded frame: left_gripper", True, 80.0, "wrong_frame"),
     ("reference frame: base\ncommanded frame: left_hand", True, 75.0, "wrong_frame"),
     ("", True, 55.0, "no_answer"),
