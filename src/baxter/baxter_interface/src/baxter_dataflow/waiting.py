@@ -74,6 +74,17 @@ class Ticker:
         self._next_s += self._period_s
 
 
+def require_timeout(timeout: object) -> float:
+    """Return a time-out [s] as a float. Raises ValueError for what is no number."""
+    try:
+        seconds = float(timeout)
+    except (TypeError, ValueError):
+        seconds = math.nan
+    if math.isnan(seconds):
+        raise ValueError("a time-out is a number of seconds, negative or infinite for ever; got %r" % (timeout,))
+    return seconds
+
+
 def is_unlimited(timeout_s):
     """Tell whether a time-out means for ever: negative or infinite."""
     return timeout_s < 0.0 or math.isinf(timeout_s)
@@ -81,6 +92,7 @@ def is_unlimited(timeout_s):
 
 def wait_on(clock, test, timeout_s, raise_on_error, rate_hz, timeout_msg, body):
     """Wait on `clock` until `test()` is true; see `baxter_dataflow.wait_for`, which is this on ROS time."""
+    timeout_s = require_timeout(timeout_s)
     watch = Stopwatch(clock.now())
     ticker = Ticker(clock, rate_hz)
     while not test():

@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from baxter_dataflow.ros_clock import RosClock
-from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
+from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited, require_timeout
 from baxter_model import BASE_FRAME, poses
 from baxter_model.readiness import why_not_ready
 from command_line.options import counted
@@ -219,7 +219,7 @@ class Limb:
         if why := beyond_a_turn(target):
             rospy.logerr("%s arm: %s", self.name, why)
             return False
-        threshold = require_number(threshold, "the threshold [rad]")
+        threshold, timeout = require_number(threshold, "the threshold [rad]"), require_timeout(timeout)
 
         resets = self.resets
         clock = RosClock(gives_up=lambda: rospy.is_shutdown() or self.resets != resets)

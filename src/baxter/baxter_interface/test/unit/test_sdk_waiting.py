@@ -67,6 +67,12 @@ def test_no_time_limit_waits_until_shutdown(timeout_s):
     assert caught.value.errno == errno.ESHUTDOWN
 
 
+@pytest.mark.parametrize("timeout_s", [math.nan, None, "soon"])
+def test_a_time_out_that_is_no_number_is_refused(timeout_s):
+    with pytest.raises(ValueError, match="a time-out is a number of seconds"):
+        wait(FakeClock(), lambda: False, timeout_s)
+
+
 def test_first_tick_of_a_simulated_clock_is_no_time_passed():
     watch = Stopwatch(0.0)
     assert watch.elapsed_s(0.0) == 0.0
