@@ -94,8 +94,16 @@ def parse(argv):
         parser.error("there is no job '%s'; JOB is a name of --list, or package.module:Class%s"
                      % (options.job, did_you_mean(options.job, JOBS)))
     if not options.list and not options.seeds:
+        try:
+            check(_spec(options))
+        except JobError as error:
+            parser.error(str(error))
         parser.error("--seeds is needed, such as --seeds 0:100")
     return options
+
+
+def _spec(options: argparse.Namespace) -> Spec:
+    return Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(options.set))
 
 
 def repeating_line(options, seed):
@@ -193,8 +201,7 @@ def list_jobs():
 
 
 def run(options):
-    settings = options.set
-    spec = Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(settings))
+    spec = _spec(options)
     check(spec)  # wrong names are told before anything starts
     if options.parquet:
         parquet.ensure_installed(ROOT)
