@@ -21,6 +21,8 @@ from pathlib import Path
 from pictures import distribution, ratios
 from report import Report, as_json, markdown, put_together, table
 
+from command_line.options import Parser, did_you_mean
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 PEERS = ROOT / ".baxter/bench/python"
@@ -62,7 +64,7 @@ LIMIT_S, LIMIT_OF_ALL_S = 1200, 4500
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="./baxter.sh bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="suites to run (default: all)")
     parser.add_argument("--rounds", type=int, default=5, help="number of rounds (default: 5)")
     parser.add_argument("--quick", action="store_true", help="a tenth of the work, only to see that it runs")
@@ -79,7 +81,8 @@ def main():
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in SUITES]
     if unknown:
-        parser.error("unknown suite: %s; the suites are %s" % (", ".join(unknown), ", ".join(SUITES)))
+        parser.error("unknown suite: %s; the suites are %s%s" % (", ".join(unknown), ", ".join(SUITES),
+                                                                 did_you_mean(unknown[0], SUITES)))
     if options.rounds < 1:
         parser.error("--rounds must be at least 1, got %d" % options.rounds)
     if options.list:

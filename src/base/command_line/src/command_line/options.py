@@ -6,7 +6,9 @@ from __future__ import annotations
 import argparse
 import difflib
 import math
+import re
 from collections.abc import Callable, Iterable
+from typing import NoReturn
 
 #: Longest time that a program is told to wait or to run [s], thirty years; Python's own limit ends in a traceback.
 MAX_SECONDS = 1e9
@@ -43,6 +45,21 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     """Return a question for the name that is most like ``word``, to be put behind an error; "" if none is."""
     near = difflib.get_close_matches(word, list(names), 1)
     return "; did you mean %s?" % near[0] if near else ""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser of command lines whose errors ask for the choice or the option that a slip may have meant."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(message + self.meant(message))
+
+    def meant(self, message: str) -> str:
+        """The question behind an error of argparse, "" where nothing is like what was found."""
+        if match := re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message):
+            return did_you_mean(match[1], re.findall(r"[\w.:-]+", match[2]))
+        if match := re.search(r"unrecognized arguments: (--[\w-]+)", message):
+            return did_you_mean(match[1], re.findall(r"--[\w-]+", self.format_help()))
+        return ""
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:

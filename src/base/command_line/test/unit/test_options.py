@@ -3,7 +3,7 @@ import argparse
 
 import pytest
 
-from command_line.options import counted, did_you_mean, number, seconds
+from command_line.options import Parser, counted, did_you_mean, number, seconds
 
 
 @pytest.mark.parametrize("text", ["1", "10", " 7"])
@@ -30,6 +30,18 @@ def test_a_bound_may_be_left_out():
 def test_a_slip_is_answered_with_the_nearest_name():
     assert "notebook" in did_you_mean("notebok", ("check", "notebook", "web"))
     assert did_you_mean("xyz", ("check", "notebook")) == ""
+
+
+@pytest.mark.parametrize(("words", "meant"), [
+    (["dwn"], "did you mean down?"), (["down", "--flder", "x"], "did you mean --folder?"), (["down", "--xyz"], None)])
+def test_an_error_asks_for_what_a_slip_may_have_meant(words, meant, capsys):
+    parser = Parser()
+    parser.add_argument("--folder")
+    parser.add_argument("verb", choices=("up", "down", "list"))
+    with pytest.raises(SystemExit):
+        parser.parse_args(words)
+    told = capsys.readouterr().err
+    assert meant in told if meant else "did you mean" not in told
 
 
 def test_singular_and_plural_agree():

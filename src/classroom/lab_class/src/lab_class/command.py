@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 import rospkg
 
+from command_line.options import Parser
 from command_line.user_files import PIPE_WAIT_S, read_file
 from lab_class import control, control_groups, memory
 from lab_class.disk import ENTRIES, entries_left, remove, room
@@ -53,15 +54,15 @@ def main(arguments=None):
 
 def _parser():
     defaults = Options()
-    parser = argparse.ArgumentParser(prog="./baxter.sh labs", description="Labs for a class on this machine, each "
-                                     "behind walls, with one address for each student; docs/class.md.")
+    parser = Parser(prog="./baxter.sh labs", description="Labs for a class on this machine, each behind walls, with "
+                    "one address for each student; docs/class.md.")
     text = "of the class: roster, tokens, students' files (default: %s)" % default_folder()
     parser.add_argument("--folder", default=default_folder(), help=text)
     # Behind a command, too.
     folder = argparse.ArgumentParser(add_help=False)
     folder.add_argument("--folder", default=argparse.SUPPRESS, help=text)
     commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|renew|down|logs",
-                                     parser_class=functools.partial(argparse.ArgumentParser, parents=[folder]))
+                                     parser_class=functools.partial(Parser, parents=[folder]))
     up = commands.add_parser("up", help="start a class, and print the addresses")
     up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
                     "of last time")

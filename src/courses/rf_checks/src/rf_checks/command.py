@@ -10,7 +10,7 @@ from pathlib import Path
 
 import rospkg
 
-from command_line.options import MAX_SEED, did_you_mean, number, seconds
+from command_line.options import MAX_SEED, Parser, did_you_mean, number, seconds
 from disk_cache.files import draft_of
 from lab_web import page_files
 from processes import isolation
@@ -43,11 +43,11 @@ def _command_for(word):
     return "./baxter.sh check LAB %s, where LAB is %s" % (word, " or ".join(LABS))
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(Parser):
     """A parser whose errors have no usage text in front."""
 
     def error(self, message):
-        self.exit(WRONG_WORDS, "check: %s\n" % message)
+        self.exit(WRONG_WORDS, "check: %s%s\n" % (message, self.meant(message)))
 
 
 def _parser():

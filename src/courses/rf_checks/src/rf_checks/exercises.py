@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The table of exercises, and which one a file is meant for. Free of ROS."""
+import difflib
 import re
 from dataclasses import dataclass
 
@@ -70,6 +71,8 @@ def choose(lab, name, file_name, text):
     if lab not in LABS:
         owner = next((one.lab for one in EXERCISES if one.name == lab), None)
         hint = "; '%s' is an exercise of %s" % (lab, owner) if owner else did_you_mean(lab, LABS)
+        if not hint and (near := difflib.get_close_matches(lab, [one.name for one in EXERCISES], 1)):
+            hint = "; did you mean %s %s?" % (next(one.lab for one in EXERCISES if one.name == near[0]), near[0])
         raise UnknownExercise("there is no lab '%s'; labs are %s%s" % (lab, ", ".join(LABS), hint))
     of_lab = {exercise.name: exercise for exercise in EXERCISES if exercise.lab == lab}
     mark = _MARK.search(text)

@@ -245,7 +245,7 @@ def test_the_exercise_is_found(name, file_name, text, expected):
 
 
 @pytest.mark.parametrize(("lab", "name", "file_name", "words"), [
-    ("lab9", "", "x.py", ["lab9", "lab2", "cwru"]),
+    ("lab9", "", "x.py", ["lab9", "lab2", "cwru"]), ("wvae", "", "x.py", ["did you mean lab2 wave?"]),
     ("lab2", "", "my_node.py", ["./baxter.sh check lab2 wave my_node.py"]),
     ("lab2", "waves", "x.py", ["waves", "wave"]),
     ("cwru", "wave", "x.py", ["./baxter.sh check lab2 wave x.py"]), ("lab2", "", "wave_tf.py", ["which exercise"]),

@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from command_line.options import MAX_SEED, MAX_WORKERS, counted, did_you_mean, number, seconds
+from command_line.options import MAX_SEED, MAX_WORKERS, Parser, counted, did_you_mean, number, seconds
 
 from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
@@ -63,7 +63,7 @@ def setting_of(text):
 
 
 def parse(argv):
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="./baxter.sh batch", description=__doc__,
         epilog="JOB is a name of --list, or package.module:Class (a class that derives from lab_batch.Job). "
                "Exit status: 0 all episodes ended well, 1 some failed or the job cannot start, 2 wrong options, "
