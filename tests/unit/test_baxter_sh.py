@@ -160,7 +160,7 @@ def test_each_mode_has_help_without_a_build(tmp_path):
 @pytest.mark.parametrize(("words", "meant"), [
     ("notebok 7_waving", "notebook 7_waving"), ("tset", "test"), ("chek --list", "check --list"),
     ("lab up 3", "labs up 3"), ("notebok --help", "notebook --help"), ("no-such-host.invalid true", None),
-    ("x", None),
+    ("x", None), ("SIM true", "sim true"), ("Helpp", "help"),
 ])
 def test_a_slip_in_a_mode_is_told_with_the_line_that_was_meant(words, meant):
     done = baxter(*words.split())
@@ -175,6 +175,20 @@ def test_version_is_that_of_all_packages():
                                 *sorted(map(str, (ROOT / "src").glob("*/")))], capture_output=True, text=True).stdout
     of_pip = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)[1]
     assert {*manifests.split(), of_pip} == {version}
+    assert [baxter(mode, "--version").stdout.split()[-1:] for mode in modes() if mode not in ("grade", "help")] == [
+        [version]] * (len(modes()) - 2)
+
+
+def test_help_while_set_up_is_at_work_needs_no_build(tmp_path):
+    copy = copy_of_tools(tmp_path / "ws")
+    for name in ("devel/setup.bash", ".baxter/build.stamp", ".venv/bin/python3"):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_text("")
+        (copy / name).chmod(0o755)
+    with open(copy / ".baxter/lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = baxter("batch-node", "--help", script=copy / "baxter.sh")
+    assert (done.returncode, done.stderr) == (0, "") and "batch-node" in done.stdout
 
 
 def test_unknown_option_and_unknown_host_are_refused():

@@ -175,8 +175,9 @@ SICK = {
         "controller_list of /move_group",
     ),
     "a controller that is not there": (
-        planning(controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], False)]),
-        "move_group", "no controller serves left/follow_joint_trajectory", "start the controller",
+        planning(controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], False,
+                                         "start its server: rosrun a b")]),
+        "move_group", "no controller serves left/follow_joint_trajectory", "rosrun a b",
     ),
     "joints without states": (
         planning(silent_joints=["left_s1"]), "move_group", "no message on /robot/joint_states has left_s1", "remap",
@@ -361,6 +362,15 @@ def test_a_set_up_that_runs_is_told_with_its_step_and_nothing_is_wrong():
     assert (finding.topic, finding.level) == ("build", Level.BUSY)
     assert "step 'apt' (1 of 9, since 40 s)" in finding.what and "Unpacking numpy" in finding.what
     assert "apt.log" in finding.fix
+
+
+def test_what_needs_the_build_waits_for_the_set_up_that_makes_it():
+    facts = replace(HEALTHY_LAB, set_up=SetUp("build", "", True, "6 of 9", 40),
+                    topics=Topics(error="ModuleNotFoundError: No module named 'rospy'"),
+                    move_group=replace(PLANNING, error="ModuleNotFoundError: No module named 'rosgraph'"))
+    found = {one.topic: one for one in examine(facts)}
+    assert [one.topic for one in found.values() if one.level is Level.WRONG] == []
+    assert [found[topic].what for topic in ("robot", "move_group")] == ["not checked: set-up is running"] * 2
 
 
 def test_the_lock_tells_a_running_set_up_from_one_that_was_cut_off(tmp_path):

@@ -45,7 +45,8 @@ def main():
     print(json.dumps({
         "node": node, "robot": model.name, "executes": bool(parameter("allow_trajectory_execution", True)),
         "groups": {name: list(group.joints) for name, group in model.groups.items()},
-        "controllers": [{"action": one.action or one.name, "joints": list(one.joints), "answers": fake or bool(
+        "controllers": [{"action": one.action or one.name, "joints": list(one.joints), "remedy": one.remedy,
+                         "answers": fake or bool(
             publishers.get(rospy.resolve_name(one.action + "/status", namespace + "x")))} for one in controllers],
         "joint_topic": joint_topic,
         "silent_joints": [name for name in model.variables if name not in names and name not in model.passive],

@@ -31,9 +31,17 @@ def _entry(facts: Facts) -> str:
     return "./baxter.sh sim" if not host or is_loopback(host) else f"./baxter.sh {host}"
 
 
+#: What needs the build, while it is made.
+_LATER = "not checked: set-up is running", "ask again when it has ended"
+
+
 def _busy(topic, what):
     """A question without an answer in time gives no other finding."""
     return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it is idle")
+
+
+def _is_setting_up(facts):
+    return facts.set_up is not None and facts.set_up.is_running
 
 
 def check_build(facts):
@@ -239,7 +247,9 @@ def check_robot(facts):
     if facts.topics is None:
         return
     state = facts.topics.robot_state
-    if facts.topics.error:
+    if facts.topics.error and _is_setting_up(facts):
+        yield Finding("robot", Level.BUSY, *_LATER)
+    elif facts.topics.error:
         yield Finding("robot", Level.WRONG, f"cannot listen: {facts.topics.error}", "./baxter.sh setup")
     elif state is None and facts.move_group is not None and facts.move_group.robot not in ("", "baxter"):
         return  # another robot, which has no such topic
@@ -266,7 +276,9 @@ def check_robot(facts):
 def check_move_group(facts):
     if "move_group" in facts.timed_out:
         yield _busy("move_group", "move_group, or a service of it, has not answered")
-    if facts.move_group is not None:
+    if facts.move_group is not None and facts.move_group.error and _is_setting_up(facts):
+        yield Finding("move_group", Level.BUSY, *_LATER)
+    elif facts.move_group is not None:
         yield from move_group_checks.examine(facts.move_group)
 
 

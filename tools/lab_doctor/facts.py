@@ -32,11 +32,13 @@ class Topics:
 
 @dataclass(frozen=True)
 class Controller:
-    """An entry of move_group's controller_list: its action, its joints, and whether the action has a server."""
+    """An entry of move_group's controller_list: its action, its joints, whether the action has a server, and what would
+    help where it has none."""
 
     action: str
     joints: list[str]
     answers: bool
+    remedy: str = ""
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,7 @@ def _controllers(move_group):
     for controller in move_group.controllers:
         if not controller.answers:
             what = f"no controller serves {controller.action}, which should move {_listed(controller.joints)}"
-            fix = ("start the controller; or, if it has another name (rostopic list | grep goal), correct name and "
-                   "action_ns in controller_list")
-            yield Finding(TOPIC, Level.WRONG, what, fix)
+            yield Finding(TOPIC, Level.WRONG, what, controller.remedy)
     moved = {joint for controller in move_group.controllers for joint in controller.joints}
     orphans = {}
     for group, joints in move_group.groups.items():
