@@ -11,6 +11,7 @@ from pathlib import Path
 import rospkg
 
 from command_line.options import MAX_SEED, Parser, did_you_mean, number, seconds
+from command_line.user_files import kind_of
 from disk_cache.files import draft_of
 from lab_web import page_files
 from processes import isolation
@@ -97,7 +98,7 @@ def _program_and_exercise(parser, options):
     except UnknownExercise as error:
         parser.error(str(error))
     if not path.is_file():
-        where = "is a folder" if path.is_dir() else "is not there"
+        where = "is %s" % (kind_of(path.stat().st_mode) if path.exists() else "not there")
         parser.error("%s %s; give the path of your Python file" % (program, where))
     for report_file in (options.json, options.junit):
         if report_file is not None and not report_file.absolute().parent.is_dir():

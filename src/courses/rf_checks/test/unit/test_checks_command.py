@@ -50,7 +50,7 @@ def test_a_skeleton_is_copied_once_and_knows_its_exercise(name, capsys):
     (["my_node.py"], "check LAB my_node.py, where LAB is lab2 or"), (["lab2", "gone.py"], "gone.py is not there"),
     (["wave.py"], "./baxter.sh check lab2 wave.py?"), (["plan_around"], "./baxter.sh check moveit plan_around.py?"),
     (["my_node.py", "lab2"], "expected LAB [EXERCISE] PROGRAM"),
-    (["lab2", "."], "is a folder"), (["lab7", "my_node.py"], "no lab 'lab7'"),
+    (["lab2", "."], "is a folder"), (["lab2", "/dev/zero"], "/dev/zero is a device"), (["lab7", "my_node.py"], "no lab 'lab7'"),
     (["plan_around", "my_node.py"], "is an exercise of moveit"),
     (["lab2", "wav", "my_node.py"], "no exercise 'wav'"), (["lab2", "my_node.py"], "lab2 wave my_node.py"),
     (["lab2", "wave", "my_node.py", "--seed", "-1"], "--seed: expected a whole number from 0"),
