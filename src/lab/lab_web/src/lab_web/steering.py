@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arms that pages steer by twists, as long as something is held. No ROS: a servo is an argument, with
 
-- ``is_there``: whether it listens; ``steer(twist,
-                                            in_tool)``: go on with (6,) numbers, -1 to 1: x, y, z, roll, pitch, yaw
+- ``is_there``: whether it listens
+- ``steer(twist, in_tool)``: go on with (6,) numbers, -1 to 1: x, y, z, roll, pitch, yaw
 - ``reason``: why it holds the arm back, or ""
 """
 import math
