@@ -205,7 +205,8 @@ def copy_of_tools(folder):
     subprocess.run(["cp", "-r", str(ROOT / "baxter.sh"), str(ROOT / "tools"), str(folder)], check=True)
     for name in ("requirements.txt", "requirements-nodeps.txt"):
         subprocess.run(["cp", str(ROOT / name), str(folder)], check=True)
-    (folder / "src").mkdir()
+    (folder / "src/base").mkdir(parents=True)
+    subprocess.run(["cp", "-r", str(ROOT / "src/base/master_calls"), str(folder / "src/base")], check=True)
     return folder
 
 
@@ -383,9 +384,8 @@ def test_a_skeleton_does_not_wait_for_a_set_up(workspace, words, is_set_up):
 
 
 def test_the_doctor_of_a_fresh_clone_names_the_missing_set_up_and_no_variables(tmp_path):
-    shutil.copy(ROOT / "baxter.sh", tmp_path)
-    shutil.copytree(ROOT / "tools", tmp_path / "tools", ignore=shutil.ignore_patterns("__pycache__"))
-    done = subprocess.run(["bash", str(tmp_path / "baxter.sh"), "doctor"], env={"PATH": "/usr/bin:/bin"},
+    copy = copy_of_tools(tmp_path / "ws")
+    done = subprocess.run(["bash", str(copy / "baxter.sh"), "doctor"], env={"PATH": "/usr/bin:/bin"},
                           capture_output=True, text=True)
     assert done.returncode == 1, done.stderr
     assert "./baxter.sh setup" in done.stdout and "ROS_MASTER_URI is" not in done.stdout

@@ -40,6 +40,7 @@ OF_OTHERS = {
     "src/baxter/baxter_simulator/baxter_sim_hardware/src/baxter_sim_hardware/robot_state.py": {"brain"},
     # A heading of columns in Moodle's exports.
     "src/courses/rf_checks/src/rf_checks/roster.py": {"mail"},
+    "src/courses/rf_checks/test/unit/test_checks_handout.py": {"mail"},
     "src/courses/rf_checks/test/unit/test_roster.py": {"mail"},
     "LICENSE": {"shall"},
     "tests/bench/recordings/LICENSE.klampt-examples": {"shall"},

@@ -264,7 +264,7 @@ class GazeboServices(unittest.TestCase):
         shoulder, elbow = eval(where().message)
         self.assertAlmostEqual(shoulder, -0.25, delta=0.002)
         self.assertAlmostEqual(elbow, 0.5, delta=0.002)
-        self.refused(self.set_model_configuration("arm", "", ["elbow"], [0.5, 1.0]), "1 joint names but 2 positions")
+        self.refused(self.set_model_configuration("arm", "", ["elbow"], [0.5, 1.0]), "1 joint name but 2 positions")
         self.refused(self.set_model_configuration("arm", "", ["knee"], [0.5]), "knee", "elbow")
         self.refused(self.set_model_configuration("leg", "", [], []), "leg", "arm")
 

@@ -16,6 +16,7 @@ from std_srvs.srv import Empty
 
 from lab_testing import waiting
 from lab_testing.waiting import wait_for_message
+from processes.family import is_running
 
 EYE = """<sdf version="1.6"><model name="m"><static>true</static><link name="l"><sensor type="camera" name="eye">
 <update_rate>20</update_rate><camera><image><width>160</width><height>120</height></image></camera>
@@ -34,14 +35,6 @@ def api_of(node):
 
 def process_of(node):
     return xmlrpc.client.ServerProxy(api_of(node)).getPid("/test")[2]
-
-
-def runs(process):
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 class GzserverAlone(unittest.TestCase):
@@ -63,7 +56,7 @@ class GzserverAlone(unittest.TestCase):
         # It ends with the simulator, even with one that is killed.
         renderer = process_of("/sensor_renderer")
         os.kill(process_of("/gazebo"), signal.SIGKILL)
-        wait_until(lambda: not runs(renderer), "the renderer ends")
+        wait_until(lambda: not is_running(renderer), "the renderer ends")
 
 
 if __name__ == "__main__":
