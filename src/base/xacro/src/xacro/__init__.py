@@ -11,7 +11,10 @@ import functools
 import importlib
 import importlib.metadata
 import importlib.util
+import os
 import re
+import select
+import stat
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import rospkg
 
+#: How long a named pipe may be silent [s]; as other files that users name.
+PIPE_WAIT_S = 60.0
 #: A function of the engine: node, macros, symbols.
 _Walk = Callable[[Any, Any, Any], Any]
 
@@ -68,6 +73,30 @@ def _without_inorder(main: Callable[[], Any]) -> Callable[[], Any]:
         sys.argv[1:] = [word for word in sys.argv[1:] if word not in ("--inorder", "-i")]
         return main()
     return command
+
+
+def _with_an_end(parse: Callable[..., Any]) -> Callable[..., Any]:
+    """The engine's reading of a file, without those that never end: a device, and a named pipe into which nobody writes
+    for PIPE_WAIT_S."""
+    @functools.wraps(parse)
+    def read(inp: Any, filename: str | None = None) -> Any:
+        path = os.path.join(_engine.root_dir, filename) if inp is None and filename else ""
+        mode = os.stat(path).st_mode if path and os.path.exists(path) else 0
+        if stat.S_ISCHR(mode):
+            raise _no_file(filename, "a device")
+        if not stat.S_ISFIFO(mode):
+            return parse(inp, filename)
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as pipe:
+            if not select.select([pipe], [], [], PIPE_WAIT_S)[0]:
+                raise _no_file(filename, "a named pipe into which nobody has written for %g s" % PIPE_WAIT_S)
+            os.set_blocking(pipe.fileno(), True)
+            return parse(pipe, filename)
+    return read
+
+
+def _no_file(name: str | None, kind: str) -> Exception:
+    _engine.filestack.pop()  # as the engine does: it has not begun to read the file
+    return _engine.XacroException("%s is %s; a file is expected" % (name, kind))
 
 
 # URDF elements that are also names of macros; these are what they are in URDF.
@@ -134,7 +163,9 @@ def _places(name: str) -> str:
 main: Callable[[], Any]
 _engine = _load_engine(_engine_folder())
 _engine.main = _without_inorder(_engine.main)
+_engine.parse = _with_an_end(_engine.parse)
 _engine.eval_all, _engine.handle_macro_call = _with_melodics_names(_engine.eval_all, _engine.handle_macro_call)
+importlib.import_module("xml.parsers.expat")  # whose errors the engine catches, and which it does not import
 _substitution_args: Any = importlib.import_module("xacro.substitution_args")  # the engine's
 _substitution_args._eval_find = _find         # $(find PACKAGE)
 _substitution_args._eval_dict["find"] = _find  # $(eval find('PACKAGE'))

@@ -65,6 +65,19 @@ def test_module_offers_the_engine(probe):
     assert '<link name="blue"/>' in done.stdout, done.stderr
 
 
+def test_a_device_and_a_silent_pipe_are_no_files(tmp_path, probe):
+    done = run(COMMANDS["xacro"], "/dev/zero", path=tmp_path)
+    assert done.returncode == 2 and "/dev/zero is a device; a file is expected" in done.stderr
+    os.mkfifo(tmp_path / "pipe")
+    code = "import xacro; xacro.PIPE_WAIT_S = 0.2; print(xacro.process_file(%r).toxml())" % str(tmp_path / "pipe")
+    # The engine's module has taken the place of ours, whose global it is.
+    code = code.replace("xacro.PIPE_WAIT_S", "xacro.parse.__globals__['PIPE_WAIT_S']")
+    silent = run([sys.executable, "-c", code], path=tmp_path)
+    assert "a named pipe into which nobody has written for 0.2 s" in silent.stderr
+    with subprocess.Popen(["cp", str(probe / "urdf" / "part.xacro"), str(tmp_path / "pipe")]):
+        assert '<link name="part"/>' in run([sys.executable, "-c", code.replace("0.2", "60")], path=tmp_path).stdout
+
+
 def test_unknown_package_names_package_search_path_and_file(probe):
     source = probe / "urdf" / "probe.urdf.xacro"
     done = run(COMMANDS["xacro"], source, path="/nonexistent")
