@@ -282,7 +282,7 @@ def test_slow_uploads_count_from_their_first_byte_to_their_end(tmp_path, monkeyp
     async def upload(reader, writer):
         head = await reader.readuntil(b"\r\n\r\n")
         if b"PUT" in head:
-            # One is given up half-way. An error that nobody takes is printed when the task is collected, in whatever test.
+            # One is given up half-way. An error that nobody takes is printed as the task is collected, in any test.
             with contextlib.suppress(asyncio.IncompleteReadError):
                 await reader.readexactly(4)
         writer.write(ANSWER)
