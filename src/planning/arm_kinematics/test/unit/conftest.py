@@ -1,31 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter's model, as the tests of this package use it: the one that the lab runs."""
-from pathlib import Path
-
+"""Baxter's arms, and one without redundancy."""
 import numpy as np
 import pytest
 
 from arm_kinematics import Chain
-from urdf_model import parse_urdf
+from lab_testing.baxter import baxter_xml, robot, side
 from urdf_model.transforms import rigid
 
-_BAXTER = Path(__file__).resolve().parents[4] / "baxter/baxter_common/baxter_description/urdf/baxter.urdf"
-
-
-@pytest.fixture(scope="session")
-def baxter_xml():
-    # The expanded model is made by the workspace's set-up.
-    return _BAXTER.read_text()
-
-
-@pytest.fixture(scope="session")
-def robot(baxter_xml):
-    return parse_urdf(baxter_xml, source=str(_BAXTER))
-
-
-@pytest.fixture(scope="session", params=["left", "right"])
-def side(request):
-    return request.param
+__all__ = ["baxter_xml", "robot", "side"]
 
 
 @pytest.fixture(scope="session")
