@@ -127,19 +127,20 @@ def people(text: str, source: str) -> dict[str, str]:
 
 
 def people_of_table(text: str, source: str) -> dict[str, str]:
-    """As `people`, of a table in any form. In a line with an address, cells of several words are names, and so are two
-    cells of one word beside each other, in either order.
+    """As `people`, of a table that is no roster in form. In a line with an address, cells of several words are names,
+    and so are two cells of one word beside each other. What several addresses have is none, as their course.
     """
-    found = []
+    owners: dict[str, set[str]] = {}
     for line in folded(text).splitlines():
         addresses = _ADDRESS.findall(line)
         if not addresses:
             continue
-        found += addresses
         cells = [_WORD.findall(cell) for cell in re.split(r"[,;\t|]", line) if "@" not in cell]
-        found += [" ".join(words) for words in cells if 2 <= len(words) <= _MAX_WORDS]
-        found += [" ".join(a + b) for a, b in itertools.pairwise(cells) if len(a) == len(b) == 1]
-    return dict.fromkeys(found, source)
+        names = [" ".join(words) for words in cells if 2 <= len(words) <= _MAX_WORDS]
+        names += [" ".join(a + b) for a, b in itertools.pairwise(cells) if len(a) == len(b) == 1]
+        for name in (*addresses, *names):
+            owners.setdefault(name, set()).add(addresses[0])
+    return {name: source for name, found in owners.items() if "@" in name or len(found) == 1}
 
 
 def known_people(workspace: Path, given: list, environment: dict) -> dict[str, str]:
@@ -162,9 +163,10 @@ def known_people(workspace: Path, given: list, environment: dict) -> dict[str, s
                 source = os.path.relpath(path, workspace)
                 with contextlib.suppress(OSError):
                     text = decoded(path.read_bytes())
-                    found.update(people_of_table(text, source))
-                    with contextlib.suppress(roster.RosterError):  # it may be a table of something else
+                    try:
                         found.update(people(text, source))
+                    except roster.RosterError:
+                        found.update(people_of_table(text, source))
     states = environment.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
     try:
         students = json.loads((Path(states) / _CLASS).read_text(encoding="utf-8"))["students"]

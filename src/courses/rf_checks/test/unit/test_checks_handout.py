@@ -150,6 +150,18 @@ def test_no_copy_names_a_student_in_whatever_form_table_and_text_are(tmp_path, t
         handout.make(workspace, tmp_path / "students")
 
 
+@pytest.mark.parametrize("headings", ["Full name,Email,Course", "Student number,E-Mail,Course"])
+def test_the_course_of_the_students_is_no_student(tmp_path, headings):
+    workspace = tmp_path / "workspace"
+    workspace.mkdir()
+    (workspace / handout.LIST).write_text("baxter.sh\nnote.md\n")
+    (workspace / "baxter.sh").write_text("")
+    (workspace / "note.md").write_text("Welcome to Robotics Foundations")
+    (workspace / "class.csv").write_text(
+        headings + "\nAnna Groß,anna@example.edu,Robotics Foundations\nWei Li,li@example.edu,Robotics Foundations\n")
+    handout.make(workspace, tmp_path / "students")
+
+
 def test_a_roster_that_cannot_be_read_is_told(workspace, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("LAB_ROOT", str(workspace))
     for name in ("/dev/zero", str(tmp_path / "gone.csv")):
