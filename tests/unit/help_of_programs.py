@@ -9,14 +9,13 @@ import concurrent.futures
 import json
 import os
 import runpy
+import select
 import signal
 import sys
-import time
 import traceback
 from pathlib import Path
 
 LIMIT_S = 60.0
-POLL_S = 0.02
 AT_A_TIME = 4
 COMMON = ("actionlib", "arm_kinematics", "baxter_interface", "baxter_sim_kinematics", "bullet_sim", "cv2",
           "dynamic_reconfigure.server", "gazebo_msgs.srv", "lab_display.show", "motion_planning.pipeline",
@@ -53,14 +52,12 @@ def said(folder: Path, program: str) -> tuple[int | None, str, str]:
         for number, file in enumerate(files, 1):
             os.dup2(os.open(file, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), number)
         become(program)
-    deadline, ended, status = time.monotonic() + LIMIT_S, 0, 0
-    while not ended and time.monotonic() < deadline:
-        ended, status = os.waitpid(child, os.WNOHANG)
-        if not ended:
-            time.sleep(POLL_S)
+    end = os.pidfd_open(child)
+    ended = select.select([end], [], [], LIMIT_S)[0]
+    os.close(end)
     if not ended:
         os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+    _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status) if ended else None
     return code, *(file.read_text(errors="replace") for file in files)
 
