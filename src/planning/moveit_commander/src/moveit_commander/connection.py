@@ -14,6 +14,8 @@ from actionlib_msgs.msg import GoalStatus
 from moveit_msgs import msg, srv
 from std_msgs.msg import String
 
+import master_calls
+
 from .exception import MoveItCommanderException
 from .node import ensure_node
 
@@ -33,6 +35,8 @@ _POLL_S = 0.05
 #: Time limit for a move_group that has started, but does not serve yet [s]: at its first start with a robot it makes
 #: what planning needs to know of the robot's shape.
 START_WAIT_S = 120.0
+# Time limit for an answer of the master and of the node [s].
+_ANSWER_S = 1.0
 
 
 def how_to_start() -> str:
@@ -77,10 +81,12 @@ class Connection:
 
     def _is_starting(self) -> bool:
         """Whether move_group's node is there, served or not."""
+        master = master_calls.master(rospy.get_name(), rosgraph.get_master_uri(), _ANSWER_S)
         try:
-            uri = urllib.parse.urlsplit(rosgraph.Master(rospy.get_name()).lookupNode(self.name("move_group")))
-            socket.create_connection((uri.hostname, uri.port), timeout=1.0).close()
-        except (rosgraph.MasterException, OSError):  # the master knows no such node, or one that has ended
+            uri = urllib.parse.urlsplit(master.lookupNode(self.name("move_group")))
+            socket.create_connection((uri.hostname or "", uri.port or 0), timeout=_ANSWER_S).close()
+        # The master does not answer, or knows no such node, or one that has ended.
+        except (rosgraph.MasterException, *master_calls.NO_ANSWER):
             return False
         return True
 

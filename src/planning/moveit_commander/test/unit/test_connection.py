@@ -56,7 +56,8 @@ def test_a_move_group_that_starts_is_waited_for_and_that_is_said_once(waiting, n
     assert "move_group is starting" in told
 
 
-@pytest.mark.parametrize("gone", [rosgraph.MasterError("unknown node"), "http://localhost:1/"])
+@pytest.mark.parametrize("gone", [rosgraph.MasterError("unknown node"), "http://localhost:1/", "http://localhost:x/",
+                                  "nonsense"])
 def test_a_node_that_is_not_there_is_not(waiting, gone):
     with pytest.raises(RuntimeError, match="is move_group running.*roslaunch"):
         waiting(20, gone)
