@@ -255,8 +255,8 @@ def held_back(run, sides):
     for side in sides:
         held = run.recording.held(side)
         if held and path_length(run.recording.arm(side)[held[0]:]) < STRAY_RAD:
-            return Fault("held", "collision avoidance held the %s arm at %.1f s: it came too near to %s. Lead it "
-                         "round; move_to_joint_positions returns False there, and its log says so"
+            return Fault("held", "collision avoidance held the %s arm at %.1f s: it came too near to %s. Take "
+                         "another way; move_to_joint_positions returns False there, and its log says so"
                          % (side, run.recording.times[held[0]], ", ".join(held[1])))
     return None
 

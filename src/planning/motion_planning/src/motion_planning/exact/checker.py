@@ -14,7 +14,7 @@ import numpy as np
 from motion_planning.errors import PlanningError
 from motion_planning.exact import kernels
 from motion_planning.exact.geometry import grown, plane_overlap
-from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, seats_of
+from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, without_fixed_joints
 from motion_planning.model import ModelError
 from motion_planning.shapes import TriangleMesh
 from urdf_model import Mesh, Plane
@@ -74,7 +74,7 @@ class ExactChecker:
         self.model, self.meshes = model, meshes
         self.warnings = []
         self._geometries = Geometries()
-        self._kinematics, self._seats = seats_of(model.kinematics)
+        self._kinematics, self._carriers = without_fixed_joints(model.kinematics)
         self._lock = threading.Lock()
         self._tables = OrderedDict()
         self._robot = self._robot_parts(meshes)
@@ -309,7 +309,7 @@ class ExactChecker:
         held = [Part(body.id, ATTACHED, self.model.link_index[body.link], shape, body.object.pose @ pose)
                 for body in bodies for shape, pose in body.object.shapes]
         return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies},
-                      self._seats)
+                      self._carriers)
 
     def _pairing(self, scene, movers, group):
         held = movers, scene.allowed
@@ -317,11 +317,11 @@ class ExactChecker:
                           lambda: self._make_pairing(scene.allowed, movers, group))
 
     def _make_pairing(self, allowed, movers, group):
-        moving, seats = None, np.arange(len(self._kinematics[0]))
+        moving, carriers = None, np.arange(len(self._kinematics[0]))
         if group is not None:
             moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
-            seats = np.array(sorted({self._seats[link][0] for link in moving}), dtype=np.int64)
-        return movers.pairs(allowed, moving), (seats, np.flatnonzero(np.isin(movers.arrays[0], seats))), {}
+            carriers = np.array(sorted({self._carriers[link][0] for link in moving}), dtype=np.int64)
+        return movers.pairs(allowed, moving), (carriers, np.flatnonzero(np.isin(movers.arrays[0], carriers))), {}
 
     @staticmethod
     def _fixed_key(scene):

@@ -27,23 +27,23 @@ class Part(NamedTuple):
     pose: np.ndarray
 
 
-def seats_of(kinematics):
-    """Return (kinematics, seats) without the fixed joints of ``kinematics``, see ``model.kernels``: of the root and the
-    links behind the other joints alone; for each link the index of the one among them that it moves with, and its pose
-    (4, 4) there."""
+def without_fixed_joints(kinematics):
+    """Return (kinematics, carriers) without the fixed joints of ``kinematics``, see ``model.kernels``: of the root and
+    the links behind the other joints alone; for each link the index of the one among them that it moves with, and its
+    pose (4, 4) there."""
     parents, origins, axes, kinds, variables, factors = kinematics
-    kept, seats, above, ways = [], [], [], []
+    kept, carriers, above, ways = [], [], [], []
     for link, parent in enumerate(parents):
-        seat, pose = (-1, np.eye(4)) if parent < 0 else seats[parent]
+        carrier, pose = (-1, np.eye(4)) if parent < 0 else carriers[parent]
         pose = pose @ origins[link]
         if parent < 0 or kinds[link]:
-            above.append(seat)
+            above.append(carrier)
             ways.append(pose)
-            seat, pose = len(kept), np.eye(4)
+            carrier, pose = len(kept), np.eye(4)
             kept.append(link)
-        seats.append((seat, pose))
+        carriers.append((carrier, pose))
     return (np.array(above, parents.dtype), np.array(ways), axes[kept], kinds[kept], variables[kept],
-            factors[kept]), seats
+            factors[kept]), carriers
 
 
 class Geometries:
@@ -77,16 +77,17 @@ def _forms(found):
 class Movers:
     """Shapes that move with the robot."""
 
-    def __init__(self, parts, geometries, touch, seats):
-        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; seats: see ``seats_of``."""
+    def __init__(self, parts, geometries, touch, carriers):
+        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; carriers: see
+        ``without_fixed_joints``."""
         self.parts, self.touch = parts, touch
         found = [geometries.of(part.shape) for part in parts]
         self.geometries = [geometries.geometry(part.shape) for part in parts]
         self.objects = [None if geometry is None else fcl.CollisionObject(geometry) for geometry in self.geometries]
         count = len(parts)
         self.arrays = (
-            np.array([seats[part.link][0] for part in parts], dtype=np.int64),
-            np.array([seats[part.link][1] @ part.pose for part in parts], dtype=float).reshape(count, 4, 4),
+            np.array([carriers[part.link][0] for part in parts], dtype=np.int64),
+            np.array([carriers[part.link][1] @ part.pose for part in parts], dtype=float).reshape(count, 4, 4),
             np.array([bounds.centre for bounds, _ in found], dtype=float).reshape(count, 3),
             np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3),
             np.array([bounds.radius for bounds, _ in found], dtype=float), _forms(found))

@@ -235,11 +235,11 @@ def _robot(sphere_model, group, scene, state, about):
     """Return (the _Robot, sentences on what is coarser than usual). about: ({object: bodies that may touch it},
     Patience)."""
     model, (special, patience), remarks = sphere_model.model, about, []
-    joints, seats = _joints(model, group, state)
+    joints, carriers = _joints(model, group, state)
     movers, still = [], []
     frames = model.frames(state.q, state.base)
     for link, name in enumerate(model.links):
-        joint, pose = seats[link]
+        joint, pose = carriers[link]
         if joint >= 0:
             spheres = sphere_model.spheres(name)
             if len(spheres):
@@ -254,7 +254,7 @@ def _robot(sphere_model, group, scene, state, about):
     moving = [mover.name for mover in movers if not scene.link_padding.get(mover.name)
               and scene.link_scale.get(mover.name, 1.0) == 1.0]
     for body in state.attached.values():
-        joint, pose = seats[model.link_index[body.link]]
+        joint, pose = carriers[model.link_index[body.link]]
         coarse = set()
         if joint >= 0:
             spheres = _spheres_of(body.object, sphere_model.tolerance, patience, coarse)
@@ -321,9 +321,9 @@ def _joints(model, group, state):
     (the joint that it moves with or -1, its pose in that joint's frame)."""
     parents, origins, axes, kinds, variables, factors = model.kinematics
     own = {int(index): number for number, index in enumerate(group.indices)}
-    joints, seats = [], []
+    joints, carriers = [], []
     for link, parent in enumerate(parents):
-        joint, pose = (-1, state.base) if parent < 0 else seats[parent]
+        joint, pose = (-1, state.base) if parent < 0 else carriers[parent]
         pose = pose @ origins[link]
         multiplier, offset = factors[link]
         variable = int(variables[link])
@@ -337,8 +337,8 @@ def _joints(model, group, state):
         elif kinds[link]:
             value = offset + (multiplier * state.q[variable] if variable >= 0 else 0.0)
             pose = pose @ _motion(kinds[link], axes[link], value)
-        seats.append((joint, pose))
-    return joints, seats
+        carriers.append((joint, pose))
+    return joints, carriers
 
 
 def _branches(joints):

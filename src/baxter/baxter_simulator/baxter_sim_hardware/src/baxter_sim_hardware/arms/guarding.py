@@ -75,7 +75,7 @@ class Guarding:
             self.held[side] = tuple(_near(self.fields[side])) if is_held else ()
             if is_held:
                 self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too "
-                          "near to %s. Lead it round, or suppress that by limb/%s/%s" % (
+                          "near to %s. Take another way, or suppress that by limb/%s/%s" % (
                               side, ", ".join(self.held[side]), side, collision.AVOIDANCE))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
