@@ -89,11 +89,3 @@ class AllowedCollisions:
     def with_default(self, name, allow):
         """Return a copy with ``name`` allowed to touch everything, or nothing; its entries stay."""
         return AllowedCollisions(self.entries, {**self.defaults, name: bool(allow)})
-
-    def without(self, names):
-        """Return a copy without the entries of ``names``."""
-        names = set(names)
-        if not names & {*self.defaults, *(name for pair in self.entries for name in pair)}:
-            return self
-        return AllowedCollisions({pair: value for pair, value in self.entries.items() if names.isdisjoint(pair)},
-                                 {name: value for name, value in self.defaults.items() if name not in names})

@@ -73,8 +73,8 @@ class Scene:
         return self.with_object(more if there is None else there.with_shapes_of(more))
 
     def without_object(self, name):
-        """Return the scene without an object, and its data; an empty ``name``: without all objects. Raises SceneError
-        for an unknown name.
+        """Return the scene without an object and its colour; an empty ``name``: without all objects. What it may touch
+        stays, for an object that takes the name again. Raises SceneError for an unknown name.
         """
         if not name:
             return self._without(list(self.objects))
@@ -249,8 +249,7 @@ class Scene:
     def _without(self, names):
         gone = set(names)
         return replace(self, objects={name: one for name, one in self.objects.items() if name not in gone},
-                       colours={name: colour for name, colour in self.colours.items() if name not in gone},
-                       allowed=self.allowed.without(gone - set(self.state.attached)))
+                       colours={name: colour for name, colour in self.colours.items() if name not in gone})
 
     def _object(self, name):
         if name not in self.objects:
