@@ -18,9 +18,11 @@ _MIN_ROOM, _MAX_ROOM = 4096, 1 << 20
 _ALL = (1 << 64) - 1
 # Shortcuts: total tries, failed tries in a row.
 _TRIES, _MISSES = 200, 30
-#: Number of tries to make a path shorter that is good enough already; how many between two looks at the clock, and the
-#: share of those that change one joint.
-IMPROVING, _AT_ONCE, _SINGLE = 2000, 250, 0.5
+#: Number of tries to make a path shorter that is good enough already, and the share of those that change one joint.
+IMPROVING, _SINGLE = 2000, 0.5
+# Tries before the first look at the clock, and the time [s] between two looks that later ones aim at: among the cubes
+# of an octomap a try may take a hundred times as long as among boxes.
+_FIRST_TRIES, _LOOK_S = 4, 2e-3
 
 
 class Path(NamedTuple):
@@ -98,13 +100,17 @@ def shorten(path, checker, run, tries=_TRIES, misses=_MISSES):
 def improve(path, checker, run):
     """Return the Path after ``IMPROVING`` tries to make it shorter, some 20 ms for both arms of Baxter, or fewer if the
     deadline has passed. Raises NoPath if it is stopped."""
-    numbers = _numbers(run.seed)
-    for _ in range(0, IMPROVING, _AT_ONCE):
+    numbers, tries, left = _numbers(run.seed), _FIRST_TRIES, IMPROVING
+    now = run.clock()
+    while left and now < run.deadline:
         if run.stop():
             raise NoPath("stopped while a path was made shorter", stopped=True)
-        if run.clock() >= run.deadline:
-            break
-        path = _shorter(path, checker, numbers, (_AT_ONCE, _AT_ONCE, _SINGLE))
+        path = _shorter(path, checker, numbers, (tries, tries, _SINGLE))
+        before, now = now, run.clock()
+        left -= tries
+        # How many tries are made at once has no influence on the path.
+        wanted = tries * _LOOK_S / max(now - before, 0.5 * _LOOK_S)
+        tries = min(left, max(1, int(wanted)))
     return path
 
 
