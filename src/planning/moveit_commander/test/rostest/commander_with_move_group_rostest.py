@@ -110,11 +110,12 @@ class ProbotTest(unittest.TestCase):
         hand = self.group.get_current_pose()
         goal = self.there()
         self.assertTrue(self.group.go("home"))
-        self.scene.add_box("box", hand, (0.02, 0.02, 0.02))
+        # A name of its own: the matrix keeps the entries of an object that is removed.
+        self.scene.add_box("crumb", hand, (0.02, 0.02, 0.02))
         self.assertFalse(self.group.plan(goal)[0])
         scene = self.scene.get_planning_scene(PlanningSceneComponents.ALLOWED_COLLISION_MATRIX)
         scene.is_diff = scene.robot_state.is_diff = True
-        scene.allowed_collision_matrix.set_allowed("box", self.robot.get_link_names())
+        scene.allowed_collision_matrix.set_allowed("crumb", self.robot.get_link_names())
         self.assertTrue(self.scene.apply_planning_scene(scene))
         self.assertTrue(self.group.plan(goal)[0])
 
