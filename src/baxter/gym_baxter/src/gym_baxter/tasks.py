@@ -14,6 +14,8 @@ import numpy as np
 from baxter_lab import Lab
 from baxter_model import BASE_HEIGHT_M, MIRROR_SIGNS, SIDES
 
+from .names import Named, places, poses
+
 #: Where arms begin in robosuite's tasks, right arm, s0 s1 e0 e1 w0 w1 w2 [rad]; the left one mirrors it.
 ROBOSUITE_RIGHT = (0.403, -0.636, 0.114, 1.432, 0.735, 1.205, -0.269)
 TABLE_TOP_M = 0.8 - BASE_HEIGHT_M  # in `base`: robosuite's tables are 0.8 m high
@@ -30,6 +32,8 @@ class Task:
     """Base of all tasks. `lab`: the `Lab` that `build` furnishes once; `begin` starts an episode by `random`."""
 
     NAME = ""
+    SENTENCE = ""  # the task in words
+    OBSERVED: tuple[Named, ...] = ()  # names and units of what `observed` returns
     POSE = "neutral"  # that the arms begin in; None: robosuite's
     STEPS = 400  # of an episode
 
@@ -75,6 +79,8 @@ class Reach(Task):
     """The left hand goes to a point in the air."""
 
     NAME, STEPS = "Reach", 100
+    SENTENCE = "Bring the left hand to the point."
+    OBSERVED = (*places("goal"), *places("goal_from_left_hand"))
     LOW_M, HIGH_M, WITHIN_M = (0.55, 0.0, 0.0), (0.85, 0.5, 0.4), 0.03
 
     def begin(self, random):
@@ -97,6 +103,8 @@ class PickPlace(Task):
     """The left hand puts a block onto a mark on the table."""
 
     NAME, STEPS = "PickPlace", 400
+    SENTENCE = "Put the block onto the mark on the table."
+    OBSERVED = (*poses("block"), *places("goal"), *places("block_from_left_hand"))
     SIZE_M, WITHIN_M = (0.04, 0.04, 0.06), 0.03
     LOW_M, HIGH_M, APART_M = (0.60, 0.10), (0.78, 0.40), 0.12
 
@@ -155,6 +163,9 @@ class TwoArmLift(Task):
     """Both hands lift a pot by its handles."""
 
     NAME, POSE, STEPS = "TwoArmLift", None, 1000
+    SENTENCE = "Lift the pot by both handles."
+    OBSERVED = (*poses("pot"), *(name for side in SIDES for what in ("%s_handle", "%s_handle_from_hand")
+                                 for name in places(what % side)))
     HALF_M, WALL_M, DENSITY = 0.07, 0.01, 1000.0
     HANDLE_M, ROD_M = 0.09, 0.02  # length and width of a handle; side of its rods
     LIFTED_M, UPRIGHT = 0.10, math.cos(math.radians(30.0))
@@ -223,6 +234,8 @@ class TwoArmHandover(Task):
     """The right hand takes a hammer from the table and gives it to the left one."""
 
     NAME, POSE, STEPS = "TwoArmHandover", None, 1000
+    SENTENCE = "Give the hammer from the right hand to the left one."
+    OBSERVED = (*poses("hammer"), *(name for side in SIDES for name in places("hammer_from_%s_hand" % side)))
     LENGTH_M, HALF_WIDTH_M, DENSITY = 0.20, 0.0175, 175.0
     HEAD_M = (0.05, 0.10, 0.05)
     LIFTED_M = 0.10
