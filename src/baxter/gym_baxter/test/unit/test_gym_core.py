@@ -112,7 +112,8 @@ def test_success_is_told(made):
 
 @pytest.mark.parametrize(("task", "choices", "named"), [
     ("Juggle", Choices(), "PickPlace"), ("Reach", Choices(control="torque"), "osc_pose"),
-    ("Reach", Choices(control_freq=30), "500"), ("Reach", Choices(obs_type="smell"), "pixels")])
+    ("Reach", Choices(control_freq=30), "control_freq is 30"),
+    ("Reach", Choices(physics_step_s=0.0), "physics_step_s 0"), ("Reach", Choices(obs_type="smell"), "pixels")])
 def test_unknown_names_are_refused_with_the_choices(task, choices, named):
     with pytest.raises(ValueError, match=named):
         Core(task, choices)
