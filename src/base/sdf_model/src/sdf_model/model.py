@@ -153,14 +153,16 @@ class ModelReader:
             frames.add(document.name(frame), frame, frame.get("attached_to", ""))
         frame_of = {joint: frames.add_joint(document.name(joint), joint, _end(document, joint, "child"))
                     for joint in element.iterchildren("joint")}
+        nested, parts.links = parts.links, {}
         for link in element.iterchildren("link"):
             name = document.name(link)
-            if name in parts.links:
+            if name in parts.links or name in nested:
                 raise document.error(link, "link '%s' appears twice" % name)
             read = read_link(document, link, name, self._materials)
             read.self_collide = document.flag(link, "self_collide", document.flag(element, "self_collide"))
             parts.links[name] = (read, frames.where(name, link))
             parts.gazebo += _sensors_and_lights(document, link, name)
+        parts.links.update(nested)  # behind its own, as in Gazebo, whose canonical link is the first
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))
         if held and len(held) == len(parts.links):

@@ -72,11 +72,12 @@ def build_robot(document, name, parts):
     """Return the Robot of ``parts``.
 
     A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Joints that close a
-    loop become the Robot's loops, which is noted since they have no state; links without a joint are fixed to the root,
-    with a note. A model that is welded to the world becomes static.
+    loop become the Robot's loops, which is noted since they have no state. Links that no joint connects with the root
+    are on floating joints; in a static model they are fixed. A model that is welded to the world becomes static, if
+    it has no such links.
     """
     links = dict(parts.links)
-    free = not parts.static
+    held = "fixed" if parts.static else "floating"
     written, root = _without_welds(parts)
     joined = {}
     for joint in written:
@@ -112,14 +113,11 @@ def build_robot(document, name, parts):
                 branch.append(there)
 
     hang(root)
-    for link in links:
+    for link in _roots_first(links, written):
         if link in reached:
             continue
         reached.add(link)
-        joints["%s_held" % link] = _held(links, root, link)
-        if free:
-            text = "link '%s', which no joint connects: it is held by '%s'" % (link, root)
-            document.notes.add(text, document.source, links[link][0].line)
+        joints["%s_held" % link] = _held(links, root, link, held)
         hang(link)
     place = {joint.name: position for position, joint in enumerate(written)}
     ordered = sorted(joints.values(), key=lambda joint: place.get(joint.name, len(place)))
@@ -138,22 +136,45 @@ def build_robot(document, name, parts):
 def _without_welds(parts):
     """Return the joints without those that fix a link in the world, and that link, which then is a static root.
 
-    Only where the world has no other joint; a hinge on the world needs the world as a link.
+    Only where the world has no other joint, and all links hang on it; a hinge on the world needs the world as a link.
     """
     welds = [joint for joint in parts.joints if WORLD in (joint.parent, joint.child)]
     anchored = [end for joint in welds for end in (joint.parent, joint.child) if end in parts.links]
     if WORLD in parts.links or not anchored or any(joint.type != "fixed" for joint in welds):
+        return parts.joints, None
+    if not parts.static and not _reachable(WORLD, parts.joints).issuperset(parts.links):
         return parts.joints, None
     parts.static = True
     return [joint for joint in parts.joints if joint not in welds], anchored[0]
 
 
 def _root(links, joints):
-    """Return the root link: the world, or the first link that is not a joint's child."""
+    """Return the root link: the world, or the first one that is not a joint's child among those that are joined to the
+    first link, with which Gazebo's model goes."""
     if WORLD in links:
         return WORLD
+    near = _reachable(next(iter(links)), joints)
+    return next(name for name in _roots_first(links, joints) if name in near)
+
+
+def _roots_first(links, joints):
+    """The links, those first that are not a joint's child."""
     children = {joint.child for joint in joints}
-    return next((name for name in links if name not in children), next(iter(links)))
+    return sorted(links, key=lambda name: name in children)
+
+
+def _reachable(start, joints):
+    """The links that are joined to ``start``, directly or through others, and itself."""
+    beside = {}
+    for joint in joints:
+        beside.setdefault(joint.parent, []).append(joint.child)
+        beside.setdefault(joint.child, []).append(joint.parent)
+    found, branch = {start}, [start]
+    while branch:
+        new = [link for link in beside.get(branch.pop(), ()) if link not in found]
+        found.update(new)
+        branch += new
+    return found
 
 
 def _joint(links, joint, parent, child):
@@ -188,7 +209,7 @@ def _loop(document, links, joint):
                  inverse(links[joint.child][1]) @ joint.frame, joint.axis)]
 
 
-def _held(links, root, link):
+def _held(links, root, link, kind):
     return Joint(
-        "%s_held" % link, "fixed", root, link, inverse(links[root][1]) @ links[link][1], np.array([0.0, 0.0, 1.0])
+        "%s_held" % link, kind, root, link, inverse(links[root][1]) @ links[link][1], np.array([0.0, 0.0, 1.0])
     )

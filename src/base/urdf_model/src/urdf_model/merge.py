@@ -26,8 +26,8 @@ class MergedFrame(NamedTuple):
 class MergedLink:
     """A body: named after the link that its movable joint moves (or the root), with everything fixed to it.
 
-    Its frame is that of its joint; the root's body has the model's frame. In a URDF that is the frame of the link that
-    it is named after. If its members have different surfaces, the first one counts.
+    Its frame is that of its joint; the bodies of roots have the model's frame. In a URDF that is the frame of the link
+    that it is named after, but for loose ones. If its members have different surfaces, the first one counts.
     """
 
     name: str
@@ -51,13 +51,19 @@ class MergedRobot:
     joints: dict[str, Joint]
     frames: dict[str, MergedFrame]
     loops: list[Loop] = field(default_factory=list)
+    loose: tuple[str, ...] = ()  # roots of further trees, which move freely
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """The bodies that no joint holds; the first is ``root``."""
+        return (self.root, *self.loose)
 
 
-def merge_fixed(robot: Robot) -> MergedRobot:
+def merge_fixed(robot: Robot, held: bool = False) -> MergedRobot:
     """Return ``robot`` with its fixed joints removed; bodies come parents first, joints in that same order.
 
-    Floating and planar joints cannot be merged nor driven; they are treated as fixed; ``parse_urdf`` has warned of
-    them.
+    A body behind a floating or planar joint is loose, since Gazebo makes no joint of these; if ``held``, as in a static
+    model, it is fixed. The frame of a loose body is the model's with all joints at 0, as the root's is.
     """
     children: dict[str, list[Joint]] = {name: [] for name in robot.links}
     for joint in robot.joints.values():
@@ -66,6 +72,8 @@ def merge_fixed(robot: Robot) -> MergedRobot:
     frames: dict[str, MergedFrame] = {}
     groups: dict[str, list[str]] = {}
     joints: dict[str, Joint] = {}
+    loose: list[str] = []
+    at_zero = {robot.root: np.eye(4)}  # frames of bodies in the model's
 
     # Depth first, so that an arm's bodies are neighbours; the stack keeps document order among siblings.
     stack = [(robot.root, robot.root, robot.root_origin)]
@@ -77,9 +85,14 @@ def merge_fixed(robot: Robot) -> MergedRobot:
             origin = offset @ joint.origin
             if joint.movable:
                 stack.append((joint.child, joint.child, joint.child_offset))
+                at_zero[joint.child] = at_zero[body] @ origin
                 joints[joint.child] = Joint(
                     **{**vars(joint), "parent": body, "origin": origin, "child_offset": np.eye(4)}
                 )
+            elif joint.type != "fixed" and not held:
+                loose.append(joint.child)
+                at_zero[joint.child] = np.eye(4)
+                stack.append((joint.child, joint.child, at_zero[body] @ origin @ joint.child_offset))
             else:
                 stack.append((joint.child, body, origin @ joint.child_offset))
 
@@ -89,7 +102,8 @@ def merge_fixed(robot: Robot) -> MergedRobot:
                      in_parent=frames[loop.parent].offset @ loop.in_parent,
                      in_child=frames[loop.child].offset @ loop.in_child) for loop in robot.loops]
     loops = [loop for loop in loops if loop.parent != loop.child]
-    return MergedRobot(robot.name, robot.root, links, ordered, frames, loops)
+    return MergedRobot(robot.name, robot.root, links, ordered, frames, loops,
+                       tuple(body for body in links if body in loose))
 
 
 def _merge_group(robot, body, members, frames):

@@ -258,7 +258,7 @@ class _Reader:
         if kind not in JOINT_TYPES:
             raise self.error(element, "joint '%s' has type '%s'; known: %s" % (name, kind, ", ".join(JOINT_TYPES)))
         if kind in ("floating", "planar"):
-            self.warn(element, "joint '%s' is %s, which nothing here drives; it is held fixed" % (name, kind))
+            self.warn(element, "joint '%s' is %s: Gazebo has no such joint, its child moves freely" % (name, kind))
         axis = self.vector(element.find("axis"), "xyz", 3, default=(1.0, 0.0, 0.0))
         length = math.sqrt(sum(a * a for a in axis))
         if length < 1e-9:

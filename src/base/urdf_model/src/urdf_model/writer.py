@@ -32,6 +32,10 @@ def drawing_urdf(merged):
         etree.SubElement(element, "axis", xyz=_words(joint.axis))
         if kind == "prismatic":
             etree.SubElement(element, "limit", lower="0", upper="0", effort="0", velocity="0")
+    for body in merged.loose:
+        element = etree.SubElement(robot, "joint", name="%s_loose" % body, type="floating")
+        etree.SubElement(element, "parent", link=merged.root)
+        etree.SubElement(element, "child", link=body)
     return etree.tostring(robot, encoding="unicode")
 
 

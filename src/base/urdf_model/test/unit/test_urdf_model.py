@@ -169,7 +169,7 @@ def test_entities_are_refused():
     "xml, message",
     [
         (edit('ixx="1"', 'ixx="-1"'), "negative principal moment"),
-        (edit('type="fixed"><parent link="upper"', 'type="floating"><parent link="upper"'), "held fixed"),
+        (edit('type="fixed"><parent link="upper"', 'type="floating"><parent link="upper"'), "moves freely"),
     ],
 )
 def test_what_can_be_mended_is_a_warning(xml, message):

@@ -4,8 +4,9 @@
 One thread owns a World and all its Models; nothing here locks.
 """
 
+from .contact import Contact
 from .errors import LOG, BulletSimError
-from .model import Contact, Model
+from .model import Model
 from .pose import Pose
 from .shapes import MeshCache, MeshFiles
 from .stand_ins import with_stand_ins

@@ -10,6 +10,7 @@ from urdf_model.transforms import inverse
 
 from .builder import inertial_frame, set_collision_filter
 from .errors import BulletSimError, within
+from .parts import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 
@@ -23,8 +24,8 @@ class Body:
     #: For how many checks of ``StateWatch`` the base has not moved.
     still_for = 0
 
-    def __init__(self, client, world, blueprint, parts, root_offset):
-        """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``parts``, ``root_offset``:
+    def __init__(self, client, world, blueprint, parts, root_offsets):
+        """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``parts``, ``root_offsets``:
         what ``builder.build`` returned for it."""
         #: The blueprint that the body is made from; its collision pairs may change.
         self.blueprint = blueprint
@@ -36,15 +37,20 @@ class Body:
         self.parts = parts
         self._client = client
         self._world = world
-        self._set_root_offset(root_offset)
+        self._link_index = link_indices(merged)
+        #: Indices of the roots beside the first, and of all roots that move.
+        self.loose = tuple(self._link_index[body] for body in merged.loose)
+        self.free = self.loose if self.static else (BASE, *self.loose)
+        self._offsets = {}
+        for body, offset in zip(merged.roots, root_offsets, strict=True):
+            self._set_root_offset(self._link_index[body], offset)
         # Pose of a fixed root, cached so that a tick need not ask for it.
         self._base_quaternion = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=client)[1]
-        self._link_index = {merged.root: BASE, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
         self._link_names = {index: link for link, index in self._link_index.items()}
         #: The links that Gazebo makes of the description: some of `link_names`.
         self.gazebo_links = tuple(dict.fromkeys(gazebo_links(self.robot).values()))
         self._canonical = self._find_canonical()
-        self._late_twist = None
+        self._late_twists = {}  # index of a root -> velocity
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
         self._pairs = ()
@@ -74,6 +80,10 @@ class Body:
         """Return the pose of a link's frame in the world. Raises BulletSimError for an unknown link."""
         return Pose.from_matrix(self._link_matrix(link))
 
+    def body_frame(self, body):
+        """Return the frame (4, 4) of a body, a link with what is fixed to it, in the world."""
+        return self._body_matrix(self._link_index[body])
+
     def link_twist(self, link):
         """Return (linear (3,), angular (3,)) velocity of a link's frame, in world axes [m/s, rad/s]."""
         frame = self._frame(link)
@@ -87,12 +97,47 @@ class Body:
         return Pose.from_matrix(self._body_matrix(BASE))
 
     def set_base_pose(self, pose):
-        """Put the model's frame at ``pose``, at rest if it is free; joints keep their positions."""
-        centre = Pose.from_matrix(pose.checked().matrix() @ self._root_offset)
-        self.parts.set_base(centre.position, centre.quaternion)
-        self._base_quaternion = centre.quaternion
-        self._late_twist = None
-        if not self.static:
+        """Put the model's frame at ``pose``, at rest if it is free; joints keep their positions, and loose links their
+        places to it."""
+        wanted = pose.checked().matrix()
+        loose = {}
+        if self.loose:
+            way = wanted @ inverse(self._body_matrix(BASE))
+            loose = {index: way @ self._body_matrix(index) for index in self.loose}
+        self._base_quaternion = self._put_root(BASE, wanted)
+        for index, frame in loose.items():
+            self._put_root(index, frame)
+        self._was_placed()
+
+    def loose_poses(self):
+        """Return the poses of the frames of the loose bodies, in the order of ``merged.loose``."""
+        return [Pose.from_matrix(self._body_matrix(index)) for index in self.loose]
+
+    def root_of(self, link):
+        """Return the root of the tree that a link is in, one of ``merged.roots``."""
+        return self._link_names[self.parts.root_of(self._link_index[self._frame(link).link])]
+
+    def set_root_pose(self, root, pose):
+        """Put the frame of a free body of ``merged.roots`` at ``pose``, at rest, with the links that joints hold on it,
+        but not the other roots."""
+        self._put_root(self._link_index[root], pose.checked().matrix())
+        self._was_placed()
+
+    def set_root_twist(self, root, linear, angular):
+        """Set the velocity of a free body of ``merged.roots`` [m/s, rad/s, world axes]: that of the model's frame for
+        the first one, else that of its link's. Raises BulletSimError out of bounds."""
+        self._set_root_twist(self._link_index[root], linear, angular)
+        self.wake()
+
+    def _put_root(self, index, frame):
+        """Put the frame of a root at ``frame`` (4, 4); returns the quaternion that PyBullet has for it."""
+        centre = Pose.from_matrix(frame @ self._offsets[index][0])
+        self.parts.set_root(index, centre.position, centre.quaternion)
+        return centre.quaternion
+
+    def _was_placed(self):
+        self._late_twists = {}
+        if self.free:
             self._world.note_placed(self)
         self._world.wake_all()
 
@@ -117,15 +162,24 @@ class Body:
         return self._twist(BASE, self._body_matrix(BASE)[:3, 3])
 
     def set_base_twist(self, linear, angular):
-        """Set the velocity of a free model's frame, in world axes [m/s, rad/s]. Raises BulletSimError out of bounds."""
+        """Set the velocity of a free model's frame, in world axes [m/s, rad/s], and as in Gazebo that of each loose
+        link. Raises BulletSimError out of bounds."""
+        for index in self.free:
+            self._set_root_twist(index, linear, angular)
+        self.wake()
+
+    def _set_root_twist(self, index, linear, angular):
         within(bounds.SPEED, linear, "the linear velocity")
         angular = np.asarray(within(bounds.TURN_RATE, angular, "the angular velocity"), dtype=float)
         # The frame moves at `linear`; Bullet wants the velocity of the centre of mass.
-        arm = self._body_matrix(BASE)[:3, :3] @ self._root_offset[:3, 3]
+        arm = self._offsets[index][0][:3, 3]
+        if index != BASE:
+            arm = arm - self.merged.frames[self._link_names[index]].offset[:3, 3]
+        arm = self._body_matrix(index)[:3, :3] @ arm
         at_centre = np.asarray(linear, dtype=float) + np.cross(angular, arm)
-        self._late_twist = (at_centre.tolist(), angular.tolist())
-        pybullet.resetBaseVelocity(self.body, *self._late_twist, physicsClientId=self._client)
-        self.wake()
+        self._late_twists[index] = (at_centre.tolist(), angular.tolist())
+        pybullet.resetBaseVelocity(self.parts.places[index].body, *self._late_twists[index],
+                                   physicsClientId=self._client)
 
     def apply_wrench(self, link, force, torque=(0.0, 0.0, 0.0), position=None):
         """Push a link during the next step: ``force`` [N] and ``torque`` [Nm] in world axes.
@@ -140,7 +194,7 @@ class Body:
             self._pushes, self._pushed_at = [], self._world.steps
         self._pushes.append((body, force, torque, position))
         push = (self._link_index[body], force, torque, position)
-        if not self.static:
+        if self.free:
             self._late_pushes.append(push)
         self.wake()
         self._push(*push)
@@ -152,10 +206,12 @@ class Body:
 
     def wake(self):
         """Wake the model up if Bullet has put it to sleep."""
-        if not self.static:
+        for index in self.free:
             pybullet.changeDynamics(
-                self.body, BASE, activationState=pybullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client
+                *self.parts.places[index], activationState=pybullet.ACTIVATION_STATE_WAKE_UP,
+                physicsClientId=self._client
             )
+        if self.free:
             self._world.note_touched(self)
 
     def reapply_wrenches(self):
@@ -164,17 +220,20 @@ class Body:
         Bullet wakes a body at the end of a step, so the body ignores forces in that step: its velocity is then exactly
         zero.
         """
-        twist, self._late_twist = self._late_twist, None
+        twists, self._late_twists = self._late_twists, {}
         pushes, self._late_pushes = self._late_pushes, []
-        if not (twist or pushes):
+        if not (twists or pushes):
             return
-        velocity = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
-        if any(velocity[0]) or any(velocity[1]):
-            return
-        if twist:
-            pybullet.resetBaseVelocity(self.body, *twist, physicsClientId=self._client)
-        for push in pushes:
-            self._push(*push)
+        for index in self.free:
+            body = self.parts.places[index].body
+            velocity = pybullet.getBaseVelocity(body, physicsClientId=self._client)
+            if any(velocity[0]) or any(velocity[1]):
+                continue
+            if index in twists:
+                pybullet.resetBaseVelocity(body, *twists[index], physicsClientId=self._client)
+            for push in pushes:
+                if self.parts.root_of(push[0]) == index:
+                    self._push(*push)
 
     def contact_force(self, link):
         """Return the force (3,) [N, world axes] with which others pressed on a link's body in the last step.
@@ -277,23 +336,28 @@ class Body:
 
     def _rebuild_with(self, link, inertial):
         """Rebuild the multibodies with another inertial of a link; poses and velocities stay."""
-        base, joints, twist, velocity = self.motion()
-        frame = self.frame_of((base,)).matrix()
+        motion, index = self.motion(), self._link_index[link.name]
         link.inertial = inertial
-        if not self.static and link.name == self.merged.root:
-            offset = inertial_frame(link)
-            if twist is not None:
-                # PyBullet's is that of the centre of mass.
-                moved = frame[:3, :3] @ (offset[:3, 3] - self._root_offset[:3, 3])
-                twist = np.asarray(twist[0]) + np.cross(twist[1], moved), twist[1]
-            self._set_root_offset(offset)
+        if index in self.free:
+            old, offset = self._offsets[index], inertial_frame(link)
+            base, twist = (motion.base, motion.twist) if index == BASE else motion.loose[index]
+            frame = Pose(*base).matrix() @ old[1]
+            # PyBullet's is that of the centre of mass.
+            moved = frame[:3, :3] @ (offset[:3, 3] - old[0][:3, 3])
+            twist = np.asarray(twist[0]) + np.cross(twist[1], moved), twist[1]
+            self._set_root_offset(index, offset)
             pose = Pose.from_matrix(frame @ offset)
             base = pose.position, pose.quaternion
-        self._world.rebuild([self], {self: (base, joints, twist, velocity)})
+            if index == BASE:
+                motion = motion._replace(base=base, twist=twist)
+            else:
+                motion.loose[index] = base, twist
+        self._world.rebuild([self], {self: motion})
 
-    def _set_root_offset(self, offset):
-        self._root_offset, self._root_offset_inverse = offset, inverse(offset)
-        self._root_is_centre = bool(np.array_equal(offset, np.eye(4)))
+    def _set_root_offset(self, index, offset):
+        self._offsets[index] = offset, inverse(offset)
+        if index == BASE:
+            self._root_is_centre = bool(np.array_equal(offset, np.eye(4)))
 
     def has_weight(self, body):
         """Whether gravity acts on the body ``body``."""
@@ -364,7 +428,7 @@ class Body:
 
     def frame_of(self, motion):
         """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
-        return Pose.from_matrix(Pose(*motion[0]).matrix() @ self._root_offset_inverse)
+        return Pose.from_matrix(Pose(*motion.base).matrix() @ self._offsets[BASE][1])
 
     def _restore_collisions(self):
         """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
@@ -406,18 +470,20 @@ class Body:
         return self._body_matrix(self._link_index[frame.link]) @ frame.offset
 
     def _body_matrix(self, index):
-        if index == BASE:
-            centre = Pose(*pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client))
-            return centre.matrix() @ self._root_offset_inverse
+        if index < 0:
+            body = self.parts.places[index].body
+            centre = Pose(*pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client))
+            return centre.matrix() @ self._offsets[index][1]
         state = pybullet.getLinkState(*self.parts.places[index], computeForwardKinematics=1,
                                       physicsClientId=self._client)
         return Pose(state[4], state[5]).matrix()
 
     def _twist(self, index, point):
         """Return (linear, angular) velocity of ``point`` (3,) (world) of a body, in world axes."""
-        if index == BASE:
-            linear, angular = map(np.array, pybullet.getBaseVelocity(self.body, physicsClientId=self._client))
-            centre = np.array(pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)[0])
+        if index < 0:
+            body = self.parts.places[index].body
+            linear, angular = map(np.array, pybullet.getBaseVelocity(body, physicsClientId=self._client))
+            centre = np.array(pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)[0])
         else:
             state = pybullet.getLinkState(*self.parts.places[index], computeLinkVelocity=1,
                                           physicsClientId=self._client)
@@ -427,8 +493,8 @@ class Body:
     def _push(self, index, force, torque=(0.0, 0.0, 0.0), position=None):
         place = self.parts.places[index]
         if position is None:
-            if index == BASE:
-                position = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)[0]
+            if index < 0:
+                position = pybullet.getBasePositionAndOrientation(place.body, physicsClientId=self._client)[0]
             else:
                 position = pybullet.getLinkState(*place, physicsClientId=self._client)[0]
         arguments = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}

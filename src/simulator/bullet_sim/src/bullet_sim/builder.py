@@ -61,18 +61,32 @@ class Blueprint(NamedTuple):
 
 
 def build(client, blueprint, pose, shapes, warn):
-    """Create the multibodies of a :class:`Blueprint` with its root body at ``pose``, its shapes from a ShapeStore.
+    """Create the multibodies of a :class:`Blueprint` with its root bodies at ``pose``, its shapes from a ShapeStore.
 
-    Returns (Parts, inertial offset (4, 4) of the root link). ``warn(text)`` is called for missing masses.
+    Returns (Parts, [inertial offset (4, 4) of each root]). ``warn(text)`` is called for missing masses.
     """
-    merged, static = blueprint.merged, blueprint.static
-    root = merged.links[merged.root]
+    merged, bodies, offsets = blueprint.merged, [], []
+    found, start = limbs(merged, blueprint.static and blueprint.in_limbs), Pose.from_matrix(pose.matrix())
+    for root in merged.roots:
+        own = [limb for limb in found if limb.root == root]
+        made, offset = _build_tree(client, blueprint, own, start, shapes, warn)
+        bodies += made
+        offsets.append(offset)
+    return Parts(client, bodies, merged, found), offsets
+
+
+def _build_tree(client, blueprint, own, start, shapes, warn):
+    """Create the multibodies of the Limbs ``own``, which have one root, at Pose ``start``.
+
+    Returns PyBullet's numbers of them and the root's inertial offset (4, 4).
+    """
+    merged, root = blueprint.merged, blueprint.merged.links[own[0].root]
+    static = blueprint.static and root.name == merged.root
     if static:
         # A root that cannot move needs no inertia, and Model.inverse_dynamics wants its axes to be the link's own.
         root_mass, root_moments, root_offset = 0.0, np.zeros(3), np.eye(4)
     else:
         root_mass, root_moments, root_offset = _inertial(root, warn)
-    joints, start = limbs(merged, static and blueprint.in_limbs), Pose.from_matrix(pose.matrix())
     base = {
         "baseMass": root_mass,
         "basePosition": start.position,
@@ -82,30 +96,30 @@ def build(client, blueprint, pose, shapes, warn):
         # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
         "flags": (pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
         # Models with joints never sleep, as in Gazebo: a drive would not wake them.
-        | (0 if static or merged.joints else pybullet.URDF_ENABLE_SLEEPING),
+        | (0 if static or own[0].joints else pybullet.URDF_ENABLE_SLEEPING),
     }
     # The first has the root's shape.
-    root_shape = shapes.compound(link_collisions(merged, merged.root, static), static, blueprint.mesh_cuts)
-    root_shapes = [root_shape] + [NO_SHAPE] * (len(joints) - 1)
-    bodies = [_build_limb(client, blueprint, numbers, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
-              for numbers, shape in zip(joints, root_shapes, strict=True)]
+    root_shape = shapes.compound(link_collisions(merged, root.name, static), static, blueprint.mesh_cuts)
+    root_shapes = [root_shape] + [NO_SHAPE] * (len(own) - 1)
+    bodies = [_build_limb(client, blueprint, limb, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
+              for limb, shape in zip(own, root_shapes, strict=True)]
     if not static:
         pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
                                 sleepThreshold=_ASLEEP_M2_PER_S2, physicsClientId=client)
     pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0), physicsClientId=client)
     set_collision_filter(client, Place(bodies[0], -1), root.surface)
-    return Parts(client, bodies, joints), root_offset
+    return bodies, root_offset
 
 
-def _build_limb(client, blueprint, numbers, base, shapes, warn):
-    """Create a multibody of the joints ``numbers`` on the root; ``base``: createMultiBody's arguments for the root.
+def _build_limb(client, blueprint, limb, base, shapes, warn):
+    """Create the multibody of a Limb; ``base``: createMultiBody's arguments for the root.
 
     Returns PyBullet's number of it.
     """
     merged, joints = blueprint.merged, list(blueprint.merged.joints.values())
     columns = {key: [] for key in _COLUMNS}
-    moments, order = [], {merged.root: 0}
-    for local, number in enumerate(numbers):
+    moments, order = [], {limb.root: 0}
+    for local, number in enumerate(limb.joints):
         joint = joints[number]
         order[joint.child] = local + 1
         link = merged.links[joint.child]
@@ -130,7 +144,7 @@ def _build_limb(client, blueprint, numbers, base, shapes, warn):
     # together with a drag, PyBullet 3.2.7 ignores it.
     calm = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
     pybullet.changeDynamics(body, -1, **calm)
-    for local, number in enumerate(numbers):
+    for local, number in enumerate(limb.joints):
         joint = joints[number]
         pybullet.changeDynamics(body, local, **calm)
         pybullet.changeDynamics(body, local, localInertiaDiagonal=moments[local].tolist(), physicsClientId=client)
@@ -154,7 +168,7 @@ def link_collisions(merged, name, static):
     wheels and casters touch the floor are determined. ``static``: whether the root is fixed.
     """
     shapes = merged.links[name].collisions
-    if name == merged.root:
+    if name in merged.roots:
         wheels = [joint for joint in merged.joints.values() if joint.parent == name and is_wheel(joint)]
         return shapes if static or len(wheels) < 2 else [_as_caster(shape) for shape in shapes]
     axes = [joint.axis for joint in merged.joints.values() if joint.child == name and is_wheel(joint)]

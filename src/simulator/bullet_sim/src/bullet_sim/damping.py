@@ -83,7 +83,7 @@ class JointDamping:
 
     def _inertia(self):
         """(m, m) The inertia at the present position, that of the joints first."""
-        if self._model.static:
+        if not self._model.free:
             try:
                 return self._model.mass_matrix(self._model.read_joints()[0])
             except (pybullet.error, SystemError):

@@ -3,6 +3,7 @@
 
 from urdf_model.transforms import inverse, quaternion_from_matrix
 
+from .parts import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 
@@ -17,8 +18,7 @@ def close_loops(client, merged, parts):
 
     ``client``: PyBullet's. Returns PyBullet's numbers of them.
     """
-    number = {merged.root: -1, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
-    found = []
+    number, found = link_indices(merged), []
     for loop in merged.loops:
         places = [parts.places[number[link]] for link in (loop.parent, loop.child)]
         frames = [_inertial(client, place) @ frame for place, frame in zip(places, (loop.in_parent, loop.in_child),

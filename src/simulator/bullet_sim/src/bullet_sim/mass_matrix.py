@@ -24,13 +24,14 @@ def moving_inertial(inertial):
 def mass_matrix_of(model):
     """Return the inertia (m, m) of a :class:`Model` at its present position.
 
-    In the order of its n joints; of a free model also of its root's three translations and three rotations, after them.
+    In the order of its n joints; then of three translations and three rotations of each root that is free.
     """
-    joints, root = list(model.merged.joints.values()), model.merged.root
+    joints, roots = list(model.merged.joints.values()), model.merged.roots[1 if model.static else 0:]
     index = {joint.child: i for i, joint in enumerate(joints)}
-    frames = {link: model.link_pose(link).matrix() for link in ((*index,) if model.static else (*index, root))}
+    column_of = {root: len(joints) + 6 * number for number, root in enumerate(roots)}
+    frames = {body: model.body_frame(body) for body in (*index, *roots)}
     axes = [frames[joint.child][:3, :3] @ joint.axis for joint in joints]
-    matrix = np.zeros((len(joints) + (0 if model.static else 6),) * 2)
+    matrix = np.zeros((len(joints) + 6 * len(roots),) * 2)
     for child, frame in frames.items():
         inertial, rotation = model.merged.links[child].inertial, frame[:3, :3]
         centre = frame[:3, 3] + rotation @ inertial.centre
@@ -44,9 +45,10 @@ def mass_matrix_of(model):
             else:
                 moved[:, i], turned[:, i] = np.cross(axes[i], centre - frames[link][:3, 3]), axes[i]
             link = joints[i].parent
-        if not model.static:
-            moved[:, -6:-3] = turned[:, -3:] = np.eye(3)
-            moved[:, -3:] = np.cross(np.eye(3), centre - frames[root][:3, 3]).T
+        if link in column_of:
+            first = column_of[link]
+            moved[:, first:first + 3] = turned[:, first + 3:first + 6] = np.eye(3)
+            moved[:, first + 3:first + 6] = np.cross(np.eye(3), centre - frames[link][:3, 3]).T
         turned = (rotation @ axes_of_link).T @ turned
         matrix += mass * moved.T @ moved + turned.T @ (moments[:, None] * turned)
     return matrix

@@ -3,17 +3,17 @@
 
 import math
 import struct
-from typing import NamedTuple
 
 import numpy as np
 
 from command_line.options import counted
 from urdf_model import bounds
 
-from .body import BASE, Body
+from .body import Body
 from .damping import JointDamping
 from .errors import BulletSimError, within
 from .loops import close_loops
+from .parts import Motion
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .springs import JointSprings
@@ -39,28 +39,14 @@ _QUICK = 5.0
 _GEAR_FORCE = 1000.0
 
 
-class Contact(NamedTuple):
-    """A point where two bodies touch. Links by their merged names, world coordinates, SI units."""
-
-    model_a: str
-    link_a: str
-    model_b: str
-    link_b: str
-    position: tuple
-    normal: tuple  # unit, on b, towards a
-    distance: float  # negative when the shapes overlap
-    force: float  # along the normal, in the last step
-    friction: tuple  # force (3,) on a, across the normal, in the last step [N]
-
-
 class Model(Body):
     """Made by ``World.spawn``. All arrays over joints are in the order of ``joint_names``; SI units and radians.
 
     A drive holds until another one replaces it, except efforts, which last one step.
     """
 
-    def __init__(self, client, world, blueprint, parts, root_offset):
-        super().__init__(client, world, blueprint, parts, root_offset)
+    def __init__(self, client, world, blueprint, parts, root_offsets):
+        super().__init__(client, world, blueprint, parts, root_offsets)
         self._gravity_key = None
         self._turned_gravity = None
         joints = list(self.merged.joints.values())
@@ -224,7 +210,7 @@ class Model(Body):
 
     def set_inertial(self, body, mass, inertia, centre=None):
         super().set_inertial(body, mass, inertia, centre)
-        if self._link_index[body] != BASE:
+        if self._link_index[body] >= 0:
             self._damping.restore_inertia(self._link_index[body])
 
     @property
@@ -308,7 +294,7 @@ class Model(Body):
 
     def inverse_dynamics(self, position, velocity=None, acceleration=None):
         """Return the efforts (n,) that give ``acceleration`` (n,) at ``position`` (n,) and ``velocity`` (n,)."""
-        if not self.static:
+        if self.free:
             raise BulletSimError("inverse dynamics need a fixed base; model '%s' is free" % self.name)
         if not self._all:
             return np.empty(0)
@@ -327,7 +313,7 @@ class Model(Body):
 
     def mass_matrix(self, position):
         """Return the joint-space inertia (n, n) at ``position`` (n,); only for a model that is fixed."""
-        if not self.static:
+        if self.free:
             raise BulletSimError("the joint-space inertia needs a fixed base; model '%s' is free" % self.name)
         inertia = np.zeros((len(self._all), len(self._all)))
         for numbers, block in self.parts.mass_matrices(position.tolist()):
@@ -351,15 +337,23 @@ class Model(Body):
 
     def mark_start(self):
         """Remember base pose and joint positions as what ``reset`` returns to."""
-        self._start = (self.base_pose(), self.read_joints()[0])
+        self._start = (self.base_pose(), self.read_joints()[0], self.loose_poses())
         base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
         self._good = (base, self._start[1])  # the last good pose, in PyBullet's frame of the base
+        self._good_loose = self._loose_centres()
+
+    def _loose_centres(self):
+        """{index of a loose root: PyBullet's (position, quaternion)}"""
+        return {index: pybullet.getBasePositionAndOrientation(self.parts.places[index].body,
+                                                              physicsClientId=self._client) for index in self.loose}
 
     def reset(self):
         """Return to the marked start, at rest. Drives stay as they are."""
-        pose, position = self._start
+        pose, position, loose = self._start
         self.set_base_pose(pose)
-        if not self.static:
+        for body, place in zip(self.merged.loose, loose, strict=True):
+            self.set_root_pose(body, place)
+        if self.free:
             self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.set_joint_positions(np.arange(len(position)), position)
 
@@ -376,19 +370,23 @@ class Model(Body):
             base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
             (x, y, z), (a, b, c, d) = base
             total = x * x + y * y + z * z + a * a + b * b + c * c + d * d
+        loose = self._loose_centres() if self.loose else {}
+        for place, turn in loose.values():
+            total += sum(value * value for value in (*place, *turn))
         joints = self._good[1]
         if self._all:
             joints, velocity, _ = self.read_joints()
             position_size, quick, effort_size = self._sizes
             total += position_size * position_size + quick * quick + _LIGHT * effort_size * effort_size
         if not total <= _SURELY_FINE:
-            found = out_of_bounds(self.merged.root, self.joint_names, base, self.read_joints())
+            found = out_of_bounds({self._link_names[-1]: base, **{self._link_names[i]: b for i, b in loose.items()}},
+                                  self.joint_names, self.read_joints())
             if found:
                 return Fault(found, math.isfinite(total))
         if self._all and quick > _QUICK:
             joints = self._stop_at_limits(joints, velocity)
         self.still_for = self.still_for + 1 if base == self._good[0] else 0
-        self._good = (base, joints)
+        self._good, self._good_loose = (base, joints), loose
         return None
 
     def _stop_at_limits(self, position, velocity):
@@ -411,28 +409,38 @@ class Model(Body):
         if not self.static:
             base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
         position, velocity, _ = self.read_joints()
-        return (base, position, twist, velocity)
+        loose = {index: (centre, pybullet.getBaseVelocity(self.parts.places[index].body, physicsClientId=self._client))
+                 for index, centre in self._loose_centres().items()}
+        return Motion(base, position, twist, velocity, loose)
 
     def last_good(self):
         """Return the state that :meth:`take_parts` needs to put the model at its last good state, at rest."""
-        return (*self._good, None, np.zeros(len(self._all)))
+        loose = {index: (centre, None) for index, centre in self._good_loose.items()}
+        return Motion(*self._good, None, np.zeros(len(self._all)), loose)
 
     def put_back(self):
         """Restore the last good state, at rest."""
         (position, quaternion), joints = self._good
         if not self.static:
             pybullet.resetBasePositionAndOrientation(self.body, position, quaternion, physicsClientId=self._client)
+        for index, centre in self._good_loose.items():
+            self.parts.set_root(index, *centre)
+        if self.free:
             self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.set_joint_positions(np.arange(len(self._all)), joints)
 
     def take_parts(self, parts, motion):
         """Continue with ``parts``, the rebuilt copy of the previous ones."""
-        base, joints, twist, velocity = motion
+        base, joints, twist, velocity, loose = motion
         client = {"physicsClientId": self._client}
         self.parts, self._reading, self._gears = parts, None, {}
         self._effort_driven[:] = self._any_effort_driven = False
         if twist is not None:
             pybullet.resetBaseVelocity(self.body, *twist, **client)
+        for index, (centre, moving) in loose.items():
+            parts.set_root(index, *centre)
+            if moving is not None:
+                pybullet.resetBaseVelocity(parts.places[index].body, *moving, **client)
         self._damping.restore()
         for index in range(len(self._all)):
             if math.isfinite(self.lower[index]) or math.isfinite(self.upper[index]):
@@ -445,7 +453,7 @@ class Model(Body):
             self.couple(*pair, ratio)
         self._loops = close_loops(self._client, self.merged, parts)
         self._restore_collisions()
-        self._good = (base, joints)
+        self._good, self._good_loose = (base, joints), {index: centre for index, (centre, _) in loose.items()}
 
     # -- inside -------------------------------------------------------------------------------------------------
 

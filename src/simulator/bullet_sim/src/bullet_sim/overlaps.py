@@ -14,34 +14,34 @@ _ALLOWED_M = 1e-3
 _ROUNDS = 10
 
 
-def come_out(client, model, others):
-    """Move ``model`` (a free Model) out of the Models ``others``; its velocity is kept.
+def come_out(client, body, others):
+    """Move the free multibody that PyBullet numbers ``body`` out of the Models ``others``; its velocity is kept.
 
     It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's.
     """
-    start, turn = pybullet.getBasePositionAndOrientation(model.body, physicsClientId=client)
-    twist = pybullet.getBaseVelocity(model.body, physicsClientId=client)
+    start, turn = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+    twist = pybullet.getBaseVelocity(body, physicsClientId=client)
     place = np.array(start)
     for _ in range(_ROUNDS):
-        way = _deepest(client, model, others)
+        way = _deepest(client, body, others)
         if way is None:
             break
         place = place + way
-        _put(client, model, place.tolist(), turn, twist)
+        _put(client, body, place.tolist(), turn, twist)
     else:
-        _put(client, model, start, turn, twist)
+        _put(client, body, start, turn, twist)
 
 
-def _put(client, model, place, turn, twist):
-    pybullet.resetBasePositionAndOrientation(model.body, place, turn, physicsClientId=client)
-    pybullet.resetBaseVelocity(model.body, *twist, physicsClientId=client)
+def _put(client, body, place, turn, twist):
+    pybullet.resetBasePositionAndOrientation(body, place, turn, physicsClientId=client)
+    pybullet.resetBaseVelocity(body, *twist, physicsClientId=client)
 
 
-def _deepest(client, model, others):
-    """Return the way (3,) [m, world] out of what ``model`` is deepest in, or None."""
+def _deepest(client, body, others):
+    """Return the way (3,) [m, world] out of what ``body`` is deepest in, or None."""
     depth, way = _ALLOWED_M, None
-    for body in (body for other in others for body in other.parts.bodies):
-        for point in pybullet.getClosestPoints(model.body, body, 0.0, physicsClientId=client) or ():
+    for obstacle in (obstacle for other in others for obstacle in other.parts.bodies):
+        for point in pybullet.getClosestPoints(body, obstacle, 0.0, physicsClientId=client) or ():
             if -point[8] > depth:
                 # The normal points to the first body.
                 depth = -point[8]

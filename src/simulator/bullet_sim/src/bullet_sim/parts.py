@@ -6,6 +6,8 @@ nothing, so the limbs on it need not be one multibody: two arms as two cost a qu
 """
 from typing import NamedTuple
 
+import numpy as np
+
 from .quiet_pybullet import pybullet
 
 # A limb with fewer joints joins another one: a multibody costs something, too.
@@ -21,23 +23,57 @@ class Place(NamedTuple):
     index: int  # in it; -1 is its root
 
 
-def limbs(merged, separate):
-    """The joints of each multibody that a urdf_model.MergedRobot is built as: a list of lists of indices, each in the
-    order of the robot's joints.
+class Motion(NamedTuple):
+    """The state of a model: PyBullet's (position, quaternion) of its base and (linear, angular) velocity of that, None
+    for one that is fixed or at rest; positions and velocities of the joints (n,); {index: the same two of its loose
+    roots}."""
 
-    One, unless ``separate`` and several limbs with some joints are on the root, which must be fixed.
+    base: tuple
+    joints: np.ndarray
+    twist: tuple | None
+    velocity: np.ndarray
+    loose: dict
+
+
+class Limb(NamedTuple):
+    """A multibody: its root, a body of a urdf_model.MergedRobot, and the numbers of its joints, ascending."""
+
+    root: str
+    joints: list
+
+
+def link_indices(merged):
+    """Return {body: its index here} of a urdf_model.MergedRobot: the number of its joint, -1 for the root, and -2, -3
+    and so on for those of ``loose``."""
+    return {**{body: -1 - number for number, body in enumerate(merged.roots)},
+            **{joint.child: number for number, joint in enumerate(merged.joints.values())}}
+
+
+def limbs(merged, separate):
+    """The Limbs that a urdf_model.MergedRobot is built as: those on its root first.
+
+    One for each root, unless ``separate`` and several limbs with some joints are on the first, which must be fixed.
     """
+    root_of, trees = {body: body for body in merged.roots}, {body: [] for body in merged.roots}
+    for number, joint in enumerate(merged.joints.values()):
+        root_of[joint.child] = root_of[joint.parent]
+        trees[root_of[joint.child]].append(number)
+    first = trees.pop(merged.root)
+    on_root = _limbs_on_root(merged, first) if separate else [first]
+    return [*(Limb(merged.root, numbers) for numbers in on_root), *(Limb(*tree) for tree in trees.items())]
+
+
+def _limbs_on_root(merged, tree):
     joints = list(merged.joints.values())
-    if not separate:
-        return [list(range(len(joints)))]
     limb_of, found = {}, {}
-    for number, joint in enumerate(joints):
+    for number in tree:
+        joint = joints[number]
         limb_of[joint.child] = limb_of.get(joint.parent, joint.child)
         found.setdefault(limb_of[joint.child], []).append(number)
     large = [limb for limb in found.values() if len(limb) >= _MIN_JOINTS]
     small = [number for limb in found.values() if len(limb) < _MIN_JOINTS for number in limb]
     if len(large) < 2:
-        return [list(range(len(joints)))]
+        return [tree]
     least = min(large, key=len)
     return [sorted(limb + small) if limb is least else limb for limb in large]
 
@@ -45,15 +81,20 @@ def limbs(merged, separate):
 class Parts:
     """Reads and commands the joints of several multibodies as those of one."""
 
-    def __init__(self, client, bodies, joints):
+    def __init__(self, client, bodies, merged, found):
         """``client``: PyBullet's; ``bodies``: its numbers of the multibodies, the first has the root's shape;
-        ``joints``: what :func:`limbs` returned."""
+        ``found``: what :func:`limbs` returned for ``merged``, one for each of them."""
         self._client = client
         self.bodies = tuple(bodies)
-        #: {index of a joint, or -1 for the root: Place}
+        #: {index of :func:`link_indices`: Place}
         self.places = {-1: Place(self.bodies[0], -1)}
+        joints = [limb.joints for limb in found]
         self._joints, self._local = joints, [list(range(len(numbers))) for numbers in joints]
+        indices = link_indices(merged)
+        self._roots = {body: indices[limb.root] for body, limb in zip(self.bodies, found, strict=True)}
         for body, numbers in zip(self.bodies, joints, strict=True):
+            if self._roots[body] != -1:
+                self.places[self._roots[body]] = Place(body, -1)
             self.places.update((number, Place(body, local)) for local, number in enumerate(numbers))
         in_turn = [number for numbers in joints for number in numbers]
         self._order = None
@@ -63,8 +104,8 @@ class Parts:
         self._shares = {}
 
     def index(self, body, local):
-        """The model's index of the link that PyBullet has as ``local`` of ``body``; every root is the model's."""
-        return -1 if local == -1 else self._indices[body, local]
+        """The model's index of the link that PyBullet has as ``local`` of ``body``."""
+        return self._roots[body] if local == -1 else self._indices[body, local]
 
     def joint_states(self):
         """PyBullet's states of all joints, in the order of the model."""
@@ -72,7 +113,8 @@ class Parts:
             return pybullet.getJointStates(self.bodies[0], self._local[0], physicsClientId=self._client)
         states = []
         for body, local in zip(self.bodies, self._local, strict=True):
-            states += pybullet.getJointStates(body, local, physicsClientId=self._client)
+            if local:
+                states += pybullet.getJointStates(body, local, physicsClientId=self._client)
         return states if self._order is None else [states[number] for number in self._order]
 
     def command(self, index, mode, **columns):
@@ -109,10 +151,15 @@ class Parts:
             yield numbers, pybullet.calculateMassMatrix(body, [position[number] for number in numbers],
                                                         physicsClientId=self._client)
 
-    def set_base(self, position, quaternion):
-        """Put the root there, with all limbs on it."""
+    def root_of(self, index):
+        """The index of the root of the tree that a link is in."""
+        return self._roots[self.places[index].body]
+
+    def set_root(self, index, position, quaternion):
+        """Put the root of that index there, with all limbs on it."""
         for body in self.bodies:
-            pybullet.resetBasePositionAndOrientation(body, position, quaternion, physicsClientId=self._client)
+            if self._roots[body] == index:
+                pybullet.resetBasePositionAndOrientation(body, position, quaternion, physicsClientId=self._client)
 
     def contacts(self, other=None):
         """PyBullet's contacts of the multibodies, with those of ``other`` (Parts) where it is given; each once."""

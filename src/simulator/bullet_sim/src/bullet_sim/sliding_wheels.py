@@ -40,12 +40,21 @@ def fixed_wheels(joints):
     return sorted(found)
 
 
-class SlidingWheels:
-    """The fixed wheels of one model."""
+def sliding_wheels(client, model):
+    """Return the SlidingWheels of a Model, a list; ``client``: PyBullet's."""
+    trees = {}
+    for index in fixed_wheels(model.merged.joints.values()):
+        trees.setdefault(model.parts.root_of(index), []).append(model.parts.places[index].index)
+    return [SlidingWheels(client, model, root, wheels) for root, wheels in trees.items()]
 
-    def __init__(self, client, model, wheels):
-        """``client``: PyBullet's; ``model``: a Model; ``wheels``: indices of their joints, see ``fixed_wheels``."""
-        self._client, self._model, self._wheels = client, model, frozenset(wheels)
+
+class SlidingWheels:
+    """The fixed wheels on one root of a model."""
+
+    def __init__(self, client, model, root, wheels):
+        """``client``: PyBullet's; ``model``: a Model, ``root``: index of its root; ``wheels``: PyBullet's numbers of
+        their joints."""
+        self._client, self._model, self._root, self._wheels = client, model, root, frozenset(wheels)
         self._surfaces = {}  # (body, link) -> (friction, does it stand still)
 
     def models_changed(self):
@@ -57,8 +66,8 @@ class SlidingWheels:
         rows = self._sliding()
         if not rows:
             return
-        links = sorted({row[0] for row in rows})
-        states = pybullet.getLinkStates(self._model.body, links, computeLinkVelocity=1, physicsClientId=self._client)
+        links, body = sorted({row[0] for row in rows}), self._body
+        states = pybullet.getLinkStates(body, links, computeLinkVelocity=1, physicsClientId=self._client)
         moving = {link: (state[0], state[6], state[7]) for link, state in zip(links, states, strict=True)}
         place, normal, friction = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
         most = np.array([row[4] for row in rows])
@@ -73,13 +82,18 @@ class SlidingWheels:
         coulomb = -slip * (most / np.maximum(speed, 1e-9))[:, None]
         forces = (coulomb - friction) * share[:, None]
         for row, force in zip(rows, forces.tolist(), strict=True):
-            pybullet.applyExternalForce(self._model.body, row[0], force, row[1], pybullet.WORLD_FRAME,
+            pybullet.applyExternalForce(body, row[0], force, row[1], pybullet.WORLD_FRAME,
                                         physicsClientId=self._client)
+
+    @property
+    def _body(self):
+        """PyBullet's number of the multibody."""
+        return self._model.parts.places[self._root].body
 
     def _sliding(self):
         """Contacts of the wheels near the bound of their friction, with things that stand still: rows of link, place,
         normal (towards the wheel), friction on the wheel [N], and its bound [N]."""
-        body, found = self._model.body, []
+        body, found = self._body, []
         for point in pybullet.getContactPoints(bodyA=body, physicsClientId=self._client) or ():
             # The force across the normal acts on the first body, and the normal points to it.
             sign = 1.0 if point[1] == body else -1.0

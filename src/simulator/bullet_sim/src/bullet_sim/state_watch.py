@@ -28,15 +28,16 @@ class Fault(NamedTuple):
     is_finite: bool
 
 
-def out_of_bounds(root, joint_names, base, readings):
+def out_of_bounds(roots, joint_names, readings):
     """Return which value of a model is out of its bound, or "".
 
-    base: (position (3,), quaternion (4,)) of the link ``root``; readings: position, velocity and effort of the joints
+    roots: {link: (position (3,), quaternion (4,))}; readings: position, velocity and effort of the joints
     ``joint_names``, (n,) each.
     """
     try:
-        within(bounds.POSITION, base[0], "the position of link '%s'" % root)
-        within(bounds.POSITION, base[1], "the orientation of link '%s'" % root)
+        for root, base in roots.items():
+            within(bounds.POSITION, base[0], "the position of link '%s'" % root)
+            within(bounds.POSITION, base[1], "the orientation of link '%s'" % root)
         for values, bound, what in zip(readings, _OF_JOINTS, ("position", "velocity", "effort"), strict=True):
             for name, value in zip(joint_names, values.tolist(), strict=True):
                 within(bound, value, "the %s of joint '%s'" % (what, name))
@@ -78,7 +79,7 @@ class StateWatch:
         faulty = False
         for model in self._lively:
             faulty |= model.fault() is not None
-            if model.still_for == _ASLEEP_STEPS and not model.joint_names:
+            if model.still_for == _ASLEEP_STEPS and not _is_never_still(model):
                 self._sorted = False
         self._turn = (self._turn + 1) % _TURNS
         for model in self._resting[self._turn::_TURNS]:
@@ -89,9 +90,9 @@ class StateWatch:
             self._put_back()
 
     def _sort(self):
-        moving = [model for model in self._world.models.values() if not model.static or model.joint_names]
-        self._lively = [model for model in moving if model.joint_names or model.still_for < _ASLEEP_STEPS]
-        self._resting = [model for model in moving if not model.joint_names and model.still_for >= _ASLEEP_STEPS]
+        moving = [model for model in self._world.models.values() if model.free or model.joint_names]
+        self._lively = [model for model in moving if _is_never_still(model) or model.still_for < _ASLEEP_STEPS]
+        self._resting = [model for model in moving if model not in self._lively]
         self._sorted = True
 
     def _put_back(self):
@@ -111,3 +112,8 @@ class StateWatch:
                     "model '%s': %s, at tick %d. It was put back to where it was before, at rest; look for an extreme "
                     "force, mass or inertia" % (model.name, fault.text, world.tick)
                 )
+
+
+def _is_never_still(model):
+    """Whether the watch does not know it from the base alone when a model rests."""
+    return bool(model.joint_names or model.loose)

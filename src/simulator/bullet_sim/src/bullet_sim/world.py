@@ -9,13 +9,14 @@ import numpy as np
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
 from .builder import Blueprint, build, is_wheel, link_collisions
+from .contact import Contact
 from .errors import LOG, BulletSimError, within
-from .model import Contact, Model
+from .model import Model
 from .overlaps import come_out
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
-from .sliding_wheels import SlidingWheels, fixed_wheels
+from .sliding_wheels import sliding_wheels
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
@@ -160,22 +161,23 @@ class World:
     def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, merged=None):
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
-        The frame of a robot from a URDF is that of its root link. ``warn`` is called with the replacements of missing
-        meshes. ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in
-        Gazebo. ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``; by default those that the
-        description asks for, but for meshes that overlap at the start. ``mesh_cuts``: {link: planes}, as
-        for ``convex_parts.cut``, in the mesh's axes [m], cuts the collision meshes of those links and replaces them by
-        the convex hulls of the parts. If such a mesh is missing, the pairs of its body are left out: its replacement is
-        too rough for a folded arm. ``merged``: the MergedRobot of ``robot``, which must be checked and have no missing
-        mesh; so the slow work can be done before, in another thread. Raises BulletSimError when the name is taken or
-        empty, and for numbers out of bounds.
+        The frame of a robot from a URDF is that of its root link. ``warn`` is called with the replacements of
+        missing meshes. ``static`` fixes the root and links without a joint; by default only a robot whose root
+        link is called "world" is fixed, as in Gazebo. ``self_collision_pairs``: as for
+        ``Model.set_self_collision_pairs``; by default those that the description asks for, but for meshes that
+        overlap at the start. ``mesh_cuts``: {link: planes}, as for ``convex_parts.cut``, in the mesh's axes
+        [m], cuts the collision meshes of those links and replaces them by the convex hulls of the parts. If
+        such a mesh is missing, the pairs of its body are left out: its replacement is too rough for a folded
+        arm. ``merged``: the MergedRobot of ``robot``, which must be checked and have no missing mesh; so the
+        slow work can be done before, in another thread. Raises BulletSimError when the name is taken or empty,
+        and for numbers out of bounds.
         """
         if not name:
             raise BulletSimError("a model needs a name")
         if name in self.models:
             raise BulletSimError("model '%s' exists already; delete it first or choose another name" % name)
         pose = (pose or Pose()).checked()
-        static = is_fixed(robot.root, static)
+        held, static = bool(static), is_fixed(robot.root, static)
         if merged is None:
             try:
                 check_robot(robot)
@@ -184,24 +186,24 @@ class World:
             robot, mended = with_stand_ins(robot, self.mesh_files)
             if mended:
                 self._warn("model '%s': %s" % (name, mended))
-            merged = merge_fixed(robot)
+            merged = merge_fixed(robot, held=held)
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         asked = list(self_collision_pairs) or self_colliding(merged)
         pairs = [pair for pair in asked if all(merged.frames[link].link not in rough for link in pair)]
         blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs), in_limbs=not merged.loops)
-        parts, root_offset = build(self._client, blueprint, pose, self._shapes,
+        parts, root_offsets = build(self._client, blueprint, pose, self._shapes,
                                    lambda text: self._warn("model '%s': %s" % (name, text)))
-        model = Model(self._client, self, blueprint, parts, root_offset)
+        model = Model(self._client, self, blueprint, parts, root_offsets)
         if pairs:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
         if pairs and not self_collision_pairs:
             self._part_rough_pairs(model, pairs)
-        if not static:
+        if model.free:
             self.note_placed(model)
-        wheels = [] if static else fixed_wheels(merged.joints.values())
+        wheels = [] if static else sliding_wheels(self._client, model)
         if wheels:
-            self._sliding[model] = SlidingWheels(self._client, model, wheels)
+            self._sliding[model] = wheels
         if model.decaying:
             self._acting[model] = [model.slow_down]
         if model.springs is not None:
@@ -253,12 +255,13 @@ class World:
         self.wake_all()
 
     def _models_changed(self):
-        any_free = any(not model.static for model in self.models.values())
+        any_free = any(model.free for model in self.models.values())
         pybullet.setPhysicsEngineParameter(solverResidualThreshold=_CREEP_M2_PER_S2[any_free],
                                            physicsClientId=self._client)
         self._watch.models_changed()
-        for wheels in self._sliding.values():
-            wheels.models_changed()
+        for groups in self._sliding.values():
+            for wheels in groups:
+                wheels.models_changed()
 
     def note_weightless(self, model, wanted):
         """For Model: whether ``model`` has links whose weight must be taken away at each step."""
@@ -289,11 +292,14 @@ class World:
         if self._placed:
             placed, self._placed = self._placed, []
             for model in placed:
-                come_out(self._client, model, [other for other in self.models.values() if other is not model])
+                others = [other for other in self.models.values() if other is not model]
+                for index in model.free:
+                    come_out(self._client, model.parts.places[index].body, others)
         for model in self._weightless:
             model.cancel_weight()
-        for wheels in self._sliding.values():
-            wheels.correct()
+        for groups in self._sliding.values():
+            for wheels in groups:
+                wheels.correct()
         for functions in self._acting.values():
             for act in functions:
                 act()

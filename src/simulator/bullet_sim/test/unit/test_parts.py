@@ -34,7 +34,7 @@ BY_TURNS = tuple(element for pair in zip(limb("left", 0.3), limb("right", -0.3),
 
 
 def numbers(limbs, separate=True):
-    return parts.limbs(merge_fixed(parse_urdf(description(*limbs))), separate)
+    return [limb.joints for limb in parts.limbs(merge_fixed(parse_urdf(description(*limbs))), separate)]
 
 
 def test_large_limbs_of_a_fixed_root_are_multibodies_and_the_smallest_takes_the_small_ones():

@@ -48,7 +48,7 @@ class VacuumGripper(PacedSensor):
         twist = own.link_twist(self._link)
         found = False
         for model in list(self.context.world.models.values()):
-            if model is own or model.static:
+            if model is own or not model.free:
                 continue
             for link in model.link_names:
                 pose = model.link_pose(link)
@@ -57,7 +57,7 @@ class VacuumGripper(PacedSensor):
                 if distance >= REACH_M:
                     continue
                 found = True
-                if link == model.robot.root:
+                if link == model.robot.root and not model.static:
                     if distance < STICKS_M:
                         model.set_base_pose(Pose(tuple(place.tolist()), pose.quaternion))
                     model.set_base_twist(*twist)

@@ -229,22 +229,26 @@ class BodyServices:
 
     def _put_link(self, state):
         model, link = self._entities.link(state.link_name)
-        frame = model.merged.frames[link]
+        frame, root = model.merged.frames[link], model.root_of(link)
         pose = self._entities.pose_in_world(pose_from_msg(state.pose), state.reference_frame).matrix()
         linear, angular = twist_from_msg(state.twist)
         rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
         linear, angular = rotation @ linear, rotation @ angular
-        if frame.link != model.merged.root and model.static:
+        is_fixed = model.static and root == model.merged.root
+        if is_fixed and frame.link != root:
             self._put_joints_of(model, frame, pose, linear, angular)
             return
-        # The whole model moves, so that this link is at the given pose.
-        in_model = np.linalg.inv(model.base_pose().matrix()) @ model.link_pose(link).matrix()
-        base = pose @ np.linalg.inv(in_model)
-        linear = bounds.SPEED.check(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]),
-                                    "the linear velocity of the model's frame")
-        model.set_base_pose(Pose.from_matrix(base))
-        if not model.static:
-            model.set_base_twist(linear, angular)
+        # All that joints hold together moves, so that this link is at the given pose.
+        in_body = np.linalg.inv(model.body_frame(root)) @ model.link_pose(link).matrix()
+        base = pose @ np.linalg.inv(in_body)
+        if is_fixed:
+            model.set_base_pose(Pose.from_matrix(base))
+            return
+        at = base if root == model.merged.root else base @ model.merged.frames[root].offset
+        linear = bounds.SPEED.check(linear + np.cross(angular, at[:3, 3] - pose[:3, 3]),
+                                    "the linear velocity of link '%s'" % root)
+        model.set_root_pose(root, Pose.from_matrix(base))
+        model.set_root_twist(root, linear, angular)
 
     def _put_joints_of(self, model, frame, pose, linear, angular):
         """Move the joints between the fixed root and a link, so that this is as near as possible to ``pose``."""

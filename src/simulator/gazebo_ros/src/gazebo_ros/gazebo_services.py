@@ -245,7 +245,7 @@ class GazeboServices:
         linear = bounds.SPEED.check(rotation @ linear, "the linear velocity in the world")
         angular = bounds.TURN_RATE.check(rotation @ angular, "the angular velocity in the world")
         model.set_base_pose(pose)
-        if not model.static:
+        if model.free:
             model.set_base_twist(linear, angular)
 
     def _set_model_configuration(self, request):

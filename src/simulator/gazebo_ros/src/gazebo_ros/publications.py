@@ -132,6 +132,8 @@ class Publications:
             parts += (pose.position, pose.quaternion)
             if model.joint_names:
                 parts.append(model.read_joints()[0])
+            for pose in model.loose_poses():
+                parts += (pose.position, pose.quaternion)
         try:
             self._snapshot.write(self._simulation.tick, self._simulation.time_s, parts, self._simulation.paused)
         except ValueError as error:

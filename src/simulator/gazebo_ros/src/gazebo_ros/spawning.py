@@ -103,7 +103,7 @@ class Spawner:
     def listed(self):
         """The scene's entry of each model of the world."""
         return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
-                 "static": bool(model.static),
+                 "static": bool(model.static), "loose": bool(model.loose),
                  "sensors": self.sensors.get(model.name, []),
                  "lights": self.lights.get(model.name, []),
                  "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
@@ -157,7 +157,7 @@ class Spawner:
             self._log.warn("model '%s': %s" % (name, mended))
         options = {"static": urdf_extras.is_static(robot), **options}
         try:
-            merged = merge_fixed(with_solids(robot, options.pop("solids", None)))
+            merged = merge_fixed(with_solids(robot, options.pop("solids", None)), held=bool(options["static"]))
         except BulletSimError as error:
             raise SpawnRefused(str(error)) from error
         if mended or drawing is None:
@@ -167,6 +167,7 @@ class Spawner:
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
                                    options.get("mesh_cuts"))
         tree = parameters() if plugins or sensors else {}
+        sensors = [_drawn(merged, *sensor) for sensor in sensors]
         for sensor in sensors:
             sensor["frame"] = with_tf_prefix(tree, sensor["namespace"], sensor["frame"])
         return Prepared(name=name, xml=xml, robot=robot, merged=merged, drawing=drawing, start=start, plugins=plugins,
@@ -274,7 +275,7 @@ class Spawner:
         simulation.host(HostedPlugin(plugin, context, model_name, label))
 
     def _add_screen(self, prepared, link, place, size_m, pixels, glows, radius_m):
-        frames = merge_fixed(prepared.robot).frames
+        frames = prepared.merged.frames
         if link not in frames:
             raise PluginError("a screen is on link '%s', which '%s' does not have" % (link, prepared.robot.name))
         if self._folder is None:
@@ -305,10 +306,11 @@ class Spawner:
                 asked = name
             namespace = urdf_extras.namespace_of(element, asked)
             if issubclass(plugin_class, DrawnSensor):
-                try:
-                    sensors.append(_drawn(robot, element, namespace))
-                except PluginError as error:
-                    self._leave_out(robot.name, error)
+                if urdf_extras.sensor_of(element)[0] is None:
+                    self._leave_out(robot.name, "plugin '%s' stands outside of a <sensor>; expected "
+                                    "<gazebo reference=\"LINK\"><sensor><plugin>" % filename)
+                else:
+                    sensors.append((element, namespace))
                 continue
             options.update(plugin_class.spawn_options(robot, element))
             found.append((plugin_class, element, namespace))
@@ -344,13 +346,10 @@ def _slow_bodies(merged):
             or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
-def _drawn(robot, plugin, namespace):
+def _drawn(merged, plugin, namespace):
     """The scene's entry of a sensor that needs pictures."""
     sensor, link = urdf_extras.sensor_of(plugin)
-    if sensor is None:
-        raise PluginError("plugin '%s' of '%s' stands outside of a <sensor>; expected <gazebo reference=\"LINK\">"
-                          "<sensor><plugin>" % (plugin.get("filename"), robot.name))
-    frame = merge_fixed(robot).frames[link]
+    frame = merged.frames[link]
     return {"link": frame.link, "offset": frame.offset.ravel().tolist(),
             "frame": (plugin.findtext("frameName") or "").strip() or link,
             "xml": etree.tostring(sensor, encoding="unicode", with_tail=False),

@@ -230,3 +230,25 @@ def test_a_pendulum_on_a_ball_joint_swings_in_all_directions():
         world.step()
     assert rod.link_pose("rod").matrix()[:3, :3] @ (0, 0, -1) == pytest.approx((-x, -y, z), abs=0.01)
     world.close()
+
+
+def test_boxes_in_one_model_slide_by_themselves_as_in_gazebos_friction_pyramid():
+    """Each starts at its own speed and stops after v² / (2 mu g); their model goes with the first."""
+    world = World(time_step_s=0.001, gravity=(0.0, 0.0, -9.8))
+    world.add_ground_plane()
+    box = """<model name="box_%d"><pose>0 %d 0.1 0 0 0</pose><link name="link"><inertial><inertia><ixx>0.024</ixx>
+        <iyy>0.024</iyy><izz>0.042</izz></inertia></inertial><collision name="c"><geometry><box><size>0.5 0.5 0.2</size>
+        </box></geometry><surface><friction><ode><mu>0.3</mu><mu2>0.3</mu2></ode></friction></surface></collision>
+        </link></model>"""
+    found = parse_sdf_model('<sdf version="1.6"><model name="boxes">%s</model></sdf>' % "".join(
+        box % (number, number) for number in range(3)), "m.sdf")
+    model = world.spawn(found.robot, "boxes")
+    speeds = (1.0, 2.0, 0.0)
+    for number, speed in enumerate(speeds):
+        model.set_root_twist("box_%d::link" % number, (speed, 0, 0), (0, 0, 0))
+    for _ in range(1200):
+        world.step()
+    places = [model.link_pose("box_%d::link" % number).position[0] for number in range(3)]
+    assert places == pytest.approx([speed ** 2 / (2 * 0.3 * 9.8) for speed in speeds], abs=0.01)
+    assert model.model_pose().position[0] == pytest.approx(places[0], abs=1e-6) and found.warning == ""
+    world.close()

@@ -106,14 +106,15 @@ class Body:
     """A model: its links as parts, its screens, and their poses."""
 
     def __init__(self, links, joints, screens=(), static=False, lights=()):
-        """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first;
-        ``static``: whether its root is fixed in the world; ``lights``: as in the scene's entry, in the frames of their
-        links.
+        """``links``: list of (name, parts), the roots first, then one for each ``urdf_model.Joint`` of ``joints``,
+        parents first; ``static``: whether its first root is fixed in the world; ``lights``: as in the scene's entry, in
+        the frames of their links.
         """
         self.screens = screens
         self._static = static
         self._lights = lights
         self._joints = joints
+        self._roots = len(links) - len(joints)
         self._index = {name: number for number, (name, _) in enumerate(links)}
         self._parents = [self._index[joint.parent] for joint in joints]
         self._origins = np.array([joint.origin for joint in joints]).reshape(-1, 4, 4)
@@ -132,9 +133,15 @@ class Body:
         return bool(self._lights)
 
     @property
+    def sizes(self):
+        """Numbers of this body's values in a snapshot: of the first root's pose with the joints, then of the other
+        roots' poses."""
+        return [7 + len(self._joints)] + [7] * (self._roots - 1)
+
+    @property
     def size(self):
         """Number of this body's values in a snapshot."""
-        return 7 + len(self._joints)
+        return sum(self.sizes)
 
     @property
     def link_names(self):
@@ -151,8 +158,12 @@ class Body:
         if self._shown is not None and np.array_equal(values, self._shown):
             return False
         self._shown = values.copy()
-        self.matrices[0] = rigid(matrix_from_quaternion(values[3:7]), values[:3])
-        for number, (parent, step) in enumerate(zip(self._parents, self._steps(values[7:]), strict=True), 1):
+        end = 7 + len(self._joints)
+        poses = (values[:7], *values[end:].reshape(-1, 7))
+        for number, pose in enumerate(poses):
+            self.matrices[number] = rigid(matrix_from_quaternion(pose[3:]), pose[:3])
+        steps = self._steps(values[7:end])
+        for number, (parent, step) in enumerate(zip(self._parents, steps, strict=True), self._roots):
             np.dot(self.matrices[parent], step, out=self.matrices[number])
         return True
 
@@ -174,10 +185,11 @@ class Body:
         matrices, found = self.matrices.copy(), {}
         shown = np.zeros(self.size) if self._shown is None else self._shown
         steps = self._steps(np.array([positions.get(joint.name, value)
-                                      for joint, value in zip(self._joints, shown[7:], strict=True)]))
-        for number, (joint, parent) in enumerate(zip(self._joints, self._parents, strict=True), 1):
+                                      for joint, value in zip(self._joints, shown[7:7 + len(self._joints)],
+                                                              strict=True)]))
+        for number, (joint, parent) in enumerate(zip(self._joints, self._parents, strict=True), self._roots):
             if joint.name in positions or parent in found:
-                found[number] = matrices[number] = matrices[parent] @ steps[number - 1]
+                found[number] = matrices[number] = matrices[parent] @ steps[number - self._roots]
         return found
 
     def is_fixed(self, name):
@@ -241,7 +253,7 @@ class Mirror:
         for entry in listed:
             name = entry["name"]
             key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")),
-                   str(entry.get("lights")))
+                   str(entry.get("lights")), bool(entry.get("loose")))
             old = known.get(name)
             self._bodies[name] = old if old is not None and old.key == key else self._build(key, entry)
         self._show_bodies()
@@ -296,9 +308,9 @@ class Mirror:
     def _body(self, entry):
         if entry["urdf"] is None:
             return Body([("", [_floor()])], [], static=True)
-        merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]))
+        merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]), held=not entry.get("loose"))
         joints = list(merged.joints.values())
-        order = [merged.root, *(joint.child for joint in joints)]
+        order = [*merged.roots, *(joint.child for joint in joints)]
         links = [(name, self._parts_of_link(merged.links[name])) for name in order]
         screens = [screen for screen in map(self._screen, entry.get("screens", ())) if screen]
         return Body(links, joints, screens, bool(entry.get("static")), entry.get("lights", ()))

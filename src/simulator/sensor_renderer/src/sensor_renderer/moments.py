@@ -55,7 +55,8 @@ class World:
                 if later is None:
                     return values
                 share = (time_s - then_s) / (later[0] - then_s)
-                return blended([body.size for body in self.mirror.bodies.values()], values, later[1], share)
+                return blended([size for body in self.mirror.bodies.values() for size in body.sizes], values, later[1],
+                               share)
             later = then_s, values
         return self._states[0][1]
 
