@@ -7,7 +7,7 @@ _NO_WIND = "there is no wind"
 _NO_SOUND = "there is no sound"
 _SOLVER = "the solver is Bullet's, not ODE's"
 _HARD_STOPS = "the stops of joints are hard"
-_ONE_MU = "friction is the same in all directions"
+_ONE_MU = "without fdir1, friction is the same in all directions"
 _NO_FEELING = "such a link passes through others, and its contacts are not told"
 _PLUGINS_NOISE = "the plugin's own elements say what it measures, and with which noise"
 _OWN_VIEW = "the window has a view of its own"
@@ -47,7 +47,7 @@ HONOURED = {
     "geometry/mesh/submesh": "name center",
     "geometry/heightmap": "uri size pos",
     "surface/bounce": "restitution_coefficient",
-    "surface/friction/ode": "mu",
+    "surface/friction/ode": "mu fdir1",
     "surface/contact/ode": "kp kd",
     "material": "ambient diffuse specular emissive",
     "material/script": "uri name",
@@ -147,7 +147,7 @@ WITHOUT_EFFECT = (
     ("geometry/heightmap", {"texture": None, "blend": None}, "heightmaps have one colour"),
     ("geometry", {"image": None, "polyline": None}, "this shape is left out"),
     ("surface/bounce", {"threshold": "100000"}, "bodies bounce at any speed"),
-    ("surface/friction/ode", {"mu2": "@mu=1", "fdir1": "0 0 0|?mu=mu2"}, _ONE_MU),
+    ("surface/friction/ode", {"mu2": "@mu=1|+fdir1"}, _ONE_MU),
     ("surface/friction/ode", {"slip1": "0", "slip2": "0"}, "contacts do not slip"),
     ("surface/friction/torsional", {"coefficient": "1", "use_patch_radius": "1", "patch_radius": "0",
                                     "surface_radius": "0"}, "points of contact resist no turning"),

@@ -123,7 +123,7 @@ def _surface(document, collision):
         return None
     found = {}
     for path, field in (
-        ("friction/ode", (("mu", "friction"),)),
+        ("friction/ode", (("mu", "friction"), ("mu2", "friction_across"))),
         ("contact/ode", (("kp", "stiffness"), ("kd", "damping"))),
         ("bounce", (("restitution_coefficient", "restitution"),)),
     ):
@@ -132,16 +132,28 @@ def _surface(document, collision):
             value = None if part is None else document.number(part, tag, may_be_infinite=name in MAY_BE_INFINITE)
             if value is None:
                 continue
-            if value < 0.0 and name == "friction":
+            if value < 0.0 and name.startswith("friction"):
                 value = math.inf  # as Gazebo takes it
             used = min(max(value, 0.0), _MOST.get(name, math.inf))
             if used != value:
                 document.mend(part, "<%s> of %g, for which %g is used" % (tag, value, used))
             found[name] = used
+    direction = _direction(document, collision, element.find("friction/ode"))
+    if direction is not None:
+        found["direction"] = direction
     mask = _bitmask(document, element)
     if mask != ALL_BITS:
         found["bitmask"] = mask
     return Surface(**found) if found else None
+
+
+def _direction(document, collision, friction):
+    """The unit direction (3,) of <fdir1>, which is in the collision's axes, in those of the link; None for none."""
+    if friction is None:
+        return None
+    said = np.array(document.vector(friction, "fdir1", (0.0, 0.0, 0.0)))
+    length = np.linalg.norm(said)
+    return tuple((document.pose(collision)[:3, :3] @ said / length).tolist()) if length > 0.0 else None
 
 
 def _bitmask(document, surface):

@@ -9,12 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from . import bounds
 from .materials import GLOWS, MATERIALS
 from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
 
 # Element -> field of Surface. Both spellings of the first one are in use.
-_SURFACE = {"mu": "friction", "mu1": "friction", "kp": "stiffness", "kd": "damping"}
+_SURFACE = {"mu": "friction", "mu1": "friction", "mu2": "friction_across", "kp": "stiffness", "kd": "damping"}
 
 
 def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) -> None:
@@ -29,6 +31,8 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
             value = _of_surface(part, field, link.name, warn)
             if value is not None:
                 found[field] = value
+    for part in (*element.iterchildren("fdir1"), *element.iterfind("collision/surface/friction/ode/fdir1")):
+        found["direction"] = _direction(part, link, warn)
     for part in element.iterfind("collision/surface/contact/collide_bitmask"):
         try:
             found["bitmask"] = int((part.text or "").strip(), 0) & ALL_BITS
@@ -75,9 +79,26 @@ def _of_surface(part, field, link, warn):
     value = _number(part, what, field in MAY_BE_INFINITE, warn)
     if value is None:
         return None
-    if field == "friction":
+    if field.startswith("friction"):
         return math.inf if value < 0.0 else value  # as Gazebo takes it
     return _within(part, what, value, math.inf if field in MAY_BE_INFINITE else bounds.DAMPING.high, warn)
+
+
+def _direction(part, link, warn):
+    """The unit direction in an <fdir1>, which is in the axes of the link's first collision, in those of the link; None
+    for 0 0 0."""
+    try:
+        values = np.array([float(word) for word in (part.text or "").split()])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != 3 or not np.isfinite(values).all():
+        warn(part, "<fdir1> of link '%s' is '%s', expected three numbers, and is left out" % (link.name, part.text))
+        return None
+    length = np.linalg.norm(values)
+    if length == 0.0:
+        return None
+    turn = link.collisions[0].origin[:3, :3] if link.collisions else np.eye(3)
+    return tuple((turn @ values / length).tolist())
 
 
 def _number(part, what, may_be_infinite, warn):

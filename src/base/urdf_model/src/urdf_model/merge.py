@@ -120,8 +120,12 @@ def _merge_group(robot, body, members, frames):
             centre = rotation @ link.inertial.centre + offset[:3, 3]
             parts.append((link.inertial.mass, centre, rotation @ link.inertial.inertia @ rotation.T))
     merged.inertial = combine(parts)
-    surfaces = [robot.links[name].surface for name in members if robot.links[name].surface is not None]
-    merged.surface = surfaces[0] if surfaces else None
+    said = next((name for name in members if robot.links[name].surface is not None), None)
+    if said is not None:
+        merged.surface = surface = robot.links[said].surface
+        if surface.direction is not None:
+            turned = frames[said].offset[:3, :3] @ surface.direction
+            merged.surface = replace(surface, direction=tuple(turned.tolist()))
     merged.gravity = robot.links[body].gravity
     merged.decay = robot.links[body].decay
     merged.self_collide = any(robot.links[name].self_collide for name in members)

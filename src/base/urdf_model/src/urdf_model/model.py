@@ -103,7 +103,7 @@ class Mimic:
 
 
 #: Fields of Surface that may be infinite: a contact that never slides, and a rigid one.
-MAY_BE_INFINITE = ("friction", "stiffness")
+MAY_BE_INFINITE = ("friction", "friction_across", "stiffness")
 
 #: The bits of a Surface.
 ALL_BITS = 0xFFFF
@@ -117,6 +117,8 @@ class Surface:
     stiffness: float | None = None  # N/m, may be infinite
     damping: float | None = None  # N s/m
     restitution: float | None = None  # 0 to 1
+    friction_across: float | None = None  # mu across `direction`, 1 if not given
+    direction: tuple[float, float, float] | None = None  # unit, in the link's frame; None: mu is the same in all
     bitmask: int | None = None  # two links collide where they have a bit in common; None: ALL_BITS
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from urdf_model import Inertial, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
-from .builder import inertial_frame, set_collision_filter
+from .builder import inertial_frame, most_friction, set_collision_filter
+from .directions import directed
 from .errors import BulletSimError, within
 from .parts import link_indices
 from .pose import Pose
@@ -59,6 +60,10 @@ class Body:
         #: {body's name: parts of its speed and turn rate that each step takes}
         self.decaying = {link.name: link.decay for link in merged.links.values()
                          if any(link.decay) and not (self.static and link.name == merged.root)}
+        by_child = {joint.child: joint for joint in merged.joints.values()}
+        #: The bodies whose friction depends on the direction.
+        self.directed = frozenset(link.name for link in merged.links.values()
+                                  if directed(link.surface, most_friction(by_child.get(link.name))) is not None)
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
             if not link.gravity:

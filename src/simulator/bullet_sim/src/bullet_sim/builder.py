@@ -13,6 +13,7 @@ import numpy as np
 from urdf_model import Cylinder, MergedRobot, Robot, Sphere, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
+from .directions import directed, is_off, scales, turned
 from .mass_matrix import moving_inertial
 from .parts import Parts, Place, limbs
 from .pose import Pose
@@ -106,7 +107,7 @@ def _build_tree(client, blueprint, own, start, shapes, warn):
     if not static:
         pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
                                 sleepThreshold=_ASLEEP_M2_PER_S2, physicsClientId=client)
-    pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0), physicsClientId=client)
+    pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0, root_offset[:3, :3]), physicsClientId=client)
     set_collision_filter(client, Place(bodies[0], -1), root.surface)
     return bodies, root_offset
 
@@ -118,13 +119,14 @@ def _build_limb(client, blueprint, limb, base, shapes, warn):
     """
     merged, joints = blueprint.merged, list(blueprint.merged.joints.values())
     columns = {key: [] for key in _COLUMNS}
-    moments, order = [], {limb.root: 0}
+    moments, turns, order = [], [], {limb.root: 0}
     for local, number in enumerate(limb.joints):
         joint = joints[number]
         order[joint.child] = local + 1
         link = merged.links[joint.child]
         mass, principal, offset = _inertial(link, warn)
         moments.append(principal)
+        turns.append(offset[:3, :3])
         columns["linkMasses"].append(mass)
         columns["linkCollisionShapeIndices"].append(
             shapes.compound(link_collisions(merged, joint.child, static=False), False, blueprint.mesh_cuts,
@@ -156,9 +158,9 @@ def _build_limb(client, blueprint, limb, base, shapes, warn):
                 jointUpperLimit=joint.limit.upper,
                 physicsClientId=client,
             )
-        most = _WHEEL_FRICTION if is_wheel(joint) else 1.0
         surface = merged.links[joint.child].surface
-        pybullet.changeDynamics(body, local, **_contact(surface, most), physicsClientId=client)
+        pybullet.changeDynamics(body, local, **_contact(surface, most_friction(joint), turns[local]),
+                                physicsClientId=client)
         set_collision_filter(client, Place(body, local), surface)
     return body
 
@@ -208,13 +210,21 @@ def set_collision_filter(client, place, surface, renew=False):
         pybullet.setCollisionFilterGroupMask(*place, 1, -1, physicsClientId=client)
 
 
-def _contact(surface, most):
-    """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one."""
-    surface = surface or Surface()
+def most_friction(joint):
+    """The largest coefficient of friction of the link behind a joint; None: of a root."""
+    return _WHEEL_FRICTION if joint is not None and is_wheel(joint) else 1.0
+
+
+def _contact(surface, most, axes):
+    """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one; ``axes`` (3, 3) of the
+    inertial frame in the body's."""
+    surface, ways = surface or Surface(), directed(surface, most)
     # Bullet multiplies the two friction coefficients of a contact; Gazebo (ODE) takes the smaller one, and 1 by
     # default. With coefficients clamped to 1, the product equals the smaller one whenever one of them is 1. Wheels may
     # have more, as they need it on Gazebo's floors of 100.
     arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, most)}
+    if ways is not None:
+        arguments["lateralFriction"], arguments["anisotropicFriction"] = scales(ways, axes)
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
     if surface.stiffness is not None and surface.stiffness < _RIGID_N_PER_M:
@@ -246,6 +256,11 @@ def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     given = link.inertial.mass
     mass, moments, axes = moving_inertial(link.inertial)
+    if directed(link.surface, _WHEEL_FRICTION) is not None:
+        moments, axes, off = turned(moments, axes, link.surface.direction)
+        if is_off(off):
+            warn("the friction of link '%s' has the directions of its principal axes of inertia, %.0f degrees from its "
+                 "fdir1" % (link.name, np.degrees(off)))
     if given < bounds.MIN_MASS_KG:
         warn("link '%s' moves and has %s mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
              % (link.name, "hardly any" if given > 0.0 else "no", mass))

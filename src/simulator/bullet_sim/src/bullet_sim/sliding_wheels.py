@@ -43,7 +43,10 @@ def fixed_wheels(joints):
 def sliding_wheels(client, model):
     """Return the SlidingWheels of a Model, a list; ``client``: PyBullet's."""
     trees = {}
-    for index in fixed_wheels(model.merged.joints.values()):
+    joints = list(model.merged.joints.values())
+    for index in fixed_wheels(joints):
+        if joints[index].child in model.directed:
+            continue
         trees.setdefault(model.parts.root_of(index), []).append(model.parts.places[index].index)
     return [SlidingWheels(client, model, root, wheels) for root, wheels in trees.items()]
 

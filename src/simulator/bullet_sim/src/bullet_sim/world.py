@@ -256,8 +256,10 @@ class World:
 
     def _models_changed(self):
         any_free = any(model.free for model in self.models.values())
+        # Bullet's cone of friction fails where a coefficient is 0; without it, friction is a pyramid, as Gazebo's.
+        pyramid = any(model.directed for model in self.models.values())
         pybullet.setPhysicsEngineParameter(solverResidualThreshold=_CREEP_M2_PER_S2[any_free],
-                                           physicsClientId=self._client)
+                                           enableConeFriction=int(not pyramid), physicsClientId=self._client)
         self._watch.models_changed()
         for groups in self._sliding.values():
             for wheels in groups:

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Friction with different coefficients along a direction and across it (Gazebo's fdir1, mu and mu2).
+
+Bullet scales the friction of a body along the axes of its inertial frame. So these are turned to the direction where
+the moments of inertia leave that open, as those of wheels do.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from urdf_model import Surface
+
+# Moments whose difference is at most this part of them are the same, and directions closer than this [rad].
+_SAME, _CLOSE = 1e-3, 1e-2
+
+
+class Directed(NamedTuple):
+    """Coefficients of friction along the direction and across it, and the direction (3,), in the body's frame."""
+
+    along: float
+    across: float
+    direction: tuple
+
+
+def directed(surface: Surface | None, most: float) -> Directed | None:
+    """Return the Directed of a surface with coefficients up to ``most``; None where all directions are the same."""
+    if surface is None or surface.direction is None:
+        return None
+    along, across = (min(1.0 if mu is None else mu, most) for mu in (surface.friction, surface.friction_across))
+    return None if along == across else Directed(along, across, surface.direction)
+
+
+def turned(moments, axes, direction):
+    """Return (moments (3,), axes (3, 3), [rad]) of an inertia, with an axis as near as possible to ``direction`` (3,),
+    and the angle between them."""
+    direction = np.asarray(direction, dtype=float)
+    if np.ptp(moments) <= _SAME * moments.max():
+        first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+        first /= np.linalg.norm(first)
+        return moments, np.stack([direction, first, np.cross(direction, first)], axis=1), 0.0
+    near = np.abs(axes.T @ direction)
+    for third in range(3):
+        one, other = (third + 1) % 3, (third + 2) % 3
+        spread = abs(moments[one] - moments[other])
+        if spread <= _SAME * max(moments[one], moments[other]) and near[third] < math.sin(_CLOSE):
+            first = direction - axes[:, third] * (axes[:, third] @ direction)
+            first /= np.linalg.norm(first)
+            found = axes.copy()
+            found[:, one], found[:, other] = first, np.cross(axes[:, third], first)
+            return moments, found, 0.0
+    return moments, axes, math.acos(min(1.0, float(near.max())))
+
+
+def scales(found, axes):
+    """Return (coefficient, scales of it along the three ``axes`` (3, 3)) for changeDynamics, of a Directed."""
+    most = max(found.along, found.across)
+    factors = [found.across / most] * 3
+    factors[int(np.abs(axes.T @ found.direction).argmax())] = found.along / most
+    return most, factors
+
+
+def is_off(angle):
+    """Whether an angle [rad] between a direction and its axis matters."""
+    return angle > _CLOSE
