@@ -48,7 +48,7 @@ HONOURED = {
     "geometry/heightmap": "uri size pos",
     "surface/bounce": "restitution_coefficient",
     "surface/friction/ode": "mu fdir1",
-    "surface/contact/ode": "kp kd",
+    "surface/contact/ode": "kp kd max_vel",
     "material": "ambient diffuse specular emissive",
     "material/script": "uri name",
     "material/pbr/metal": "albedo_map",
@@ -155,7 +155,8 @@ WITHOUT_EFFECT = (
     ("surface/contact", {"collide_without_contact": "0", "collide_without_contact_bitmask": "1",
                          "category_bitmask": "65535|0xffff"}, _NO_FEELING),
     ("surface/contact", {"poissons_ratio": "0.3", "elastic_modulus": "-1"}, "kp alone says how stiff contacts are"),
-    ("surface/contact/ode", {"soft_cfm": "0", "soft_erp": "0.2", "max_vel": "0.01", "min_depth": "0"}, _SOLVER),
+    ("surface/contact/ode", {"soft_cfm": "0", "soft_erp": "0.2"}, _SOLVER),
+    ("surface/contact/ode", {"min_depth": "0"}, "overlaps of any depth are corrected"),
     ("material", {"lighting": "true"}, "all materials are lit"),
     ("material", {"shader": None, "shininess": "0", "double_sided": "false"}, "the renderer has one shader"),
     ("material/pbr/metal", dict.fromkeys((

@@ -124,7 +124,7 @@ def _surface(document, collision):
     found = {}
     for path, field in (
         ("friction/ode", (("mu", "friction"), ("mu2", "friction_across"))),
-        ("contact/ode", (("kp", "stiffness"), ("kd", "damping"))),
+        ("contact/ode", (("kp", "stiffness"), ("kd", "damping"), ("max_vel", "leaving_speed"))),
         ("bounce", (("restitution_coefficient", "restitution"),)),
     ):
         part = element.find(path)

@@ -16,7 +16,8 @@ from .materials import GLOWS, MATERIALS
 from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
 
 # Element -> field of Surface. Both spellings of the first one are in use.
-_SURFACE = {"mu": "friction", "mu1": "friction", "mu2": "friction_across", "kp": "stiffness", "kd": "damping"}
+_SURFACE = {"mu": "friction", "mu1": "friction", "mu2": "friction_across", "kp": "stiffness", "kd": "damping",
+            "maxVel": "leaving_speed", "max_vel": "leaving_speed"}
 
 
 def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) -> None:

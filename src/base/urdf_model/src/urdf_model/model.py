@@ -117,6 +117,7 @@ class Surface:
     stiffness: float | None = None  # N/m, may be infinite
     damping: float | None = None  # N s/m
     restitution: float | None = None  # 0 to 1
+    leaving_speed: float | None = None  # with which an overlap is corrected at most [m/s]
     friction_across: float | None = None  # mu across `direction`, 1 if not given
     direction: tuple[float, float, float] | None = None  # unit, in the link's frame; None: mu is the same in all
     bitmask: int | None = None  # two links collide where they have a bit in common; None: ALL_BITS

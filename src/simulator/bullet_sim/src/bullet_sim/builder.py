@@ -42,6 +42,9 @@ _TREAD_PART, _ALONG = 0.05, 0.9999
 _ASLEEP_M2_PER_S2 = 1e-6
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8
+# An overlap of up to this is corrected no faster than the surfaces' max_vel [m]; below the lowest speed [m/s] nothing
+# would come apart, and from the highest one on rigid contacts are within it.
+_DEEP_M, _SLOWEST_M_PER_S, _QUICK_M_PER_S = 0.005, 1e-3, 0.5
 
 
 class Blueprint(NamedTuple):
@@ -227,10 +230,21 @@ def _contact(surface, most, axes):
         arguments["lateralFriction"], arguments["anisotropicFriction"] = scales(ways, axes)
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
-    if surface.stiffness is not None and surface.stiffness < _RIGID_N_PER_M:
-        arguments["contactStiffness"] = surface.stiffness
-        arguments["contactDamping"] = _DEFAULT_DAMPING if surface.damping is None else surface.damping
+    stiffness, damping = surface.stiffness, _DEFAULT_DAMPING if surface.damping is None else surface.damping
+    speed = surface.leaving_speed
+    if speed is not None and (is_rigid(stiffness) and speed < _QUICK_M_PER_S or not is_rigid(stiffness)):
+        # Bullet turns an overlap d into the speed d k / (dt k + c) at most, for a stiffness k and a damping c.
+        stiffness = _RIGID_N_PER_M if is_rigid(stiffness) else stiffness
+        damping = max(damping, stiffness * _DEEP_M / max(speed, _SLOWEST_M_PER_S))
+        arguments.update(contactStiffness=stiffness, contactDamping=damping)
+    elif not is_rigid(stiffness):
+        arguments.update(contactStiffness=stiffness, contactDamping=damping)
     return arguments
+
+
+def is_rigid(stiffness):
+    """Whether contacts of a surface with a stiffness [N/m] are rigid; None: it is not given."""
+    return stiffness is None or stiffness >= _RIGID_N_PER_M
 
 
 _COLUMNS = (

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import Pose, World
+from bullet_sim.quiet_pybullet import pybullet
 from urdf_model import Box, Link, Robot, Shape, parse_urdf
 
 BOX = """<robot name="box"><link name="it"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/>
@@ -74,3 +75,26 @@ def test_a_model_between_two_walls_stays_where_it_was_put(world):
     box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0.175, 0.0, 0.0)))
     world.step()
     assert box.base_pose().position == pytest.approx((0.175, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize("speed, fastest", [(None, 10.0), (0.01, 0.01), (0.1, 0.1), (0.0, 0.001)])
+@pytest.mark.parametrize("contact", ["", "<kp>1e6</kp><kd>1</kd>"])
+def test_what_was_pressed_into_the_board_leaves_it_no_faster_than_max_vel(speed, fastest, contact):
+    """A chess piece of 1 g, 2 mm deep."""
+    world = World(time_step_s=0.001)
+    world.add_ground_plane()
+    said = "" if speed is None else "<maxVel>%g</maxVel>" % speed
+    piece = world.spawn(parse_urdf("""<robot name="piece"><link name="it"><inertial><mass value="0.001"/>
+        <inertia ixx="1e-7" iyy="1e-7" izz="1e-7" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>
+        <box size="0.02 0.02 0.04"/></geometry></collision></link><gazebo reference="it">%s%s</gazebo></robot>"""
+                                   % (contact, said)), "piece", Pose((0, 0, 0.02)))
+    world.step()
+    pybullet.resetBasePositionAndOrientation(piece.body, (0, 0, 0.018), (0, 0, 0, 1), physicsClientId=world._client)
+    speeds = []
+    for _ in range(300):
+        world.step()
+        speeds.append(piece.base_twist()[0][2])
+    assert max(speeds) <= fastest and (speed is not None or max(speeds) > 0.1)
+    if speed:
+        assert piece.base_pose().position[2] > 0.0181
+    world.close()

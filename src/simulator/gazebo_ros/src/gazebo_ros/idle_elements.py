@@ -13,20 +13,20 @@ _ONE_MU = "without fdir1, friction is the same in all directions"
 #: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
 KNOWN = {
     "model": "static self_collide joint plugin start_configuration",
-    "link": "mu mu1 fdir1 kp kd selfCollide self_collide dampingFactor "
+    "link": "mu mu1 fdir1 kp kd maxVel selfCollide self_collide dampingFactor "
             "turnGravityOff gravity material sensor light plugin canonicalBody "
             "maxContacts",
     "link/collision": "max_contacts",
     "link/collision/surface/friction/ode": "mu fdir1",
     "link/collision/surface/contact": "collide_bitmask",
-    "link/collision/surface/contact/ode": "kp kd",
+    "link/collision/surface/contact/ode": "kp kd max_vel",
     **{"link/collision/" + path: names for path, names in sdf.HARMLESS.items() if path.startswith("surface")},
     "joint": "implicitSpringDamper cfmDamping springStiffness springReference provideFeedback sensor plugin "
              "preserveFixedJoint disableFixedJointLumping",
 }
 WITHOUT_EFFECT = (
     ("link", {"mu2": "@mu1=1|+fdir1"}, _ONE_MU),
-    ("link", {"maxVel": "0.01", "minDepth": "0"}, "the solver is Bullet's, not ODE's"),
+    ("link", {"minDepth": "0"}, "overlaps of any depth are corrected"),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
     ("link", {"visual": None}, _NOT_IN_A_URDF),

@@ -68,7 +68,7 @@ def test_what_has_its_effect_or_none_in_gazebo_is_no_news(block):
     ('<gazebo reference="a"><mu1>1</mu1><mu2>0.1</mu2><fdir1>1 0 0</fdir1><minDepth>0.001</minDepth></gazebo>',
      ["minDepth"]),
     ('<gazebo reference="a"><selfCollide>true</selfCollide><dampingFactor>0.1</dampingFactor><maxVel>1</maxVel>'
-     "</gazebo>", ["maxVel"]),
+     "</gazebo>", []),
     ('<gazebo reference="j"><stopCfm>0.1</stopCfm><fudgeFactor>1</fudgeFactor></gazebo>',
      ["stopCfm", "fudgeFactor"]),
     ('<gazebo reference="a"><visual><material/></visual></gazebo>', ["visual"]),
