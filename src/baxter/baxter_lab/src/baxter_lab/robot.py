@@ -43,7 +43,7 @@ class Gripper:
     @property
     def position(self) -> float:
         """How far it is open, 0 to 100 [%]; 0 of a suction gripper."""
-        return self._hand.readings(self._simulated.model.read_joints()[0])[0]
+        return self._hand.opening(self._simulated.model.read_joints()[0])
 
     @property
     def force(self) -> float:
@@ -93,6 +93,7 @@ class Arm:
         self.joint_names = self.chain.joint_names
         self.gripper = Gripper(simulated, side, wait)
         self._index = simulated.limb_index[side]
+        self._posed_at = self._pose = None
 
     @property
     def angles(self) -> np.ndarray:
@@ -112,7 +113,10 @@ class Arm:
     @property
     def pose(self) -> np.ndarray:
         """(4, 4) of the gripper's frame in `base`."""
-        return self.chain.fk(self.angles)
+        positions = self._simulated.model.read_joints()[0]
+        if positions is not self._posed_at:  # rewards and observations ask for it many times in a tick
+            self._posed_at, self._pose = positions, self.chain.fk(positions[self._index])
+        return self._pose.copy()
 
     @property
     def wrench(self) -> np.ndarray:

@@ -11,13 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from baxter_lab import Arm, Mode
-from baxter_sim_hardware.arms.endpoint import joint_velocities
+from baxter_sim_hardware.arms.endpoint import SINGULARITY_DAMPING
 from command_line.options import counted
-from urdf_model.transforms import axis_rotation
+
+from .twist import after
 
 #: What 1 means of joint_delta [rad], and of osc_pose [m], [rad] about an axis of `base`: as robosuite's controllers.
 JOINT_DELTA_RAD = 0.05
 OSC_POSITION_M, OSC_ROTATION_RAD = 0.05, 0.5
+OSC_SCALE = np.repeat((OSC_POSITION_M, OSC_ROTATION_RAD), 3)
 _STILL = 1e-9
 
 #: {control: numbers of one arm without its gripper}
@@ -56,30 +58,7 @@ class ArmControl:
         if self._control == "joint_pos":
             middle, half = 0.5 * (arm.chain.lower + arm.chain.upper), 0.5 * (arm.chain.upper - arm.chain.lower)
             return middle + half * action
-        return self._after_twist(OSC_POSITION_M * action[:3], OSC_ROTATION_RAD * action[3:])
-
-    def _after_twist(self, shift, turn):
-        """(7,) joints after the hand's pose has moved by `shift` [m] and turned by `turn` [rad], in two steps of damped
-        least squares from the present target; away from singularities within a millimetre."""
-        chain, q = self._arm.chain, self.target
-        angle = float(np.linalg.norm(turn))
-        goal = chain.fk(q)
-        goal[:3, 3] += shift
-        if angle > _STILL:
-            goal[:3, :3] = axis_rotation(turn / angle, angle) @ goal[:3, :3]
-        for _ in range(2):
-            pose, jacobian = chain.fk_and_jacobian(q)
-            q = np.clip(q + joint_velocities(jacobian, _difference(goal, pose)), chain.lower, chain.upper)
-        return q
-
-
-def _difference(goal, pose):
-    """(6,) shift and turn, in `base`, from one pose to another [m, rad]."""
-    turned = goal[:3, :3] @ pose[:3, :3].T
-    axis = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
-    sine, cosine = 0.5 * np.linalg.norm(axis), 0.5 * (np.trace(turned) - 1.0)
-    turn = axis * (np.arctan2(sine, cosine) / (2.0 * sine)) if sine > _STILL else np.zeros(3)
-    return np.concatenate([goal[:3, 3] - pose[:3, 3], turn])
+        return after(arm.chain.arrays, arm.chain.limit_arrays, self.target, OSC_SCALE * action, SINGULARITY_DAMPING)
 
 
 def action_size(control: str, arms: int = 2) -> int:

@@ -120,13 +120,13 @@ class Core:
     def agent_pos(self) -> np.ndarray:
         """Of each arm, in the actions' order: angles (7) [rad], speeds (7) [rad/s], the hand's place (3) [m] and
         quaternion x y z w, how far the gripper is open, 0 to 1."""
-        values = []
+        parts = []
         for side in self.sides:
             arm = self.lab.robot.arms[side]
             pose = arm.pose
-            values += [*arm.angles, *arm.velocities, *pose[:3, 3], *quaternion_from_matrix(pose),
-                       arm.gripper.position / 100.0]
-        return np.array(values)
+            parts += [arm.angles, arm.velocities, pose[:3, 3], quaternion_from_matrix(pose),
+                      (arm.gripper.position / 100.0,)]
+        return np.concatenate(parts)
 
     # -- states
 

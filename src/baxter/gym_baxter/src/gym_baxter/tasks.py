@@ -195,9 +195,10 @@ class TwoArmLift(Task):
         yaw = math.pi + random.uniform(-math.pi / 3, math.pi / 3)
         self.pot.put((0.66 + float(x), float(y), TABLE_TOP_M + self.HALF_M + 1e-3), float(yaw))
 
-    def _handles(self):
-        """{side: (3,)}: the pot begins turned by about half a turn, so the handle at -y is the left hand's."""
-        pose = self.pot.pose
+    def _handles(self, pose: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """{side: (3,)} of the pot at `pose`, by default where it is. It begins turned by about half a turn, so the
+        handle at -y is the left hand's."""
+        pose = self.pot.pose if pose is None else pose
         out = self.HALF_M + self.HANDLE_M + 0.5 * self.ROD_M
         return {side: (pose @ (0.0, sign * out, self.HALF_M - self.ROD_M, 1.0))[:3]
                 for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
@@ -212,11 +213,12 @@ class TwoArmLift(Task):
 
     def reward(self):
         """robosuite's, divided by its greatest value, 3: lifted and upright 3; else reaching, grasps, height."""
-        upright = self.pot.pose[2, 2] >= self.UPRIGHT
-        if self.succeeded() and upright:
+        pose = self.pot.pose
+        upright, lift = pose[2, 2] >= self.UPRIGHT, float(pose[2, 3]) - self.HALF_M - TABLE_TOP_M
+        if upright and lift > self.LIFTED_M:
             return 1.0
-        total = 10.0 * min(max(self._lift() - 0.05, 0.0), 0.15) if upright else 0.0
-        for side, handle in self._handles().items():
+        total = 10.0 * min(max(lift - 0.05, 0.0), 0.15) if upright else 0.0
+        for side, handle in self._handles(pose).items():
             holds = self._holds(side)
             near = 1.0 if holds else _near(float(np.linalg.norm(handle - self._hand(side))), 10.0)
             total += 0.25 * holds + 0.5 * near

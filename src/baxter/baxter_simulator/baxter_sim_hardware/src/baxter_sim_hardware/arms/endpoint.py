@@ -7,7 +7,7 @@ import numpy as np
 _DAMPING = 1e-6
 # Damping of the inverse from twist to joint velocities: the tip loses 1 % of its speed where the least singular value
 # of J is ten times this.
-_SINGULARITY_DAMPING = 0.02
+SINGULARITY_DAMPING = 0.02
 
 
 def twist(jacobian, velocity):
@@ -22,7 +22,7 @@ def joint_velocities(jacobian, tip_twist):
     Damped least squares: J^T (J J^T + d^2 I)^-1.
     """
     gram = jacobian @ jacobian.T
-    gram.flat[::7] += _SINGULARITY_DAMPING**2
+    gram.flat[::7] += SINGULARITY_DAMPING**2
     return jacobian.T @ np.linalg.solve(gram, tip_twist)
 
 

@@ -40,9 +40,13 @@ class FingersHand:
         self._unseen_ticks = 0
         self._driven = OPEN, 100.0  # to which share of the travel, how hard [%], as they begin
 
+    def opening(self, positions):
+        """How far it is open [%]; positions: of all joints of the model."""
+        return 100.0 * min(max(self._share(positions), 0.0), 1.0)
+
     def readings(self, positions):
         """(opening, force) [%] for the state message; positions: of all joints of the model."""
-        return 100.0 * min(max(self._share(positions), 0.0), 1.0), min(self._squeeze(), 100.0)
+        return self.opening(positions), min(self._squeeze(), 100.0)
 
     def _squeeze(self):
         """Force on the fingers along their travel, the mean of both [% of the joints' effort limit]."""
@@ -110,6 +114,10 @@ class CupHand:
         model.grip_firmly(self._frame)
         self.gripper = SuctionGripper(dt)
 
+    def opening(self, positions):
+        """How far it is open [%]."""
+        return 0.0
+
     def readings(self, positions):
         """(opening, force) [%] for the state message: a cup has neither."""
         return 0.0, 0.0
@@ -155,6 +163,10 @@ class NoHand:
 
     def __init__(self):
         self.gripper = CustomGripper()
+
+    def opening(self, positions):
+        """How far it is open [%]."""
+        return 0.0
 
     def readings(self, positions):
         """(opening, force) [%] for the state message."""
