@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from lab_tests import processes
-from lab_tests.discovery import Selection, SelectionError, changed_files, select, take_inventory
+from lab_tests.discovery import WORKERS_BESIDE_CORES, Selection, SelectionError, changed_files, select, take_inventory
 from lab_tests.quota import Quota, QuotaError
 from lab_tests.results import Tally, summary
 
@@ -44,7 +44,6 @@ EXIT_SKIPPED = 77
 # Factor of all time limits. They are written for an idle machine with two fast cores; others may be half as fast, or
 # have neighbours. Only a test that hangs takes longer by it.
 STRETCH = 2.0
-WORKERS_BESIDE_CORES = 1  # plugin.py says what for
 # Fewer files run in this process itself, which is quicker, and lets pytest's --pdb work.
 MIN_FILES_FOR_WORKERS = 3
 USAGE = "./baxter.sh test [NAME…] [OPTION…] [pytest's options]"

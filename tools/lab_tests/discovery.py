@@ -15,6 +15,8 @@ from xml.etree import ElementTree
 LINTERS = {name: f"tests/unit/test_lint.py::test_{name}" for name in ("ruff", "catkin_lint")}
 # The package of files at the root, whose tests look at the whole tree.
 WHOLE_TREE = "workspace_tests"
+# Workers, more than cores, that run only the .test files that leave the processor to others.
+WORKERS_BESIDE_CORES = 2
 # pytest options that take a value, which is not a test's name.
 _OPTIONS_WITH_VALUE = set("-k -m -p -o -c -W -r -n --dist --maxfail --deselect --ignore --tb --durations --junitxml"
                           " --shuffle".split())
@@ -38,6 +40,11 @@ def is_long(path: Path) -> bool:
 def mostly_waits(path: Path) -> bool:
     """Whether a .test file leaves the processor to others: no simulator, a small one, or one slowed on purpose."""
     return _has_mark(path, "beside others")
+
+
+def shares_its_lab(path: Path) -> bool:
+    """Whether a .test file leaves its lab as it was, so that others with the same one can use it."""
+    return _has_mark(path, "shared lab")
 
 
 def is_whole_machine(path: Path) -> bool:

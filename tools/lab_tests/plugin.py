@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The pytest plugin of `./baxter.sh test`: .test files as tests, some at a time, and the counts.
 
-The controller of pytest-xdist gives whole files to its workers, the longest first. There is a worker for each
-core, and one more, which runs only the .test files that leave the processor to others: with yet another one a whole run
-is a tenth shorter, and motions are late.
+The controller of pytest-xdist gives whole files to its workers, the longest first; files that share a lab are one.
+There is a worker for each core, and two more, which run only the .test files that leave the processor to others.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import functools
+import hashlib
 import json
 import locale
 import os
@@ -21,8 +22,9 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 from lab_tests import comma_locale, left_threads, rostests
-from lab_tests.discovery import is_long, is_whole_machine, mostly_waits, package_of
+from lab_tests.discovery import WORKERS_BESIDE_CORES, is_long, is_whole_machine, mostly_waits, package_of
 from lab_tests.results import Tally, summary
+from lab_tests.shared_labs import lab_of
 
 LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
 # What files took in earlier runs, and what a fresh clone begins with: file below the root -> seconds.
@@ -78,9 +80,7 @@ class Rostest(pytest.Item):
     """One .test file, run by rostest; the tests in it are counted one by one."""
 
     def runtest(self):
-        folder = work_folder(self.config) / f"{package_of(self.path, self.config.rootpath)}-{self.path.stem}"
-        environment = self.config.pluginmanager.get_plugin("lab worker").environment
-        tally = rostests.run(self.path, folder, environment, stretch=self.config.option.stretch)
+        tally = self.config.pluginmanager.get_plugin("lab worker").run_rostest(self)
         tally.refuse_bare_skips()
         self.user_properties += [("passed", tally.passed), ("failed", tally.failed), ("skips", tally.skips)]
         if tally.failed:
@@ -105,6 +105,13 @@ def file_of(nodeid: str) -> str:
     return nodeid.partition("::")[0]
 
 
+@functools.cache
+def unit_of(root: Path, nodeid: str) -> str:
+    """What one worker runs in one go: the test's file, or the name of the lab that several .test files share."""
+    lab = lab_of(root / file_of(nodeid))
+    return file_of(nodeid) if lab is None else f"lab {hashlib.sha256(lab.encode()).hexdigest()[:12]}"
+
+
 def read_durations(folder: Path) -> dict[str, float]:
     """File below the root -> seconds that it took last time."""
     found: dict[str, float] = {}
@@ -125,18 +132,22 @@ def pytest_collection_modifyitems(config, items):
         items[:] = [item for item in items if item not in set(left_out)]
         _tell(config, "long", [item.nodeid for item in left_out])
     durations = read_durations(work_folder(config))
-    by_file: dict[str, list] = {}
+    units: dict[str, list] = {}
     for item in items:
-        by_file.setdefault(file_of(item.nodeid), []).append(item)
-    files = sorted(by_file, key=lambda file: (-durations.get(file, 0.0), file))
+        units.setdefault(unit_of(config.rootpath, item.nodeid), []).append(item)
+    for of_unit in units.values():
+        # Workers collect the files in different orders; within a file the sort keeps the order.
+        of_unit.sort(key=lambda item: file_of(item.nodeid))
+    files = {unit: {file_of(item.nodeid) for item in of_unit} for unit, of_unit in units.items()}
+    order = sorted(units, key=lambda unit: (-sum(durations.get(file, 0.0) for file in files[unit]), unit))
     if config.option.shuffle is not None:
         source = random.Random(config.option.shuffle)
-        source.shuffle(files)
-        for file in files:
-            source.shuffle(by_file[file])
+        source.shuffle(order)
+        for unit in order:
+            source.shuffle(units[unit])
     # Tests that need the whole machine first: later they would wait for a moment in which nothing else runs.
-    files.sort(key=lambda file: not is_whole_machine(config.rootpath / file))
-    items[:] = [item for file in files for item in by_file[file]]
+    order.sort(key=lambda unit: not any(is_whole_machine(config.rootpath / file) for file in files[unit]))
+    items[:] = [item for unit in order for item in units[unit]]
 
 
 def _tell(config, name: str, value):
@@ -158,6 +169,20 @@ class Worker:
         os.environ.update(comma_locale.variables(LOCALE_FOLDER))
         locale.setlocale(locale.LC_ALL, "")
         self._machine = open(work_folder(config) / "machine.lock", "w")
+        self._shared: dict[Path, Tally] = {}
+
+    def run_rostest(self, item: Rostest) -> Tally:
+        """Run a .test file, with all those of this run that share its lab when it is the first of them."""
+        config, stretch = self._config, self._config.option.stretch
+        if lab_of(item.path) is None:
+            folder = work_folder(config) / f"{package_of(item.path, config.rootpath)}-{item.path.stem}"
+            return rostests.run(item.path, folder, self.environment, stretch=stretch)
+        if item.path not in self._shared:
+            unit = unit_of(config.rootpath, item.nodeid)
+            paths = [one.path for one in item.session.items if unit_of(config.rootpath, one.nodeid) == unit]
+            folder = work_folder(config) / unit.replace(" ", "-")
+            self._shared.update(rostests.run_shared(paths, folder, self.environment, stretch))
+        return self._shared.pop(item.path)
 
     def _begin_elsewhere(self):
         """Collect the files in another order than the other workers do: what one compiles, the others find compiled."""
@@ -272,17 +297,18 @@ class Controller:
 
 
 class FileScheduling(LoadScopeScheduling):
-    """A file's tests run in one worker. The last one gets only .test files that mostly wait, the others those last."""
+    """A unit runs in one worker. Workers beside the cores get .test files that mostly wait, the others those last."""
 
     def _split_scope(self, nodeid):
-        return file_of(nodeid)
+        return unit_of(self.config.rootpath, nodeid)
 
     def _is_extra(self, node) -> bool:
-        return self.numnodes > 1 and node.gateway.id == f"gw{self.numnodes - 1}"
+        return int(node.gateway.id.removeprefix("gw")) >= max(1, self.numnodes - WORKERS_BESIDE_CORES)
 
     def _assign_work_unit(self, node):
-        waiting = {scope: mostly_waits(self.config.rootpath / scope) for scope in self.workqueue}
-        wanted = next((scope for scope, waits in waiting.items() if waits == self._is_extra(node)), None)
+        waiting = {unit: mostly_waits(self.config.rootpath / file_of(next(iter(tests))))
+                   for unit, tests in self.workqueue.items()}
+        wanted = next((unit for unit, waits in waiting.items() if waits == self._is_extra(node)), None)
         if wanted is None and self._is_extra(node):
             node.shutdown()
             return

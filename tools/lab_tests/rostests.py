@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run one .test file through rostest: own master, own log and result folders, a time limit, nothing left behind."""
+"""Run .test files through rostest: own master, own log and result folders, a time limit, nothing left behind."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
-from lab_tests import processes
+from lab_tests import processes, shared_labs
 from lab_tests.discovery import is_long
 from lab_tests.results import Tally, failure, read_rostest_results
 from processes.ports import free_port
@@ -39,10 +39,57 @@ def run(
 
     stretch: factor of all time limits, including those in the file, when the processes get only a part of the machine.
     """
+    _empty(work_folder)
+    tally = _run(path, [], work_folder, environment, time_limit_s, stretch)
+    return _with_output(tally, path, work_folder)
+
+
+def run_shared(
+    paths: list[Path], work_folder: Path, environment: dict[str, str], stretch: float = 1.0
+) -> dict[Path, Tally]:
+    """Run files that share a lab, and count each one; as :func:`run` otherwise.
+
+    After a file that leaves the lab in another state, the others get a new lab.
+    """
+    _empty(work_folder)
+    tallies: dict[Path, Tally] = {}
+    waiting = list(paths)
+    while waiting:
+        folder = work_folder / str(len(tallies))
+        _empty(folder)
+        launch, results = shared_labs.write(waiting, folder)
+        owner = ["--package", "lab_testing", "--pkgdir", str(folder)]
+        whole = _run(launch, owner, folder, environment, None, stretch)
+        ran = [path for path, result in zip(waiting, results, strict=True) if result.is_dir()] or waiting[:1]
+        for path, result in zip(ran, results, strict=False):
+            tallies[path] = read_rostest_results(result)
+        # The node that ran them is no test, but may have failed as one.
+        whole.passed = 0
+        tallies[ran[-1]].add(whole)
+        tallies[ran[-1]] = _with_output(tallies[ran[-1]], launch, folder)
+        waiting = waiting[len(ran):]
+    return tallies
+
+
+def _empty(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "results").mkdir(parents=True)
+
+
+def _with_output(tally: Tally, path: Path, work_folder: Path) -> Tally:
+    if tally.failed:
+        lines = (work_folder / "output.txt").read_text(errors="replace").splitlines()
+        tail = "\n".join(lines[-OUTPUT_LINES_SHOWN:])
+        tally.details.append(f"output of {path.name} (logs in {work_folder}):\n{tail}")
+    return tally
+
+
+def _run(
+    path: Path, options: list[str], work_folder: Path, environment: dict[str, str], time_limit_s: float | None,
+    stretch: float,
+) -> Tally:
     if time_limit_s is None:
         time_limit_s = stretch * max(LONG_TIME_LIMIT_S if is_long(path) else TIME_LIMIT_S, declared_s(path))
-    shutil.rmtree(work_folder, ignore_errors=True)
-    (work_folder / "results").mkdir(parents=True)
     run_id = uuid.uuid4().hex
     environment = {
         **environment,
@@ -63,7 +110,7 @@ def run(
         try:
             # Do not trust the results of rostest --text (it exits with 0 when tests fail), but the XML files.
             child = subprocess.Popen(
-                [*command, str(path)],
+                [*command, *options, str(path)],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=stream,
@@ -91,10 +138,6 @@ def run(
         if leftovers:
             listing = "\n".join(f"  {pid}: {command}" for pid, command in sorted(leftovers.items()))
             tally.add(failure(f"{path.name}: left processes behind (killed now):\n{listing}"))
-    if tally.failed:
-        lines = output.read_text(errors="replace").splitlines()
-        tail = "\n".join(lines[-OUTPUT_LINES_SHOWN:])
-        tally.details.append(f"output of {path.name} (logs in {work_folder}):\n{tail}")
     return tally
 
 
