@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node foxglove_bridge: reads its parameters and listens."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 
 from foxglove_bridge.parameters import read_parameters
@@ -12,12 +16,12 @@ from web_bridge.ros_foxglove import FoxgloveGraph, options_of_graph
 from web_bridge.websocket import Clients
 
 
-def main():
+def main() -> int:
     """Returns the exit code."""
     return ros_node.run("foxglove_bridge", read_parameters, _serve)
 
 
-def _serve(parameters):
+def _serve(parameters: Any) -> None:
     loop_thread = LoopThread("foxglove")
     session_id, metadata, sim_time = options_of_graph()
     bridge = FoxgloveBridge(

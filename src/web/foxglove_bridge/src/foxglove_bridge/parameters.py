@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters of foxglove_bridge, by their published names. No ROS."""
+from __future__ import annotations
+
 import re
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from web_bridge.foxglove.rules import ASSETS, CAPABILITIES, FoxgloveRules, compiled
 from web_bridge.parameters import Endpoint, ParameterError, access_of, number, port_of, switch, tls_of, warnings_of
@@ -22,7 +25,7 @@ class BridgeParameters(NamedTuple):
     warnings: tuple
 
 
-def read_parameters(get):
+def read_parameters(get: Callable[[str, Any], Any]) -> BridgeParameters:
     """``get(name, default)`` returns a parameter of the node. Raises ParameterError."""
     address, access = str(get("address", "localhost")), access_of(get)
     capabilities = _texts(get, "capabilities", CAPABILITIES)
@@ -32,9 +35,8 @@ def read_parameters(get):
         raise ParameterError("~capabilities has %s; known are %s"
                              % (", ".join(sorted(unknown)), ", ".join(CAPABILITIES)))
     rules = FoxgloveRules(
-        *(_patterns(get, name, [".*"])
-          for name in ("topic_whitelist", "service_whitelist", "param_whitelist", "client_topic_whitelist")),
-        _patterns(get, "asset_uri_allowlist", ASSETS, re.IGNORECASE),
+        _patterns(get, "topic_whitelist"), _patterns(get, "service_whitelist"), _patterns(get, "param_whitelist"),
+        _patterns(get, "client_topic_whitelist"), _patterns(get, "asset_uri_allowlist", ASSETS, re.IGNORECASE),
         tuple(name for name in CAPABILITIES if name in capabilities))
     socket = SocketOptions(
         access, rules, use_compression=switch(get, "use_compression", False),
@@ -44,14 +46,15 @@ def read_parameters(get):
         max(0.01, number(get, "service_type_retrieval_timeout_ms", 250) / 1000), socket, warnings_of(address, access))
 
 
-def _texts(get, name, default):
+def _texts(get: Callable[[str, Any], Any], name: str, default: Sequence[str]) -> Sequence[str]:
     values = get(name, default)
     if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
         raise ParameterError("~%s is %r; a list of texts is expected, as ['/robot/.*', '/tf']" % (name, values))
     return values
 
 
-def _patterns(get, name, default, flags=0):
+def _patterns(get: Callable[[str, Any], Any], name: str, default: Sequence[str] = (".*",),
+              flags: int | re.RegexFlag = 0) -> tuple[re.Pattern, ...]:
     try:
         return compiled(_texts(get, name, default), flags)
     except re.error as error:

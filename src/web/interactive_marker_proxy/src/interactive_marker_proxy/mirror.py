@@ -2,23 +2,29 @@
 """The markers of a server as its messages tell them. No ROS: messages are objects with the fields of
 visualization_msgs.
 """
+from __future__ import annotations
+
 import copy
 import threading
+from typing import Any
+
+Point = tuple[float, float, float]  #: x, y, z [m]
+Quaternion = tuple[float, float, float, float]  #: x, y, z, w
 
 
 class MarkerMirror:
     """Markers by name, of the servers that publish on one topic. Any thread."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._servers = {}  # server id -> [sequence number, {name: marker}]
 
-    def begin(self, init):
+    def begin(self, init: Any) -> None:
         """A server has said all of its markers (InteractiveMarkerInit)."""
         with self._lock:
             self._servers[init.server_id] = [init.seq_num, {marker.name: marker for marker in init.markers}]
 
-    def update(self, update):
+    def update(self, update: Any) -> None:
         """A server has said what changed (InteractiveMarkerUpdate)."""
         with self._lock:
             server = self._servers.setdefault(update.server_id, [0, {}])
@@ -31,7 +37,7 @@ class MarkerMirror:
                 if change.name in server[1]:
                     server[1][change.name].header, server[1][change.name].pose = change.header, change.pose
 
-    def fill(self, init):
+    def fill(self, init: Any) -> Any:
         """Lay copies of all markers, and the id and number of the server that spoke last, over an empty
         InteractiveMarkerInit.
         """
@@ -43,7 +49,7 @@ class MarkerMirror:
         return init
 
 
-def multiplied(a, b):
+def multiplied(a: Quaternion, b: Quaternion) -> Quaternion:
     """The product of two quaternions (x, y, z, w)."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
@@ -51,7 +57,7 @@ def multiplied(a, b):
             aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
 
 
-def moved(place, turn, position, orientation):
+def moved(place: Point, turn: Quaternion, position: Point, orientation: Quaternion) -> tuple[Point, Quaternion]:
     """A pose (position, quaternion x y z w) in the parent frame of a transform with translation ``place``, rotation
     ``turn``.
     """

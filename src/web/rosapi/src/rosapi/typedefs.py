@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Message types as lists of plain definitions. No ROS: classes are asked from the caller."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from web_bridge.values import RANGES, parts_of
 
@@ -22,7 +25,7 @@ class Definition(NamedTuple):
 _TIME = (["secs", "nsecs"], ["int32", "int32"], [-1, -1], ["0", "0"], [], [])
 
 
-def definitions(cls, class_of):
+def definitions(cls: type, class_of: Callable[..., Any]) -> list[Definition]:
     """The definition of a message class, and after it those of the types in its fields, each once.
 
     ``class_of(type name)`` returns a message class.
@@ -32,7 +35,7 @@ def definitions(cls, class_of):
     return list(found.values())
 
 
-def _add(name, cls, class_of, found):
+def _add(name: str, cls: type | None, class_of: Callable[[Any], Any], found: dict[str, Definition]) -> None:
     if name in found:
         return
     if cls is None:
@@ -57,7 +60,7 @@ def _add(name, cls, class_of, found):
             _add(base, class_of(base), class_of, found)
 
 
-def _example(value, base, length):
+def _example(value: Any, base: str, length: int) -> str:
     if length >= 0:
         return "[]"
     return "{}" if base in ("time", "duration") or base not in _PLAIN else str(value)

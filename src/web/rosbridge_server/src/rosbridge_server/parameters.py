@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters of rosbridge_websocket, by their published names. No ROS."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from web_bridge.access import Rules, patterns_of
 from web_bridge.parameters import Endpoint, ParameterError, access_of, number, port_of, switch, tls_of, warnings_of
@@ -17,7 +20,7 @@ class ServerParameters(NamedTuple):
     warnings: tuple
 
 
-def read_parameters(get):
+def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
     """``get(name, default)`` returns a parameter of the node. Raises ParameterError."""
     address, access = str(get("address", "localhost")), access_of(get)
     _refuse_what_is_not_served(get)
@@ -32,7 +35,7 @@ def read_parameters(get):
     return ServerParameters(endpoint, bridge, socket, warnings_of(address, access))
 
 
-def _refuse_what_is_not_served(get):
+def _refuse_what_is_not_served(get: Callable[[str, Any], Any]) -> None:
     if switch(get, "authenticate", False):
         raise ParameterError("~authenticate asks for rosauth, which this server does not use; set ~token, and let "
                              "clients connect to ws://host:port/?token=…")

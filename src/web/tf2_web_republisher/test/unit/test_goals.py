@@ -46,7 +46,7 @@ class Handle:
 
 @pytest.fixture
 def served(monkeypatch):
-    monkeypatch.setattr(node.actionlib, "ActionServer", Server)
+    monkeypatch.setattr(node, "ActionServer", Server)
     monkeypatch.setattr(node.rospy, "Service", lambda *_: None)
     monkeypatch.setattr(node.tf2_ros, "TransformListener", lambda _: None)
     monkeypatch.setattr(node.rospy, "Time", lambda _: None)

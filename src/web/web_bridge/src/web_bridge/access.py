@@ -5,11 +5,14 @@ A handshake of a WebSocket is not subject to a browser's same-origin policy: any
 a server on that user's machine. A page is therefore only let in from this machine's own names, or from origins that the
 operator lists.
 """
+from __future__ import annotations
+
 import fnmatch
 import hmac
 import ipaddress
 import socket
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 from web_bridge.errors import Refused, shown
@@ -30,12 +33,12 @@ class Rules(NamedTuple):
     services: tuple = ()
     may_act: bool = True
 
-    def check_topic(self, topic):
+    def check_topic(self, topic: str) -> None:
         """Raise Refused unless a pattern allows the topic."""
         if self.topics and not any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics):
             raise Refused("topics_glob of this server does not allow the topic %s" % topic)
 
-    def check_service(self, service):
+    def check_service(self, service: str) -> None:
         """Raise Refused unless a pattern allows the service; rosapi's are always allowed."""
         patterns = (*self.services, "/rosapi/*")
         if self.services and not any(fnmatch.fnmatchcase(service, pattern) for pattern in patterns):
@@ -43,34 +46,34 @@ class Rules(NamedTuple):
         if not self.may_act and (not service.startswith("/rosapi/") or service.startswith(_CHANGING)):
             raise Refused("the view token does not allow to call %s" % service)
 
-    def check_may_act(self, what):
+    def check_may_act(self, what: str) -> None:
         """Raise Refused for a client that may only watch."""
         if not self.may_act:
             raise Refused("the view token does not allow to %s" % what)
 
 
-def is_token(name):
+def is_token(name: str) -> bool:
     """Is a parameter of this name a server's token? A client that may only watch must not read how to become one that
     acts. The name decides, because a server may have been started with one of the two.
     """
     return name.rpartition("/")[2] in _TOKENS
 
 
-def without_tokens(value):
+def without_tokens(value: Any) -> Any:
     """A parameter's value without the tokens of servers, at any depth."""
     if not isinstance(value, dict):
         return value
     return {name: without_tokens(part) for name, part in value.items() if not is_token(name)}
 
 
-def patterns_of(text):
+def patterns_of(text: str) -> tuple[str, ...]:
     """The list in a parameter such as "['/robot/*', '/camera']"; "[*]" and "[]" allow everything, and give ()."""
     parts = [part.strip().strip("'\"").strip() for part in text.strip().removeprefix("[").removesuffix("]").split(",")]
     found = tuple(part for part in parts if part)
     return () if "*" in found else found
 
 
-def origin_of(address):
+def origin_of(address: str) -> str:
     """The origin of a page's address; a text that is none, such as "null", as it is."""
     try:
         parts = urlsplit(address)
@@ -79,7 +82,7 @@ def origin_of(address):
     return "%s://%s" % parts[:2] if parts.netloc else address
 
 
-def is_loopback(name):
+def is_loopback(name: str) -> bool:
     """Is this host name or address (no port) one of the loopback device?"""
     if name.rstrip(".").lower() == "localhost":
         return True
@@ -89,7 +92,7 @@ def is_loopback(name):
         return False
 
 
-def host_of(text):
+def host_of(text: str) -> str:
     """The host in "host:port", "[::1]:80" or a URL's origin, in lower case; "" where there is none."""
     try:
         return (urlsplit(text if "//" in text else "//" + text).hostname or "").lower()
@@ -105,17 +108,18 @@ class Access:
     machine.
     """
 
-    def __init__(self, tokens=None, origins=(), null_origin=False, names=None):
+    def __init__(self, tokens: dict[str, bool] | None = None, origins: Sequence[str] = (), null_origin: bool = False,
+                 names: list[str] | None = None) -> None:
         self._tokens = dict(tokens or {})
         self._origins = {origin.rstrip("/").lower() for origin in origins}
         self._null_origin = null_origin
         self._names = {name.lower() for name in (own_names() if names is None else names)}
 
     @property
-    def needs_token(self):
+    def needs_token(self) -> bool:
         return bool(self._tokens)
 
-    def check_origin(self, origin, host):
+    def check_origin(self, origin: str | None, host: str) -> None:
         """Raise Refused unless a page of this origin (a header's text, None: no browser) may connect to this ``host``
         header.
         """
@@ -131,7 +135,7 @@ class Access:
             raise Refused("a page of %s may not connect to %s; the parameter ~allowed_origins lists those that may"
                           % (origin, host))
 
-    def check_host(self, host):
+    def check_host(self, host: str) -> None:
         """Raise Refused unless the ``host`` header of a request without an origin names this machine; who has a token
         may use any name.
         """
@@ -141,11 +145,11 @@ class Access:
             raise Refused("%s is no name of this machine that is known; use its address, or list http://%s in the "
                           "parameter ~allowed_origins" % (shown(host), host))
 
-    def _is_own(self, server):
+    def _is_own(self, server: str) -> bool:
         """Is it a name of this machine? A foreign name that resolves to it must not pass as its own."""
         return is_loopback(server) or server in self._names or _is_address(server)
 
-    def may_act(self, token):
+    def may_act(self, token: str) -> bool:
         """Whether a client with this token ("": none) may act. Raises Refused where the token is wrong."""
         if not self._tokens:
             return True
@@ -155,7 +159,7 @@ class Access:
         raise Refused("the token is wrong" if token else "a token is needed: ws://host:port/?token=…")
 
 
-def _is_address(name):
+def _is_address(name: str) -> bool:
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -163,7 +167,7 @@ def _is_address(name):
     return True
 
 
-def own_names():
+def own_names() -> set[str]:
     """The names under which pages of this machine are opened."""
     name = socket.gethostname()
     return {name, name + ".local", name.partition(".")[0]}

@@ -2,20 +2,29 @@
 """Serialized messages to objects, and objects to the forms that clients read. No ROS: classes are asked from the
 caller.
 """
+from __future__ import annotations
+
 import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from web_bridge.errors import BridgeError, UnknownType
 from web_bridge.values import CborForm, JsonForm, Reader, Writer
 
+if TYPE_CHECKING:
+    from genpy import Message, Time
 
-def serialized(message):
+    from web_bridge.feeds import Arrival
+
+
+def serialized(message: Message) -> bytes:
     """The bytes of a message, as on the wire. Raises what generated code raises."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
 
 
-def deserialized(empty, data):
+def deserialized(empty: Any, data: bytes) -> Message:
     """An empty message filled from all of these bytes. Raises BridgeError."""
     try:
         message = empty.deserialize(data)
@@ -28,7 +37,7 @@ def deserialized(empty, data):
     return message
 
 
-def are_the_same(class_of, one, other):
+def are_the_same(class_of: Callable[[str], type], one: str, other: str) -> bool:
     """Whether two names stand for the same messages, as rospy decides it: by the MD5 of their definitions.
 
     ``class_of(type name)`` returns a message class or raises UnknownType; a name that is not known here is the same as
@@ -43,13 +52,13 @@ def are_the_same(class_of, one, other):
 class Codec:
     """``class_of(type name)`` returns a message class or raises UnknownType; ``now()`` the time for headers."""
 
-    def __init__(self, class_of, now):
+    def __init__(self, class_of: Callable[[str], type], now: Callable[[], Time]) -> None:
         self.class_of = class_of
         self.json = Writer(class_of, JsonForm())
         self.cbor = Writer(class_of, CborForm())
         self.reader = Reader(class_of, now)
 
-    def decoded(self, arrival):
+    def decoded(self, arrival: Arrival) -> Message:
         """The message of an :class:`web_bridge.feeds.Arrival`. Raises BridgeError."""
         cls = self.class_of(arrival.type)
         if arrival.md5 != cls._md5sum:

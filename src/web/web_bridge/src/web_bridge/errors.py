@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors for a client whose request cannot be served."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class BridgeError(ValueError):
     """The root of this package's errors; the text is a sentence for the client."""
@@ -30,7 +34,7 @@ class ServiceFailed(BridgeError):
     """A service that is not there, or that answered with an error."""
 
 
-def shown(value, length=60):
+def shown(value: Any, length: int = 60) -> str:
     """A value as an error text quotes it: its repr, cut to ``length`` characters."""
     text = repr(value[:length] if isinstance(value, str | bytes | list) else value)
     return text if len(text) <= length else text[:length] + "…"

@@ -2,16 +2,28 @@
 """Topics on their way to clients: one subscription for all, each message converted once for each form that somebody
 wants.
 
-No ROS: the graph (web_bridge.session says which methods it has) is an argument.
+No ROS: the :class:`web_bridge.graph.Graph` is an argument.
 """
+from __future__ import annotations
+
 import threading
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from command_line.options import counted
 from web_bridge.errors import BridgeError
 from web_bridge.frames import cbor, json_text, packed_png, split
 
+if TYPE_CHECKING:
+    from genpy import Message
+
+    from web_bridge.codec import Codec
+    from web_bridge.graph import Graph, Subscription
+    from web_bridge.loop_thread import Later
+    from web_bridge.session import Session
+
+_Message = TypeVar("_Message")
 #: From the weakest to the strongest.
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 #: Subscriptions of one client to one topic, which differ in their ids; each change looks at all of them.
@@ -26,7 +38,7 @@ class Arrival(NamedTuple):
     data: bytes
     type: str
     md5: str
-    received: tuple
+    received: tuple[int, int]
     publisher: str = ""
     is_latched: bool = False
 
@@ -39,7 +51,7 @@ class Wish(NamedTuple):
     fragment_size: int = 0
     compression: str = "none"
 
-    def joined(self, other):
+    def joined(self, other: Wish) -> Wish:
         """The wish of a client with both subscriptions to one topic."""
         sizes = [size for size in (self.fragment_size, other.fragment_size) if size]
         return Wish(min(self.throttle_rate, other.throttle_rate), min(self.queue_length, other.queue_length),
@@ -49,15 +61,16 @@ class Wish(NamedTuple):
 class Packet:
     """One message of a topic; converts itself when a form is first asked for. Not for two threads at a time."""
 
-    def __init__(self, topic, arrival, codec):
+    def __init__(self, topic: str, arrival: Arrival, codec: Codec) -> None:
         self._topic = topic
         self._arrival = arrival
         self._codec = codec
-        self._message = self._text = None
-        self._frames = {}
+        self._message: Message | None = None
+        self._text: str | None = None
+        self._frames: dict[tuple[str, int], Sequence[str | bytes]] = {}
         self._lock = threading.Lock()
 
-    def frames(self, compression, fragment_size):
+    def frames(self, compression: str, fragment_size: int) -> Sequence[str | bytes]:
         """The frames of a form: texts, or one bytes object. Raises BridgeError where the message cannot be read."""
         form = (compression, 0 if compression.startswith("cbor") else fragment_size)
         with self._lock:
@@ -65,7 +78,7 @@ class Packet:
                 self._frames[form] = self._made(*form)
             return self._frames[form]
 
-    def _made(self, compression, fragment_size):
+    def _made(self, compression: str, fragment_size: int) -> Sequence[str | bytes]:
         if compression == "cbor-raw":
             secs, nsecs = self._arrival.received
             return [self._publish_cbor({"bytes": self._arrival.data, "secs": secs, "nsecs": nsecs})]
@@ -78,7 +91,7 @@ class Packet:
             self._text = json_text({"op": "publish", "topic": self._topic, "msg": values})
         return split(packed_png(self._text) if compression == "png" else self._text, fragment_size)
 
-    def _publish_cbor(self, values):
+    def _publish_cbor(self, values: dict[str, Any]) -> bytes:
         return cbor({"op": "publish", "topic": self._topic, "msg": values})
 
 
@@ -87,20 +100,21 @@ class ClientFeed:
     ``cancel()``.
     """
 
-    def __init__(self, client, topic, later, clock):
+    def __init__(self, client: Session, topic: str, later: Callable[[float, Callable[[], None]], Later],
+                 clock: Callable[[], float]) -> None:
         self._client = client
         self._topic = topic
         self._later = later
         self._clock = clock
         self._lock = threading.Lock()
-        self._wishes = {}
-        self._wish = None
+        self._wishes: dict[str | None, Wish] = {}
+        self._wish: Wish | None = None
         self._due = 0.0
-        self._waiting = deque()
-        self._timer = None
+        self._waiting: deque[Packet] = deque()
+        self._timer: Later | None = None
         self._told = ""
 
-    def add(self, name, wish):
+    def add(self, name: str | None, wish: Wish) -> None:
         """A subscription; one of the same name is replaced. Raises BridgeError for one too many."""
         with self._lock:
             if name not in self._wishes and len(self._wishes) >= MAX_OF_A_TOPIC:
@@ -109,7 +123,7 @@ class ClientFeed:
             self._wishes[name] = wish
             self._join()
 
-    def remove(self, name):
+    def remove(self, name: str | None) -> bool:
         """Forget one subscription (None: all); returns whether one is left."""
         with self._lock:
             if name is None:
@@ -118,7 +132,7 @@ class ClientFeed:
             self._join()
             return bool(self._wishes)
 
-    def _join(self):
+    def _join(self) -> None:
         self._wish = None
         for wish in self._wishes.values():
             self._wish = wish if self._wish is None else self._wish.joined(wish)
@@ -127,14 +141,14 @@ class ClientFeed:
             self._timer.cancel()
             self._timer = None
 
-    def send(self, packet):
+    def send(self, packet: Packet) -> None:
         """Send a message now, whatever the throttle says."""
         with self._lock:
             wish = self._wish
         if wish is not None:
             self._send(packet, wish)
 
-    def offer(self, packet):
+    def offer(self, packet: Packet) -> None:
         """Send a message now, later or not at all."""
         with self._lock:
             wish = self._wish
@@ -150,7 +164,7 @@ class ClientFeed:
             self._due = now + wish.throttle_rate / 1000
         self._send(packet, wish)
 
-    def _next(self):
+    def _next(self) -> None:
         with self._lock:
             self._timer = None
             if not self._waiting or self._wish is None:
@@ -161,7 +175,7 @@ class ClientFeed:
                 self._timer = self._later(wish.throttle_rate / 1000, self._next)
         self._send(packet, wish)
 
-    def _send(self, packet, wish):
+    def _send(self, packet: Packet, wish: Wish) -> None:
         try:
             frames = packet.frames(wish.compression, wish.fragment_size)
         except BridgeError as error:
@@ -173,22 +187,22 @@ class ClientFeed:
         self._client.outgoing.offer(frames, self._topic, wish.queue_length)
 
 
-class Latched:
+class Latched(Generic[_Message]):
     """The last latched message of each publisher of a topic, for clients that subscribe later. Its user locks."""
 
-    def __init__(self):
-        self._of = {}  # publisher -> message
+    def __init__(self) -> None:
+        self._of: dict[str, _Message] = {}  # publisher -> message
 
-    def keep(self, arrival, message):
+    def keep(self, arrival: Arrival, message: _Message) -> None:
         """``message``: what :meth:`of` gives back for this arrival."""
         if arrival.is_latched and len(arrival.data) <= LARGEST_LATCHED:
             self._of[arrival.publisher] = message
         else:
             self._of.pop(arrival.publisher, None)
 
-    def of(self, subscription):
+    def of(self, subscription: Subscription | None) -> list[_Message]:
         """The messages of publishers that are still connected."""
-        if self._of:
+        if self._of and subscription is not None:
             alive = subscription.publishers()
             self._of = {name: message for name, message in self._of.items() if name in alive}
         return list(self._of.values())
@@ -197,17 +211,18 @@ class Latched:
 class Feed:
     """One topic for all clients."""
 
-    def __init__(self, topic, codec, later, clock):
+    def __init__(self, topic: str, codec: Codec, later: Callable[[float, Callable[[], None]], Later],
+                 clock: Callable[[], float]) -> None:
         self._topic = topic
         self._codec = codec
         self._later = later
         self._clock = clock
         self._lock = threading.Lock()
-        self._clients = {}
-        self._latched = Latched()
-        self.subscription = None
+        self._clients: dict[Session, ClientFeed] = {}
+        self._latched: Latched[Packet] = Latched()
+        self.subscription: Subscription | None = None
 
-    def arrived(self, arrival):
+    def arrived(self, arrival: Arrival) -> None:
         """A message of ROS; on the thread that received it."""
         packet = Packet(self._topic, arrival, self._codec)
         with self._lock:
@@ -216,7 +231,7 @@ class Feed:
         for client in clients:
             client.offer(packet)
 
-    def add(self, client, name, wish):
+    def add(self, client: Session, name: str | None, wish: Wish) -> None:
         """A subscription of a client; each gets the latched messages of publishers that are still there."""
         with self._lock:
             share = self._clients.get(client)
@@ -227,7 +242,7 @@ class Feed:
         for packet in packets:
             share.send(packet)
 
-    def remove(self, client, name=None):
+    def remove(self, client: Session, name: str | None = None) -> bool:
         """Forget one subscription of a client (None: all of its). Returns whether the client had any."""
         with self._lock:
             share = self._clients.get(client)
@@ -236,7 +251,7 @@ class Feed:
             return share is not None
 
     @property
-    def is_idle(self):
+    def is_idle(self) -> bool:
         with self._lock:
             return not self._clients
 
@@ -244,15 +259,16 @@ class Feed:
 class Feeds:
     """The topics that clients hear. Changes of subscriptions come one at a time; messages from any thread."""
 
-    def __init__(self, graph, codec, later, clock):
+    def __init__(self, graph: Graph, codec: Codec, later: Callable[[float, Callable[[], None]], Later],
+                 clock: Callable[[], float]) -> None:
         self._graph = graph
         self._codec = codec
         self._later = later
         self._clock = clock
         self._lock = threading.Lock()
-        self._feeds = {}
+        self._feeds: dict[str, Feed] = {}
 
-    def subscribe(self, client, name, topic, type_name, wish):
+    def subscribe(self, client: Session, name: str | None, topic: str, type_name: str | None, wish: Wish) -> None:
         """Raises BridgeError, for a type that is not the topic's, for instance."""
         with self._lock:
             feed = self._feeds.get(topic)
@@ -272,7 +288,7 @@ class Feeds:
             # Not before the subscription has worked: the next client tries again.
             self._feeds[topic] = feed
 
-    def unsubscribe(self, client, topic, name=None):
+    def unsubscribe(self, client: Session, topic: str, name: str | None = None) -> bool:
         """Returns whether the client had a subscription to the topic. The last client takes the subscription along."""
         with self._lock:
             feed = self._feeds.get(topic)
@@ -280,10 +296,11 @@ class Feeds:
                 return False
             if feed.is_idle:
                 del self._feeds[topic]
-                feed.subscription.close()
+                if feed.subscription is not None:
+                    feed.subscription.close()
             return True
 
-    def forget(self, client):
+    def forget(self, client: Session) -> None:
         """End all subscriptions of a client."""
         with self._lock:
             topics = list(self._feeds)
@@ -291,6 +308,6 @@ class Feeds:
             self.unsubscribe(client, topic)
 
     @property
-    def topics(self):
+    def topics(self) -> list[str]:
         with self._lock:
             return sorted(self._feeds)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The fields of a client's operation, checked."""
+from __future__ import annotations
+
+from typing import Any
+
 from web_bridge.errors import FieldError, shown
 
 #: A number: milliseconds, messages or characters of a client's wish, of at most so many.
@@ -8,13 +12,13 @@ _LARGEST_NUMBER = 1e12
 _NEEDED = object()
 
 
-def type_field(operation, default=_NEEDED):
+def type_field(operation: dict[str, Any], default: Any = _NEEDED) -> Any:
     """The field ``type``; rosbridge_suite reads "/std_msgs//String" as well. Raises FieldError."""
     given = field(operation, "type", str, default)
     return given and "/".join(part for part in given.split("/") if part)
 
 
-def field(operation, name, kind, default=_NEEDED):
+def field(operation: dict[str, Any], name: str, kind: Any, default: Any = _NEEDED) -> Any:
     """A field of an operation (dict); ``kind``: a type, or NUMBER. JSON's null counts as missing. Raises FieldError."""
     value = operation.get(name)
     if value is None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of a WebSocket to operations (dicts) and back: JSON, CBOR, PNG, fragments. No ROS."""
+from __future__ import annotations
+
 import base64
 import binascii
 import itertools
@@ -8,6 +10,8 @@ import math
 import struct
 import zlib
 from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import cbor2
 
@@ -36,11 +40,11 @@ _DECODER = json.JSONDecoder()
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def json_text(values):
+def json_text(values: dict[str, Any]) -> str:
     return json.dumps(values, separators=(",", ":"))
 
 
-def read_frame(frame):
+def read_frame(frame: str | bytes) -> list[dict[str, Any]]:
     """The operations of one frame: a text with one or more JSON objects, or bytes with one object in CBOR (or JSON).
 
     Raises FrameError.
@@ -55,7 +59,7 @@ def read_frame(frame):
     return _read_json(frame)
 
 
-def _read_json(text):
+def _read_json(text: str) -> list[dict[str, Any]]:
     if text.count("[") + text.count("{") > MAX_CONTAINERS:
         raise FrameError("a frame with more than %d lists and objects" % MAX_CONTAINERS)
     found, at = [], 0
@@ -77,8 +81,8 @@ def _read_json(text):
     return found
 
 
-def _refused_tag(number):
-    def refuse(value, _immutable):
+def _refused_tag(number: int) -> Callable[..., Any]:
+    def refuse(value: Any, _immutable: bool):
         # It raises: the tag is none of a numeric array.
         return from_tag(cbor2.CBORTag(number, value))
     return refuse
@@ -87,7 +91,7 @@ def _refused_tag(number):
 _REFUSED_TAGS = {number: _refused_tag(number) for number in _CBOR2_TAGS}
 
 
-def _read_cbor(data):
+def _read_cbor(data: bytes) -> dict[str, Any]:
     _limit_containers(data)
     try:
         return _operation(cbor2.loads(data, tag_hook=lambda tag, _immutable: from_tag(tag),
@@ -101,7 +105,7 @@ def _read_cbor(data):
         raise FrameError("a binary frame of %d bytes is no CBOR object: %s" % (len(data), error)) from None
 
 
-def _limit_containers(data):
+def _limit_containers(data: bytes) -> None:
     """Raise FrameError where CBOR ``data`` has too many lists and objects; else leave everything to the decoder."""
     if len(data) - len(data.translate(None, _CONTAINER_HEADS)) <= MAX_CONTAINERS:
         return  # so many bytes at most begin one
@@ -121,13 +125,13 @@ def _limit_containers(data):
                              % (MAX_CONTAINERS, _MAX_COUNTED))
 
 
-def _operation(value):
+def _operation(value: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise FrameError("%s is no JSON object" % shown(value))
     return value
 
 
-def png_of(text):
+def png_of(text: str) -> bytes:
     """A text as the pixels of an RGB picture, filled up with newlines: bytes of a PNG file."""
     data = text.encode("utf-8")
     pixels = math.ceil(len(data) / 3)
@@ -141,11 +145,11 @@ def png_of(text):
     return _PNG + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(rows, 3)) + _chunk(b"IEND", b"")
 
 
-def _chunk(kind, data):
+def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def text_of_png(data, largest):
+def text_of_png(data: bytes, largest: int) -> str:
     """The text of a picture that :func:`png_of` or another rosbridge program made; ``largest`` in bytes. Raises
     FrameError.
     """
@@ -169,7 +173,7 @@ def text_of_png(data, largest):
         raise FrameError("a picture of %d bytes cannot be read: %s" % (len(data), error)) from None
 
 
-def _chunks(data):
+def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
     if data[:8] != _PNG:
         raise ValueError("it is no PNG file")
     at = 8
@@ -182,7 +186,7 @@ def _chunks(data):
 _NUMBERS = itertools.count()
 
 
-def split(text, size):
+def split(text: str, size: int) -> list[str]:
     """A text as fragments (JSON texts) whose data have ``size`` characters at most; itself where it is not longer, or
     ``size`` is 0. Raises FrameError for too many.
     """
@@ -201,14 +205,16 @@ class Fragments:
     ``timeout_s``.
     """
 
-    def __init__(self, clock, timeout_s):
+    def __init__(self, clock: Callable[[], float], timeout_s: float) -> None:
         self._clock = clock
         self._timeout_s = timeout_s
         self._pending = OrderedDict()  # id -> [begin, total, {num: data}, bytes]
 
-    def add(self, operation):
+    def add(self, operation: dict[str, Any]) -> str | None:
         """The whole text when its last fragment comes, else None. Raises FrameError."""
-        name, data, num, total = (operation.get(key) for key in ("id", "data", "num", "total"))
+        name, data = operation.get("id"), operation.get("data")
+        num: Any = operation.get("num")
+        total: Any = operation.get("total")
         if not isinstance(name, str | int) or not isinstance(data, str):
             raise FrameError("a fragment needs id and data, a text")
         # 0.11.17 itself sends total as a float.
@@ -228,7 +234,7 @@ class Fragments:
             return "".join(entry[2][i] for i in range(int(total)))
         return None
 
-    def _forget(self):
+    def _forget(self) -> None:
         limit = self._clock() - self._timeout_s
         while self._pending:
             oldest = next(iter(self._pending.values()))
@@ -238,11 +244,11 @@ class Fragments:
             self._pending.popitem(last=False)
 
 
-def _whole(number):
+def _whole(number: Any) -> bool:
     return type(number) in (int, float) and number == number // 1
 
 
-def from_base64(text):
+def from_base64(text: Any) -> bytes:
     """Bytes of a base64 text; raises FrameError."""
     try:
         return binascii.a2b_base64(text)
@@ -250,7 +256,7 @@ def from_base64(text):
         raise FrameError("data is no base64 text: %s" % error) from None
 
 
-def packed_png(text, name=None):
+def packed_png(text: str, name: str | None = None) -> str:
     """A text as an operation png, itself a JSON text."""
     operation = {"op": "png", "data": base64.b64encode(png_of(text)).decode("ascii")}
     if name is not None:
@@ -258,5 +264,5 @@ def packed_png(text, name=None):
     return json_text(operation)
 
 
-def cbor(values):
+def cbor(values: dict[str, Any]) -> bytes:
     return cbor2.dumps(values)

@@ -5,6 +5,8 @@ sockets.
 The other server is not trusted: its pages have the same origin as all pages of this one, so an answer must not set
 cookies for other paths, nor register workers for them.
 """
+from __future__ import annotations
+
 from http.cookies import CookieError, SimpleCookie
 
 from tornado.httputil import HTTPHeaders, HTTPInputError
@@ -29,12 +31,13 @@ class BadAnswer(Exception):
     """An answer that cannot be passed on; the text says why."""
 
 
-def is_upgrade(headers):
+def is_upgrade(headers: HTTPHeaders) -> bool:
     """Does a request want a WebSocket?"""
     return headers.get("Upgrade", "").lower() == "websocket"
 
 
-def request_head(method, uri, headers, length, upgrade=False, own_cookie=""):
+def request_head(method: str, uri: str, headers: HTTPHeaders, length: int, upgrade: bool = False,
+                 own_cookie: str = "") -> bytes:
     """The head of a request as bytes. uri: path and query; length: of the body [bytes]; own_cookie: name of the cookie
     that is not passed on.
 
@@ -54,13 +57,13 @@ def request_head(method, uri, headers, length, upgrade=False, own_cookie=""):
     return "\r\n".join([*lines, "", ""]).encode("utf-8", "surrogateescape")
 
 
-def without_cookie(text, name):
+def without_cookie(text: str, name: str) -> str:
     """A header "Cookie" without the cookie of this name."""
     parts = [part.strip() for part in text.split(";")]
     return "; ".join(part for part in parts if part and part.partition("=")[0].strip() != name)
 
 
-def answer_head(data):
+def answer_head(data: bytes) -> tuple[int, HTTPHeaders]:
     """(status, HTTPHeaders) of an answer's head as bytes, up to the empty line. Raises BadAnswer."""
     first, _, rest = data.decode("latin-1").partition("\r\n")
     words = first.split(None, 2)
@@ -75,7 +78,7 @@ def answer_head(data):
     return int(words[1]), headers
 
 
-def passed_on(headers, outside, inside="", own_cookie=""):
+def passed_on(headers: HTTPHeaders, outside: str, inside: str = "", own_cookie: str = "") -> list[tuple[str, str]]:
     """The (name, value) of an answer's headers for the client.
 
     outside, inside: the path of the other server as clients see it, and as it does itself, such as "/anna" and "";
@@ -90,7 +93,7 @@ def passed_on(headers, outside, inside="", own_cookie=""):
     return found + [("Set-Cookie", cookie) for cookie in narrowed if cookie]
 
 
-def _narrow(text, outside, own_cookie):
+def _narrow(text: str, outside: str, own_cookie: str) -> str:
     """A cookie of the other server, for its own path; "" for one that cannot be read, or of the name own_cookie."""
     try:
         cookies = SimpleCookie(text)
@@ -105,7 +108,7 @@ def _narrow(text, outside, own_cookie):
     return cookie.OutputString()
 
 
-def upgrade_text(headers):
+def upgrade_text(headers: HTTPHeaders) -> bytes:
     """The head of the answer that makes a WebSocket of the client's connection, from the headers of
     the answer."""
     lines = ["HTTP/1.1 101 Switching Protocols", "Upgrade: websocket", "Connection: Upgrade"]
@@ -113,7 +116,7 @@ def upgrade_text(headers):
     return "\r\n".join([*lines, "", ""]).encode("latin-1")
 
 
-def is_heartbeat(chunk):
+def is_heartbeat(chunk: bytes) -> bool:
     """Are these bytes of a WebSocket's client nothing but heartbeats of the page, and pongs?"""
     place = 0
     while place + 2 <= len(chunk):

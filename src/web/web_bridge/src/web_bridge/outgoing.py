@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages that wait for one client: bounded, the oldest messages dropped. No ROS, any thread."""
+from __future__ import annotations
+
 import threading
 from collections import OrderedDict, deque
+from collections.abc import Callable, Sequence
 
 #: Messages of topics that wait for one client [bytes].
 DROPPABLE_BYTES = 16 << 20
@@ -17,7 +20,8 @@ class OutgoingBuffer:
     always stays. Answers are kept; beyond ``kept_bytes`` the buffer is ``overflowed`` and takes nothing more.
     """
 
-    def __init__(self, wake, droppable_bytes=DROPPABLE_BYTES, kept_bytes=KEPT_BYTES):
+    def __init__(self, wake: Callable[[], object], droppable_bytes: int = DROPPABLE_BYTES,
+                 kept_bytes: int = KEPT_BYTES) -> None:
         self._wake = wake
         self._limits = (droppable_bytes, kept_bytes)
         self._lock = threading.Lock()
@@ -32,11 +36,11 @@ class OutgoingBuffer:
         self.closed = False
 
     @property
-    def kept_bytes(self):
+    def kept_bytes(self) -> int:
         """Answers that wait [bytes]."""
         return self._sizes[1]
 
-    def keep(self, frames):
+    def keep(self, frames: Sequence[str | bytes]) -> None:
         """Append an entry that is never dropped."""
         size = sum(map(len, frames))
         with self._lock:
@@ -48,7 +52,7 @@ class OutgoingBuffer:
             self.overflowed = self._sizes[1] > self._limits[1]
         self._wake_if_idle()
 
-    def offer(self, frames, key=None, at_most=0):
+    def offer(self, frames: Sequence[str | bytes], key: str | None = None, at_most: int = 0) -> None:
         """Append an entry that may be dropped; of a key at most ``at_most`` entries wait (0: no such limit)."""
         size = sum(map(len, frames))
         with self._lock:
@@ -66,7 +70,7 @@ class OutgoingBuffer:
                 self._drop(next(iter(self._droppable)))
         self._wake_if_idle()
 
-    def take(self):
+    def take(self) -> Sequence[str | bytes] | None:
         """The frames of the oldest entry, or None."""
         with self._lock:
             number = next(iter(self._droppable), None)
@@ -77,7 +81,7 @@ class OutgoingBuffer:
             self._is_idle = number is None
             return None if number is None else self._remove(number)
 
-    def close(self):
+    def close(self) -> None:
         """Forget everything, and accept nothing more."""
         with self._lock:
             self.closed = True
@@ -87,17 +91,17 @@ class OutgoingBuffer:
             self._sizes = [0, 0]
         self._wake()
 
-    def _wake_if_idle(self):
+    def _wake_if_idle(self) -> None:
         with self._lock:
             is_idle, self._is_idle = self._is_idle, False
         if is_idle:
             self._wake()
 
-    def _drop(self, number):
+    def _drop(self, number: int) -> None:
         self._remove(number)
         self.dropped += 1
 
-    def _remove(self, number):
+    def _remove(self, number: int) -> Sequence[str | bytes]:
         frames, size, key = self._droppable.pop(number)
         self._sizes[0] -= size
         if key is not None:

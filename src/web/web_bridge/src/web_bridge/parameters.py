@@ -3,7 +3,10 @@
 
 ``get(name, default)`` returns a parameter of the node. All functions raise ParameterError.
 """
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from web_bridge.access import Access, is_loopback
 
@@ -23,7 +26,7 @@ class Endpoint(NamedTuple):
     retry_s: float = 5.0
 
 
-def switch(get, name, default):
+def switch(get: Callable[[Any, Any], Any], name: str, default: bool) -> bool:
     value = get(name, default)
     if value in (None, ""):
         return default
@@ -32,7 +35,7 @@ def switch(get, name, default):
     return value
 
 
-def number(get, name, default):
+def number(get: Callable[[Any, Any], Any], name: str, default: float) -> float:
     """A number; nothing and "None", as published launch files write it, are the default."""
     value = get(name, default)
     if value in (None, "", "None"):
@@ -45,14 +48,14 @@ def number(get, name, default):
     return float(value)
 
 
-def port_of(get, default):
+def port_of(get: Callable[..., Any], default: int) -> int:
     port = int(number(get, "port", default))
     if not 0 <= port <= 65535:
         raise ParameterError("~port is %d; 0 to 65535 is possible" % port)
     return port
 
 
-def tls_of(get, name):
+def tls_of(get: Callable[[str, str], Any], name: str) -> tuple[str, str] | None:
     """(certfile, keyfile) where the switch ``name`` is on, else None."""
     if not switch(get, name, False):
         return None
@@ -62,7 +65,7 @@ def tls_of(get, name):
     return certfile, str(get("keyfile", ""))
 
 
-def access_of(get):
+def access_of(get: Callable[[str, str], Any]) -> Access:
     """~token, ~view_token, ~allowed_origins, ~websocket_null_origin."""
     may_act, may_watch = str(get("token", "")), str(get("view_token", ""))
     if may_watch and not may_act:
@@ -74,7 +77,7 @@ def access_of(get):
                   switch(get, "websocket_null_origin", False) or bool(tokens))
 
 
-def warnings_of(address, access, risk="move the robot"):
+def warnings_of(address: str, access: Access, risk: str = "move the robot") -> tuple[str, ...]:
     """Warnings for the node's log about an address and an Access; ``risk``: what everybody could do there."""
     if access.needs_token or is_loopback(address):
         return ()

@@ -4,13 +4,19 @@
 Who may ask is decided before a connection to the other server is made. Its answers come by HTTP/1.0, so they end with
 their connection and are never in pieces.
 """
+from __future__ import annotations
+
 import asyncio
 import contextlib
+from typing import TYPE_CHECKING, cast
 from urllib.parse import urlsplit
 
 from tornado import httputil, iostream, web
 
 from web_bridge import http_text
+
+if TYPE_CHECKING:
+    from tornado.http1connection import HTTP1Connection
 
 _CHUNK = 65536
 #: A request's body; the largest are recordings and notebooks [bytes].
@@ -20,7 +26,7 @@ ANSWER_S = 60.0
 _METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 
 
-def is_foreign(request):
+def is_foreign(request: httputil.HTTPServerRequest) -> bool:
     """Does a page of another origin make this request?"""
     origin = request.headers.get("Origin")
     return origin is not None and urlsplit(origin).netloc != request.host
@@ -29,13 +35,13 @@ def is_foreign(request):
 class PlainHandler(web.RequestHandler):
     """Answers that are not kept and tell nobody of their address; refusals are plain text."""
 
-    def set_default_headers(self):
+    def set_default_headers(self) -> None:
         self.set_header("Referrer-Policy", "no-referrer")
         self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("Cache-Control", "no-store")
         self.clear_header("Server")
 
-    def refuse(self, status, text):
+    def refuse(self, status: int, text: str) -> None:
         self.set_status(status)
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(text + "\n")
@@ -50,32 +56,37 @@ class PassingHandler(PlainHandler):
 
     SUPPORTED_METHODS = _METHODS
     SERVER, OWN_COOKIE = "", ""
-    _streams, _is_entered, detached = None, False, False
+    _streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+    _is_entered, detached = False, False
 
-    def initialize(self):
+    def initialize(self) -> None:
         self.is_upgrade = http_text.is_upgrade(self.request.headers)
         length = self.request.headers.get("Content-Length", "")
         self._length = int(length) if length.isdecimal() else 0  # tornado refuses what is no number
 
+    @property
+    def _connection(self) -> HTTP1Connection:
+        return cast("HTTP1Connection", self.request.connection)
+
     # For subclasses to replace.
 
-    def answer_headers(self, headers):
+    def answer_headers(self, headers: httputil.HTTPHeaders) -> list[tuple[str, str]]:
         """The (name, value) that the client gets of an answer's headers."""
         raise NotImplementedError
 
-    def entered(self):
+    def entered(self) -> None:
         """The request is passed on from here on; its body may come in slowly."""
 
-    def left(self):
+    def left(self) -> None:
         """It is not any more; called once after `entered`."""
 
-    def may_pass(self, chunk):
+    def may_pass(self, chunk: bytes) -> bool:
         """Whether these bytes of a client's WebSocket are passed on."""
         return True
 
     # For `prepare` of subclasses.
 
-    def takes_request(self):
+    def takes_request(self) -> bool:
         """Whether a request of this origin, with this body, is taken; else it is refused."""
         if is_foreign(self.request):
             self.refuse(403, "a page of %s may not use this address" % self.request.headers["Origin"][:200])
@@ -84,11 +95,11 @@ class PassingHandler(PlainHandler):
         elif self._length > LARGEST_BODY:
             self.refuse(413, "a request may have %d MB, not %d" % (LARGEST_BODY >> 20, self._length >> 20))
         else:
-            self.request.connection.set_max_body_size(LARGEST_BODY)
+            self._connection.set_max_body_size(LARGEST_BODY)
             return True
         return False
 
-    async def pass_to(self, path, uri):
+    async def pass_to(self, path: str, uri: str) -> None:
         """Connect to the socket ``path``, and pass the head of the request on; its body follows as it comes in."""
         self._is_entered = True
         self.entered()
@@ -103,7 +114,7 @@ class PassingHandler(PlainHandler):
 
     # For tornado.
 
-    async def data_received(self, chunk):
+    async def data_received(self, chunk: bytes) -> None:
         if self._streams is None:
             return
         # A server that does not read holds its client up, and not the memory of this one.
@@ -113,21 +124,23 @@ class PassingHandler(PlainHandler):
                 await self._streams[1].drain()
         except TimeoutError:
             # Meanwhile nothing tells whether the client is still there.
-            self.request.connection.stream.close()
+            cast("iostream.IOStream", self._connection.stream).close()
         except OSError:
             pass  # what the server has answered before it went is read afterwards
 
-    def on_connection_close(self):
+    def on_connection_close(self) -> None:
         # Also of a client that goes in the middle of its request.
         super().on_connection_close()
         self._leave()
 
-    async def _pass(self, *_):
+    async def _pass(self, *_: str) -> None:
+        if self._streams is None:
+            return  # refused already
         try:
             if self.is_upgrade:
-                await self._tunnel()
+                await self._tunnel(*self._streams)
             else:
-                await self._answer()
+                await self._answer(self._streams[0])
         except (OSError, EOFError, asyncio.LimitOverrunError, http_text.BadAnswer) as error:
             if not self._finished and not self._headers_written and not self.detached:
                 self._refuse_answer(error)
@@ -136,23 +149,23 @@ class PassingHandler(PlainHandler):
 
     get = head = post = put = patch = delete = options = _pass
 
-    def _leave(self):
+    def _leave(self) -> None:
         if self._streams is not None:
             self._streams[1].close()
         if self._is_entered:
             self._is_entered = False
             self.left()
 
-    def _refuse_answer(self, error):
+    def _refuse_answer(self, error: Exception) -> None:
         self.refuse(502, "%s does not answer: %s" % (self.SERVER, error or type(error).__name__))
 
-    async def _head(self):
+    async def _head(self, reader: asyncio.StreamReader) -> tuple[int, httputil.HTTPHeaders]:
         """(status, headers) of the answer."""
         async with asyncio.timeout(ANSWER_S):
-            return http_text.answer_head(await self._streams[0].readuntil(b"\r\n\r\n"))
+            return http_text.answer_head(await reader.readuntil(b"\r\n\r\n"))
 
-    async def _answer(self):
-        status, headers = await self._head()
+    async def _answer(self, reader: asyncio.StreamReader) -> None:
+        status, headers = await self._head(reader)
         try:
             self.set_status(status)
             # The server says how long its answers may be kept.
@@ -160,16 +173,16 @@ class PassingHandler(PlainHandler):
             for name, value in self.answer_headers(headers):
                 (self.add_header if name == "Set-Cookie" else self.set_header)(name, value)
             if self.request.method != "HEAD" and status not in (204, 304):
-                while chunk := await self._streams[0].read(_CHUNK):
+                while chunk := await reader.read(_CHUNK):
                     self.write(chunk)
                     await self.flush()
             await self.finish()
         except (iostream.StreamClosedError, httputil.HTTPOutputError):
             # The client has gone, or the answer has not the length that it announced.
-            self.request.connection.stream.close()
+            cast("iostream.IOStream", self._connection.stream).close()
 
-    async def _tunnel(self):
-        status, headers = await self._head()
+    async def _tunnel(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        status, headers = await self._head(reader)
         if status != 101:
             self.refuse(403 if status == 403 else 502, "%s refused this connection (%d)" % (self.SERVER, status))
             return
@@ -177,18 +190,19 @@ class PassingHandler(PlainHandler):
         client = self.detach()
         try:
             await client.write(http_text.upgrade_text(headers))
-            await self._copy_both(client, *self._streams)
+            await self._copy_both(client, reader, writer)
         except iostream.StreamClosedError:
             pass
         finally:
             client.close()
 
-    async def _copy_both(self, client, reader, writer):
-        async def to_client():
+    async def _copy_both(self, client: iostream.IOStream, reader: asyncio.StreamReader,
+                         writer: asyncio.StreamWriter) -> None:
+        async def to_client() -> None:
             while chunk := await reader.read(_CHUNK):
                 await client.write(chunk)
 
-        async def to_server():
+        async def to_server() -> None:
             while True:
                 chunk = await client.read_bytes(_CHUNK, partial=True)
                 if self.may_pass(chunk):

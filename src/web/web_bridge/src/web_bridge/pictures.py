@@ -2,17 +2,24 @@
 """Images of cameras to JPEG and PNG. No ROS: messages are objects with the fields of sensor_msgs/Image or
 CompressedImage.
 """
+from __future__ import annotations
+
 import asyncio
 import re
 import sys
 import threading
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from command_line.user_files import check_picture
 from web_bridge.errors import BridgeError
+
+if TYPE_CHECKING:
+    from concurrent.futures.thread import ThreadPoolExecutor
+
 
 #: Quality of a JPEG, 0 to 100, and compression of a PNG, 0 to 9, where a client does not say them.
 JPEG_QUALITY, PNG_COMPRESSION = 95, 3
@@ -61,14 +68,15 @@ class Picture:
     work.
     """
 
-    def __init__(self, read, pool):
+    def __init__(self, read: Callable[[], Any], pool: ThreadPoolExecutor) -> None:
         self._read = read
         self._pool = pool
         self._lock = threading.Lock()
-        self._message = self._pixels = None
+        self._message: Any = None
+        self._pixels: np.ndarray | None = None
         self._frames = {}
 
-    async def encoded(self, form):
+    async def encoded(self, form: Form) -> Encoded:
         """The image in a form; in the loop. Raises BridgeError where it cannot be shown."""
         if form not in self._frames:
             self._frames[form] = asyncio.get_running_loop().run_in_executor(self._pool, self._encode, form)
@@ -77,20 +85,21 @@ class Picture:
         # One client that goes away must not end the work for the others.
         return await asyncio.shield(self._frames[form])
 
-    def _encode(self, form):
+    def _encode(self, form: Form) -> Encoded:
         with self._lock:
             if self._message is None:
                 self._message = self._read()
-            if self._pixels is None and form.kind != "original":
-                self._pixels = decoded(self._message)
+            pixels = self._pixels
+            if pixels is None and form.kind != "original":
+                pixels = self._pixels = decoded(self._message)
         stamp = self._message.header.stamp
         stamp = "%d.%06d" % (stamp.secs, stamp.nsecs // 1000)
-        if form.kind == "original":
+        if pixels is None or form.kind == "original":
             return Encoded(bytes(self._message.data), content_type(self._message.format), stamp)
-        return Encoded(encode(self._pixels, form), "image/" + form.kind, stamp)
+        return Encoded(encode(pixels, form), "image/" + form.kind, stamp)
 
 
-def content_type(text):
+def content_type(text: str) -> str:
     """The type of a CompressedImage's data by its field format, as "rgb8; jpeg compressed bgr8". Raises
     PictureError.
     """
@@ -101,7 +110,7 @@ def content_type(text):
     raise PictureError("its format is %r; jpeg and png can be shown" % text)
 
 
-def decoded(message):
+def decoded(message: Any) -> np.ndarray:
     """The pixels of a message: uint8 (height, width), or (height, width, 3 or 4) with blue first. Raises
     PictureError.
 
@@ -138,7 +147,7 @@ def decoded(message):
     return pixels if pixels.dtype == np.uint8 else _scaled(pixels)
 
 
-def _array(message, kind, channels):
+def _array(message: Any, kind: str, channels: int) -> np.ndarray:
     """A view of the message's numbers (height, width[, channels]) in this machine's byte order."""
     numbers = np.dtype(kind)
     height, width, step, data = message.height, message.width, message.step, message.data
@@ -154,14 +163,14 @@ def _array(message, kind, channels):
     return pixels if numbers.isnative else pixels.astype(numbers.newbyteorder("="))
 
 
-def _scaled(values):
+def _scaled(values: np.ndarray) -> np.ndarray:
     """Numbers as grey, from 0 to the largest; what is no number is black."""
     values = np.nan_to_num(values.astype(np.float32), nan=0.0, posinf=0.0, neginf=0.0)
     largest = float(values.max())
     return np.clip(values * (255 / max(largest, 1e-30)), 0, 255).astype(np.uint8)
 
 
-def encode(pixels, form):
+def encode(pixels: np.ndarray, form: Form) -> bytes:
     """The bytes of a JPEG or PNG of decoded pixels. Raises PictureError."""
     if form.is_turned:
         pixels = cv2.rotate(pixels, cv2.ROTATE_180)

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The graph of :mod:`web_bridge.session` in rospy. Only the modules ros_* know ROS."""
+from __future__ import annotations
+
 import socket
 import threading
 import time
+from collections.abc import Callable
 from io import BytesIO
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 from xmlrpc.client import Error
 
 import genpy
-import rosgraph
+import rosgraph.network
 import roslib.message
 import rospy
 import rosservice
@@ -17,6 +21,10 @@ from web_bridge.codec import are_the_same, serialized
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType, shown
 from web_bridge.feeds import Arrival
 from web_bridge.publications import FirstMessages
+
+if TYPE_CHECKING:
+    from web_bridge.graph import Closable, Publisher, Subscription
+    from web_bridge.services import Call
 
 #: What is published within this time after a topic was advertised also reaches subscribers that connect within it [s].
 _FIRST_S = 1.0
@@ -32,17 +40,17 @@ _CLOSING_S = 0.2  # between two tries to close the connection of a call that nob
 _LONGEST_TEXT = 200  # of an error of others, which may quote all that a client sent
 
 
-def message_class(type_name):
+def message_class(type_name: str) -> type:
     """The class of a message type; raises UnknownType."""
     return _found(roslib.message.get_message_class, "message", type_name, "serialize")
 
 
-def service_class(type_name):
+def service_class(type_name: str) -> type:
     """The class of a service type; raises UnknownType."""
     return _found(roslib.message.get_service_class, "service", type_name, "_request_class")
 
 
-def _found(load, kind, type_name, attribute):
+def _found(load: Callable[[Any], Any], kind: str, type_name: str, attribute: str) -> type:
     try:
         cls = load(type_name)
     # Imports a module by its name, which may be any text and any module.
@@ -55,18 +63,18 @@ def _found(load, kind, type_name, attribute):
     return cls
 
 
-def now():
+def now() -> genpy.Time:
     """ROS time; zero before /clock has begun."""
     return rospy.Time.now() if rospy.core.is_initialized() else genpy.Time()
 
 
-def address_of(uri):
+def address_of(uri: str) -> tuple[str, int]:
     """(host, port) of a service's or node's address."""
     parts = urlsplit(uri)
-    return parts.hostname, parts.port
+    return parts.hostname or "", parts.port or 0
 
 
-def handshake(address, header, timeout_s):
+def handshake(address: tuple[str, int], header: dict[str, str], timeout_s: float) -> dict[str, str]:
     """The answer of the publisher or service at (host, port) to a header of TCPROS. Raises OSError and
     ROSHandshakeException.
     """
@@ -75,7 +83,7 @@ def handshake(address, header, timeout_s):
         return rosgraph.network.read_ros_handshake_header(connection, BytesIO(), 65536)
 
 
-def wait(seconds):
+def wait(seconds: float) -> bool:
     """Wait in wall time, because /clock may not run; False where the node ends."""
     rospy.rostime.wallsleep(seconds)
     return not rospy.is_shutdown()
@@ -84,12 +92,12 @@ def wait(seconds):
 class RosGraph:
     """Topics and services of the master."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._master = rosgraph.Master(rospy.get_name())
         self._lock = threading.Lock()  # xmlrpc's proxies serve one thread
         self._types, self._types_until = {}, 0.0
 
-    def resolve(self, name):
+    def resolve(self, name: str) -> str:
         """Raises BridgeError for a text that is no name."""
         if not rosgraph.names.is_legal_name(name):
             raise BridgeError("%s is no legal name of ROS" % shown(name))
@@ -99,14 +107,14 @@ class RosGraph:
             raise BridgeError("%s is a namespace; the name of a topic or service is expected" % shown(name))
         return resolved
 
-    def topic_type(self, topic):
+    def topic_type(self, topic: str) -> str | None:
         return self._newest_types().get(self.resolve(topic))
 
-    def published_topics(self):
+    def published_topics(self) -> dict[str, str]:
         """The topics that have a publisher, {name: type}. Raises BridgeError."""
         return dict(self._ask("getPublishedTopics", "/"))
 
-    def check_type(self, topic, type_name):
+    def check_type(self, topic: str, type_name: str | None) -> None:
         if type_name is None:
             self.resolve(topic)
             return
@@ -119,21 +127,21 @@ class RosGraph:
         if established is not None and not are_the_same(message_class, established, type_name):
             raise BridgeError("%s has the type %s, not %s" % (topic, established, type_name))
 
-    def _newest_types(self):
+    def _newest_types(self) -> dict[str, str]:
         """{topic: established type} of now."""
         types = {name: kind for name, kind in self._ask("getTopicTypes") if kind != "*"}
         self._types, self._types_until = types, time.monotonic() + _TYPES_S
         return types
 
-    def subscribe(self, topic, arrived):
+    def subscribe(self, topic: str, arrived: Callable[[Arrival], None]) -> Subscription:
         self.resolve(topic)
         return _Subscription(topic, arrived)
 
-    def advertise(self, topic, type_name, latched, queue_size):
+    def advertise(self, topic: str, type_name: str, latched: bool, queue_size: int) -> Publisher:
         self.resolve(topic)
         return _Publisher(topic, type_name, latched, queue_size)
 
-    def call_service(self, service, fill, call):
+    def call_service(self, service: str, fill: Callable[[genpy.Message], genpy.Message], call: Call) -> genpy.Message:
         name = self.resolve(service)
         # Asked each time: a program that was restarted may offer another type.
         try:
@@ -155,11 +163,12 @@ class RosGraph:
             is_over.set()
             proxy.close()
 
-    def advertise_service(self, service, type_name, handler):
+    def advertise_service(self, service: str, type_name: str,
+                          handler: Callable[[genpy.Message, Callable[[], genpy.Message]], genpy.Message]) -> Closable:
         name, cls = self.resolve(service), service_class(type_name)
         self._check_is_free(name)
 
-        def answer(request):
+        def answer(request: genpy.Message) -> genpy.Message:
             try:
                 return handler(request, cls._response_class)
             except ServiceFailed as error:
@@ -169,7 +178,7 @@ class RosGraph:
         except rospy.service.ServiceException as error:
             raise BridgeError("service %s: %s" % (name, error)) from None
 
-    def _check_is_free(self, service):
+    def _check_is_free(self, service: str) -> None:
         """Raise BridgeError where another node offers the service: the master would give the name to the newcomer."""
         others = set(dict(self._ask("getSystemState")[2]).get(service, ())) - {rospy.get_name()}
         if not others:
@@ -183,7 +192,7 @@ class RosGraph:
         raise BridgeError("the node %s offers the service %s already; choose another name"
                           % (", ".join(sorted(others)), service))
 
-    def _ask(self, method, *arguments):
+    def _ask(self, method: str, *arguments) -> Any:
         try:
             with self._lock:
                 return getattr(self._master, method)(*arguments)
@@ -202,11 +211,11 @@ class Bytes(rospy.AnyMsg):
 
     __slots__ = ["_read"]
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self._read = None
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> list[genpy.Message]:
         # Fields have no such names; copies and headers are asked for before there is anything to read.
         if name.startswith("_"):
             raise AttributeError(name)
@@ -216,27 +225,28 @@ class Bytes(rospy.AnyMsg):
 
 
 class _Subscription:
-    def __init__(self, topic, arrived):
+    def __init__(self, topic: str, arrived: Callable[[Arrival], None]) -> None:
         self._arrived = arrived
         self._subscriber = rospy.Subscriber(topic, Bytes, self._on_message, queue_size=_QUEUE, tcp_nodelay=True)
 
-    def _on_message(self, message):
+    def _on_message(self, message: genpy.Message) -> None:
         header, received = message._connection_header, rospy.Time.now()
         # Under simulated time rospy has subscribed to /clock itself, and delivers that class to everybody.
-        data = message._buff if isinstance(message, rospy.AnyMsg) else serialized(message)
+        data: Any = message._buff if isinstance(message, rospy.AnyMsg) else serialized(message)
         self._arrived(Arrival(data, header.get("type", "*"), header.get("md5sum", "*"),
                               (received.secs, received.nsecs), header.get("callerid", ""),
                               header.get("latching", "0") == "1"))
 
-    def publishers(self):
-        return {connection.callerid_pub for connection in self._subscriber.impl.connections}
+    def publishers(self) -> set[str]:
+        implementation: Any = self._subscriber.impl
+        return {connection.callerid_pub for connection in implementation.connections}
 
-    def close(self):
+    def close(self) -> None:
         self._subscriber.unregister()
 
 
 class _Publisher(rospy.SubscribeListener):
-    def __init__(self, topic, type_name, latched, queue_size):
+    def __init__(self, topic: str, type_name: str, latched: bool, queue_size: int) -> None:
         self.type = type_name
         self.new_message = message_class(type_name)
         self._lock = threading.Lock()
@@ -245,7 +255,8 @@ class _Publisher(rospy.SubscribeListener):
         self._publisher = rospy.Publisher(topic, self.new_message, subscriber_listener=self, latch=latched,
                                           queue_size=queue_size, tcp_nodelay=True)
 
-    def peer_subscribe(self, _topic, _publish, peer_publish):
+    def peer_subscribe(self, _topic: str, _publish: Callable[[genpy.Message], None],
+                       peer_publish: Callable[[genpy.Message], None]) -> None:
         """A subscriber has connected; on rospy's thread."""
         with self._lock:
             if time.monotonic() >= self._until:
@@ -254,7 +265,7 @@ class _Publisher(rospy.SubscribeListener):
         for message in first:
             peer_publish(message)
 
-    def publish(self, message):
+    def publish(self, message: genpy.Message) -> None:
         """Raises BridgeError where the message cannot be serialized."""
         try:
             self._keep_first(message)
@@ -262,18 +273,18 @@ class _Publisher(rospy.SubscribeListener):
         except (rospy.ROSException, genpy.MessageException) as error:
             raise BridgeError("%s: %s" % (self._publisher.name, error)) from None
 
-    def _keep_first(self, message):
+    def _keep_first(self, message: genpy.Message) -> None:
         with self._lock:
             if time.monotonic() >= self._until:
                 self._first = None
             if self._first is not None:
                 self._first.add(message, len(serialized(message)))
 
-    def close(self):
+    def close(self) -> None:
         self._publisher.unregister()
 
 
-def _close_until(proxy, is_over):
+def _close_until(proxy: rospy.ServiceProxy, is_over: threading.Event) -> None:
     """Close the proxy's connection, which it may be about to make, until the call is over."""
     while not is_over.is_set():
         proxy.close()
@@ -281,8 +292,8 @@ def _close_until(proxy, is_over):
 
 
 class _Service:
-    def __init__(self, service):
+    def __init__(self, service: rospy.Service) -> None:
         self._service = service
 
-    def close(self):
+    def close(self) -> None:
         self._service.shutdown("the client that offered it has gone")

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How the nodes around this package start, and how those with WebSockets serve, in rospy."""
+from __future__ import annotations
+
 import ssl
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import rospy
 
@@ -10,8 +14,14 @@ from web_bridge import ros_graph
 from web_bridge.parameters import ParameterError
 from web_bridge.serving import listen
 
+if TYPE_CHECKING:
+    from tornado.web import Application
 
-def run(name, read_parameters, serve):
+    from web_bridge.parameters import Endpoint
+    from web_bridge.websocket import Clients
+
+
+def run(name: str, read_parameters: Callable[[Callable[[str, Any], Any]], Any], serve: Callable[[Any], object]) -> int:
     """Start the node ``name`` and call ``serve(parameters)``, which returns when the node ends; returns the exit code.
 
     ``read_parameters(get)`` returns the parameters; their ``warnings`` go to the log. It and ``serve`` may raise
@@ -32,12 +42,12 @@ def run(name, read_parameters, serve):
     return 0
 
 
-def announce(port):
+def announce(port: int) -> None:
     """Tell clients, tests and scripts the port of a node that was started with ~port 0."""
     rospy.set_param("~actual_port", port)
 
 
-def serve_clients(clients, application, endpoint, what):
+def serve_clients(clients: Clients, application: Application, endpoint: Endpoint, what: str) -> None:
     """Serve the :class:`web_bridge.websocket.Clients` until the node ends; ``what``: the server's name for the log.
 
     Waits while the port is taken. Raises ParameterError for a certificate or key that TLS cannot use.

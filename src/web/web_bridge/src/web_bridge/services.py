@@ -1,10 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services both ways: calls of clients, and services that clients offer. No ROS."""
+from __future__ import annotations
+
 import itertools
 import threading
 from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from web_bridge.errors import BridgeError, ServiceFailed, shown
+
+if TYPE_CHECKING:
+    from genpy import Message
+
+    from web_bridge.codec import Codec
+    from web_bridge.foxglove.session import FoxgloveSession
+    from web_bridge.graph import Closable, Graph
+    from web_bridge.session import Session
 
 #: Calls of one client that are under way at a time; further ones wait, up to a number.
 MAX_AT_ONCE, MAX_WAITING = 16, 1000
@@ -15,12 +27,12 @@ MAX_OF_ALL = 256
 class Call:
     """A call that is under way. Whoever waits for its answer says how the wait can be ended."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._end = None
+        self._end: Callable[[], None] | None = None
         self._is_cancelled = False
 
-    def ends_by(self, end):
+    def ends_by(self, end: Callable[[], None]) -> None:
         """``end()`` ends the wait. It is called on another thread, or at once if the call is cancelled already."""
         with self._lock:
             self._end = end
@@ -28,7 +40,7 @@ class Call:
         if is_late:
             end()
 
-    def cancel(self):
+    def cancel(self) -> None:
         with self._lock:
             self._is_cancelled, end = True, self._end
         if end is not None:
@@ -38,19 +50,20 @@ class Call:
 class CallPool:
     """Runs the calls of all clients, each in a separate thread, because a service may take as long as it likes."""
 
-    def __init__(self, most_at_once=MAX_AT_ONCE, most_waiting=MAX_WAITING, most_of_all=MAX_OF_ALL):
+    def __init__(self, most_at_once: int = MAX_AT_ONCE, most_waiting: int = MAX_WAITING,
+                 most_of_all: int = MAX_OF_ALL) -> None:
         self._limits = (most_at_once, most_waiting, most_of_all)
         self._lock = threading.Lock()
-        self._running = {}  # client -> set of Call
-        self._waiting = {}  # client -> calls
+        self._running: dict[object, set[Call]] = {}
+        self._waiting: dict[object, deque[Callable[[Call], None]]] = {}
 
     @property
-    def under_way(self):
+    def under_way(self) -> int:
         """How many calls wait for their answers."""
         with self._lock:
             return sum(map(len, self._running.values()))
 
-    def run(self, client, call):
+    def run(self, client: Session | FoxgloveSession, call: Callable[[Call], None]) -> None:
         """Call ``call(Call)`` soon. Raises BridgeError where too many calls wait."""
         at_once, most_waiting, of_all = self._limits
         with self._lock:
@@ -66,7 +79,7 @@ class CallPool:
             self._running.setdefault(client, set()).add(under_way)
         threading.Thread(target=self._work, args=(client, call, under_way), daemon=True).start()
 
-    def forget(self, client):
+    def forget(self, client: Session | FoxgloveSession) -> None:
         """Drop the calls of a client that have not begun, and wait no longer for the answers to the others."""
         with self._lock:
             self._waiting.pop(client, None)
@@ -74,7 +87,7 @@ class CallPool:
         for call in running:
             call.cancel()
 
-    def _work(self, client, call, under_way):
+    def _work(self, client: Session | FoxgloveSession, call: Callable[[Call], None] | None, under_way: Call) -> None:
         while call is not None:
             try:
                 call(under_way)
@@ -93,41 +106,41 @@ class CallPool:
 
 
 class _Request:
-    def __init__(self, client, key):
+    def __init__(self, client: Session, key: str) -> None:
         self.client = client
         self.key = key
         self.done = threading.Event()
-        self.answer = None  # (client that answered, worked, values)
+        self.answer: tuple[Session, bool, Any] | None = None  # (client that answered, worked, values)
 
 
 class OfferedServices:
     """Services that clients offer to ROS."""
 
-    def __init__(self, graph, codec):
+    def __init__(self, graph: Graph, codec: Codec) -> None:
         self._graph = graph
         self._codec = codec
         self._lock = threading.Lock()
-        self._offers = {}  # resolved name of the service -> (client, handle)
-        self._requests = {}  # id -> _Request
+        self._offers: dict[str, tuple[Session, Closable]] = {}  # by the resolved name of the service
+        self._requests: dict[str, _Request] = {}
         self._numbers = itertools.count()
 
-    def advertise(self, client, service, type_name):
+    def advertise(self, client: Session, service: str, type_name: str) -> None:
         """Raises BridgeError, where a node offers the service, for instance. A service of another client goes over to
         this one: a page that was reloaded does not wait for the end of its old connection.
         """
         key = self._graph.resolve(service)
         with self._lock:
-            holder, handle = self._offers.pop(key, (None, None))
-            if handle is not None:
+            if key in self._offers:
+                holder, handle = self._offers.pop(key)
                 handle.close()
                 if holder is not client:
                     holder.status("warning", "another client offers the service %s from now on" % service, None)
 
-            def handler(request, new_response):
+            def handler(request: Message, new_response: Callable[[], Message]) -> Message:
                 return self._ask(client, service, key, request, new_response)
             self._offers[key] = (client, self._graph.advertise_service(service, type_name, handler))
 
-    def unadvertise(self, service):
+    def unadvertise(self, service: str) -> bool:
         """Returns whether a client offered it. Waiting callers get an error."""
         key = self._graph.resolve(service)
         with self._lock:
@@ -138,7 +151,7 @@ class OfferedServices:
             handle.close()
             return True
 
-    def forget(self, client):
+    def forget(self, client: Session) -> None:
         """Withdraw everything that a client offers."""
         with self._lock:
             mine = [key for key, (holder, _) in self._offers.items() if holder is client]
@@ -146,7 +159,7 @@ class OfferedServices:
             for key in mine:
                 self._offers.pop(key)[1].close()
 
-    def answer(self, client, name, worked, values):
+    def answer(self, client: Session, name: str, worked: bool, values: Any) -> None:
         """The answer to request ``name``, whichever client it was sent to. Raises BridgeError where that waits for
         none.
         """
@@ -157,7 +170,8 @@ class OfferedServices:
         request.answer = (client, worked, values)
         request.done.set()
 
-    def _ask(self, client, service, key, request, new_response):
+    def _ask(self, client: Session, service: str, key: str, request: Message,
+             new_response: Callable[[], Message]) -> Message:
         """On ROS's thread: the response to a request. Raises ServiceFailed."""
         waiting = _Request(client, key)
         with self._lock:
@@ -181,7 +195,7 @@ class OfferedServices:
             answerer.status("error", "the answer to %s: %s" % (service, error), name)
             raise ServiceFailed("the client's answer does not fit: %s" % error) from None
 
-    def _give_up(self, concerns):
+    def _give_up(self, concerns: Callable[[_Request], bool]) -> None:
         for name, request in list(self._requests.items()):
             if concerns(request):
                 del self._requests[name]

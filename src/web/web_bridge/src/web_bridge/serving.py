@@ -1,10 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A tornado application on a port, in a LoopThread. No ROS."""
+from __future__ import annotations
+
 import ssl
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from tornado import httpserver, netutil
 
 from rospy_fixes.hidden_tokens import hide_in_logs
+
+if TYPE_CHECKING:
+    from tornado.http1connection import HTTP1ServerConnection
+    from tornado.iostream import IOStream
+    from tornado.web import Application
+
+    from web_bridge.loop_thread import LoopThread
+    from web_bridge.parameters import Endpoint
 
 #: Connections that are no WebSocket: streams of cameras, files, clients that have not asked for anything yet. They need
 #: no token, so their number and their memory are limited.
@@ -15,14 +27,15 @@ LARGEST_BODY = 64 << 10
 IDLE_S = 30.0
 
 
-def tls_context(certfile, keyfile):
+def tls_context(certfile: str, keyfile: str) -> ssl.SSLContext:
     """The TLS of a server; raises OSError and ssl.SSLError for files that do not fit."""
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.load_cert_chain(certfile, keyfile or None)
     return context
 
 
-def listen(loop_thread, application, endpoint, wait, complain):
+def listen(loop_thread: LoopThread, application: Application, endpoint: Endpoint, wait: Callable[[float], bool],
+           complain: Callable[[str], None]) -> Serving | None:
     """A Serving at an Endpoint; where the port is taken, ``complain(text)``, and again after ``wait(seconds)``, until
     that returns False: then None. Raises OSError and ssl.SSLError for the files of TLS.
     """
@@ -42,12 +55,12 @@ class LimitedServer(httpserver.HTTPServer):
     without a pause, and connections that say nothing must not keep others out.
     """
 
-    def initialize(self, *args, **kwargs):
+    def initialize(self, *args: Any, **kwargs: Any) -> None:
         super().initialize(*args, **kwargs)
         hide_in_logs()
         self._streams = {}  # the oldest first
 
-    def handle_stream(self, stream, address):
+    def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
         if len(self._streams) >= MAX_CONNECTIONS:
             oldest = next(iter(self._streams))
             del self._streams[oldest]
@@ -55,7 +68,7 @@ class LimitedServer(httpserver.HTTPServer):
         self._streams[stream] = True
         super().handle_stream(stream, address)
 
-    def on_close(self, server_conn):
+    def on_close(self, server_conn: HTTP1ServerConnection) -> None:
         # Also when the connection has become a WebSocket, or a stream of images.
         self._streams.pop(server_conn.stream, None)
         super().on_close(server_conn)
@@ -66,28 +79,29 @@ class Serving:
     ``idle_s``: time for a client's request [s].
     """
 
-    def __init__(self, loop_thread, application, port, address, tls=None, idle_s=IDLE_S):
+    def __init__(self, loop_thread: LoopThread, application: Application, port: int, address: str,
+                 tls: ssl.SSLContext | None = None, idle_s: float = IDLE_S) -> None:
         self._loop_thread = loop_thread
         self._sockets = netutil.bind_sockets(port, address)
         loop_thread.run(self._start(application, tls, idle_s))
 
-    async def _start(self, application, tls, idle_s):
+    async def _start(self, application: Application, tls: ssl.SSLContext | None, idle_s: float) -> None:
         self._server = LimitedServer(application, ssl_options=tls, idle_connection_timeout=idle_s, body_timeout=idle_s,
                                       max_body_size=LARGEST_BODY)
         self._server.add_sockets(self._sockets)
 
     @property
-    def port(self):
+    def port(self) -> int:
         """The first port, where the kernel chose it."""
         return self._sockets[0].getsockname()[1]
 
-    def url(self, endpoint):
+    def url(self, endpoint: Endpoint) -> str:
         """The address for a log."""
         return "%s://%s:%d" % ("wss" if endpoint.tls else "ws", endpoint.address or "0.0.0.0", self.port)
 
-    def close(self):
+    def close(self) -> None:
         self._loop_thread.run(self._stop())
 
-    async def _stop(self):
+    async def _stop(self) -> None:
         self._server.stop()
         await self._server.close_all_connections()

@@ -1,23 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The operations of rosbridge v2 for one client. No ROS: the graph is an argument, with these methods, all of which may
-block on the master and raise BridgeError:
+"""The operations of rosbridge v2 for one client. No ROS: the :class:`web_bridge.graph.Graph` is an argument."""
+from __future__ import annotations
 
-- ``resolve(name)``: the absolute name of a topic or service
-- ``topic_type(topic)``: the established type, or None
-- ``check_type(topic, type or None)``: raise where the type is unknown here or is not the topic's
-- ``subscribe(topic, arrived)``: calls ``arrived(Arrival)`` on any thread; returns an object with ``close()`` and
-  ``publishers()``, the names of the publishers that are connected
-- ``advertise(topic, type, latched, queue size)``: an object with ``type``, ``new_message()``, ``publish(message)``,
-  ``close()``
-- ``call_service(service, fill, call)``: ``fill(request)`` lays the arguments over an empty request; returns the
-  response. ``call.ends_by(function)`` tells how the wait for it can be ended
-- ``advertise_service(service, type, handler)``: ``handler(request, new_response)`` returns the response or raises
-  ServiceFailed; returns an object with ``close()``
-"""
 import json
 import threading
 import time
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from web_bridge.access import Rules
 from web_bridge.codec import Codec
@@ -27,6 +16,14 @@ from web_bridge.fields import NUMBER, field, type_field
 from web_bridge.frames import Fragments, cbor, from_base64, json_text, packed_png, read_frame, split, text_of_png
 from web_bridge.publications import Publications
 from web_bridge.services import CallPool, OfferedServices
+
+if TYPE_CHECKING:
+    from genpy import Message
+
+    from web_bridge.graph import Graph
+    from web_bridge.loop_thread import Later
+    from web_bridge.outgoing import OutgoingBuffer
+    from web_bridge.services import Call
 
 LEVELS = ("none", "error", "warning", "info")
 #: Characters of a text inside of fragments or a picture.
@@ -45,7 +42,8 @@ class BridgeOptions(NamedTuple):
 class Bridge:
     """State that all clients share."""
 
-    def __init__(self, graph, codec: Codec, later, options=None, clock=time.monotonic):
+    def __init__(self, graph: Graph, codec: Codec, later: Callable[[float, Callable[[], None]], Later],
+                 options: BridgeOptions | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self.options = options or BridgeOptions()
         self.clock = clock
         self.graph = graph
@@ -59,7 +57,7 @@ class Bridge:
 class Session:
     """One client. ``outgoing`` is its OutgoingBuffer; frames come one at a time, from any thread."""
 
-    def __init__(self, bridge, outgoing, rules=None):
+    def __init__(self, bridge: Bridge, outgoing: OutgoingBuffer, rules: Rules | None = None) -> None:
         self.outgoing = outgoing
         self._bridge = bridge
         self._rules = rules or Rules()
@@ -70,11 +68,11 @@ class Session:
 
     # To the client; from any thread.
 
-    def send(self, operation):
+    def send(self, operation: dict[str, Any]) -> None:
         """An answer, which is never dropped."""
         self.outgoing.keep([json_text(operation)])
 
-    def status(self, level, text, name):
+    def status(self, level: str, text: str, name: Any) -> None:
         """Say something about the operation ``name`` (its id, or None) where the client's level asks for it."""
         if level == "none" or LEVELS.index(level) > LEVELS.index(self._level):
             return
@@ -84,18 +82,18 @@ class Session:
         # A client that floods with mistakes and reads nothing loses the oldest.
         self.outgoing.offer([json_text(operation)])
 
-    def warn_of(self, subject, texts, name):
+    def warn_of(self, subject: str, texts: list[str], name: Any) -> None:
         """Say what of ``subject`` was passed over, of the operation ``name``."""
         for text in texts:
             self.status("warning", "%s: passed over: %s" % (subject, text), name)
 
-    def tell_fault(self, text):
+    def tell_fault(self, text: str) -> None:
         """The server failed at an operation."""
         self.status("error", text, None)
 
     # From the client.
 
-    def handle(self, frame):
+    def handle(self, frame: str | bytes) -> None:
         """Serve all operations of a frame (text or bytes). Errors go to the client as status, never to the caller."""
         with self._lock:
             if self._closed:
@@ -108,7 +106,7 @@ class Session:
             for operation in operations:
                 self._serve(operation, 0)
 
-    def is_quick(self, frame):
+    def is_quick(self, frame: str | bytes) -> bool:
         """Can this frame be served without waiting for the master? A small publish on an advertised topic can."""
         if not isinstance(frame, str) or len(frame) > 4096 or '"publish"' not in frame:
             return False
@@ -119,7 +117,7 @@ class Session:
         return all(operation.get("op") == "publish" and isinstance(operation.get("topic"), str)
                    and self._bridge.publications.is_advertised(self, operation["topic"]) for operation in operations)
 
-    def close(self):
+    def close(self) -> None:
         """The client has gone: withdraw everything of it."""
         self.outgoing.close()
         # Requests that wait for this client's answers end now: an operation of it may wait for them.
@@ -131,7 +129,7 @@ class Session:
             self._bridge.publications.forget(self)
             self._bridge.services.forget(self)
 
-    def _serve(self, operation, depth):
+    def _serve(self, operation: dict[str, Any], depth: int) -> None:
         name, op = operation.get("id"), operation.get("op")
         if not _is_plain(name) or (op in _FOUND_BY_ID and not isinstance(name, str | int | float | None)):
             self.status("error", "id is %s; a text or a finite number is expected" % shown(name), None)
@@ -148,47 +146,47 @@ class Session:
         except BridgeError as error:
             self.status("error", "%s: %s" % (op, error), name)
 
-    def _fragment(self, operation, depth):
+    def _fragment(self, operation: dict[str, Any], depth: int) -> None:
         text = self._fragments.add(operation)
         if text is not None:
             self._unpacked(text, depth)
 
-    def _png(self, operation, depth):
+    def _png(self, operation: dict[str, Any], depth: int) -> None:
         self._unpacked(text_of_png(from_base64(operation.get("data")), LARGEST_TEXT), depth)
 
-    def _unpacked(self, text, depth):
+    def _unpacked(self, text: str, depth: int) -> None:
         if depth >= DEEPEST:
             raise FieldError("operations are packed into each other more than %d times" % DEEPEST)
         for operation in read_frame(text):
             self._serve(operation, depth + 1)
 
-    def _set_level(self, operation, _name):
+    def _set_level(self, operation: dict[str, Any], _name: Any) -> None:
         level = operation.get("level")
         if level not in LEVELS:
             raise FieldError("level is %s; %s are known" % (shown(level), ", ".join(LEVELS)))
         self._level = level
 
-    def _advertise(self, operation, name):
+    def _advertise(self, operation: dict[str, Any], name: Any) -> None:
         topic, type_name = field(operation, "topic", str), type_field(operation)
         self._may_publish(topic)
         self._bridge.publications.advertise(self, name, topic, type_name, _publisher_options(operation))
 
-    def _unadvertise(self, operation, name):
+    def _unadvertise(self, operation: dict[str, Any], name: int | None) -> None:
         topic = field(operation, "topic", str)
         if not self._bridge.publications.unadvertise(self, topic, name):
             self.status("warning", "unadvertise: %s is not advertised by this client" % topic, name)
 
-    def _publish(self, operation, name):
+    def _publish(self, operation: dict[str, Any], name: Any) -> None:
         topic = field(operation, "topic", str)
         self._may_publish(topic)
         unread = self._bridge.publications.publish(self, topic, operation.get("msg"), _publisher_options(operation))
         self.warn_of("publish on " + topic, unread, name)
 
-    def _may_publish(self, topic):
+    def _may_publish(self, topic: str) -> None:
         self._rules.check_may_act("publish")
         self._rules.check_topic(self._bridge.graph.resolve(topic))
 
-    def _subscribe(self, operation, name):
+    def _subscribe(self, operation: dict[str, Any], name: str | None) -> None:
         topic = field(operation, "topic", str)
         self._rules.check_topic(self._bridge.graph.resolve(topic))
         type_name = type_field(operation, None)
@@ -199,12 +197,12 @@ class Session:
         is_any = type_name in ("", "*") or wish.compression == "cbor-raw"
         self._bridge.feeds.subscribe(self, name, topic, None if is_any else type_name, wish)
 
-    def _unsubscribe(self, operation, name):
+    def _unsubscribe(self, operation: dict[str, Any], name: str | None) -> None:
         topic = field(operation, "topic", str)
         if not self._bridge.feeds.unsubscribe(self, topic, name):
             self.status("warning", "unsubscribe: this client has no subscription to %s" % topic, name)
 
-    def _call_service(self, operation, name):
+    def _call_service(self, operation: dict[str, Any], name: Any) -> None:
         service = field(operation, "service", str)
         # Old clients write the id behind the service's name.
         called, _, tag = service.partition("#")
@@ -214,19 +212,19 @@ class Session:
             self.warn_of("call_service of " + called, ["args is %s, neither an object nor a list" % shown(args)], name)
             args = None
 
-        def answer(values, worked, in_cbor=None):
+        def answer(values: Any, worked: bool, in_cbor: dict[str, Any] | None = None) -> None:
             response = {"op": "service_response", "service": service, "values": values, "result": worked}
             if name is not None:
                 response["id"] = name
             self.outgoing.keep(_packed(response, in_cbor or values, compression, size))
 
-        def fill(request):
+        def fill(request: Message) -> Message:
             unread = []
             self._bridge.codec.reader.fill(request, args, unread)
             self.warn_of("call_service of " + called, unread, name)
             return request
 
-        def call(under_way):
+        def call(under_way: Call) -> None:
             try:
                 response = self._bridge.graph.call_service(called, fill, under_way)
                 answer(self._bridge.codec.json.values(response), True, self._bridge.codec.cbor.values(response))
@@ -240,26 +238,26 @@ class Session:
         except BridgeError as error:
             answer(str(error), False)
 
-    def _advertise_service(self, operation, _name):
+    def _advertise_service(self, operation: dict[str, Any], _name: Any) -> None:
         service, type_name = field(operation, "service", str), type_field(operation)
         self._rules.check_may_act("offer services")
         self._rules.check_service(self._bridge.graph.resolve(service))
         self._bridge.services.advertise(self, service, type_name)
 
-    def _unadvertise_service(self, operation, name):
+    def _unadvertise_service(self, operation: dict[str, Any], name: str | None) -> None:
         service = field(operation, "service", str)
         self._rules.check_may_act("withdraw services")
         if not self._bridge.services.unadvertise(service):
             self.status("warning", "unadvertise_service: no client offers %s" % service, name)
 
-    def _service_response(self, operation, name):
+    def _service_response(self, operation: dict[str, Any], name: str) -> None:
         # From any connection of a program: its requests may have come over another one.
         self._rules.check_may_act("answer for services")
         # A page may answer with anything true, or with values alone; without both it has failed.
         worked = bool(operation.get("result", "values" in operation))
         self._bridge.services.answer(self, name, worked, operation.get("values"))
 
-    def _compression(self, operation, name):
+    def _compression(self, operation: dict[str, Any], name: Any) -> str:
         compression = field(operation, "compression", str, "none")
         if compression in COMPRESSIONS:
             return compression
@@ -267,7 +265,7 @@ class Session:
                      name)
         return "none"
 
-    def _auth(self, _operation, _name):
+    def _auth(self, _operation: dict[str, Any], _name: Any):
         raise FieldError("this server does not use rosauth; where it has a token, it asks for it in the address "
                          "(?token=…)")
 
@@ -284,7 +282,7 @@ _OPERATIONS = {
 _FOUND_BY_ID = ("advertise", "unadvertise", "subscribe", "unsubscribe", "fragment", "service_response")
 
 
-def _is_plain(name):
+def _is_plain(name: Any) -> bool:
     """Has an id a form in JSON? NaN, infinities and bytes have none: no page could read the answer."""
     try:
         json.dumps(name, allow_nan=False)
@@ -293,15 +291,15 @@ def _is_plain(name):
     return True
 
 
-def _fragment_size(operation):
+def _fragment_size(operation: dict[str, Any]) -> int:
     return max(0, int(field(operation, "fragment_size", NUMBER, 0)))
 
 
-def _publisher_options(operation):
+def _publisher_options(operation: dict[str, Any]) -> tuple[bool, int]:
     return bool(operation.get("latch")), max(1, int(field(operation, "queue_size", NUMBER, 100)))
 
 
-def _packed(response, in_cbor, compression, fragment_size):
+def _packed(response: dict[str, Any], in_cbor: Any, compression: str, fragment_size: int) -> Sequence[str | bytes]:
     if compression.startswith("cbor"):
         return [cbor({**response, "values": in_cbor})]
     text = json_text(response)

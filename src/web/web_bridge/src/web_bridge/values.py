@@ -7,19 +7,26 @@ CBOR: uint8[] and char[] are bytes, other numeric arrays of variable length are 
 they are. In: missing fields keep their defaults; a field that the type lacks, or a value of another kind, is a
 FieldError.
 """
+from __future__ import annotations
+
 import array
 import base64
 import binascii
 import math
 import re
 import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import cbor2
 
 from command_line.options import counted
 from web_bridge.errors import FieldError, shown
 
-_TYPE = re.compile(r"([^\[]+)(?:\[(\d*)\])?\Z")
+if TYPE_CHECKING:
+    from genpy import Duration, Message, Time
+
+_TYPE = re.compile(r"([^\[]+)(\[(\d*)\])?\Z")
 _OF_BYTES = ("uint8", "char")
 _SIGNED = {"int8": 8, "byte": 8, "int16": 16, "int32": 32, "int64": 64}
 _UNSIGNED = {"uint8": 8, "char": 8, "uint16": 16, "uint32": 32, "uint64": 64}
@@ -33,44 +40,44 @@ TYPED_ARRAYS = {"uint16": (69, "H"), "uint32": (70, "I"), "uint64": (71, "Q"), "
 _LETTER_OF_TAG = {64: "B", **dict(TYPED_ARRAYS.values())}
 
 
-def parts_of(slot_type):
+def parts_of(slot_type: str) -> tuple[str, int | None]:
     """("float64", None) of float64, ("float64", 0) of float64[], ("float64", 36) of float64[36]."""
-    base, length = _TYPE.match(slot_type).groups()
-    return base, None if length is None else int(length or 0)
+    [(base, brackets, length)] = _TYPE.findall(slot_type)
+    return base, int(length or 0) if brackets else None
 
 
-def _base64(data):
+def _base64(data: bytes) -> str:
     return base64.b64encode(bytes(data)).decode("ascii")
 
 
-def _json_float(value):
+def _json_float(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _json_floats(values):
+def _json_floats(values: Sequence[float]) -> list[float | None]:
     # The sum of finite values can overflow; then the slow way gives the same result.
     return list(values) if math.isfinite(sum(values)) else [value if math.isfinite(value) else None for value in values]
 
 
-def _time(value):
+def _time(value: Time | Duration) -> dict[str, int]:
     return {"secs": value.secs, "nsecs": value.nsecs}
 
 
-def _times(values):
+def _times(values: Any):
     return [_time(value) for value in values]
 
 
-def _same(value):
+def _same(value: Any) -> Any:
     return value
 
 
 class JsonForm:
     """Values for JSON."""
 
-    def scalar(self, base):
+    def scalar(self, base: str) -> Callable[..., Any]:
         return _json_float if base in _FLOATS else _same
 
-    def array(self, base, length):
+    def array(self, base: str, length: int) -> Callable[..., Any]:
         if base in _OF_BYTES:
             return _base64
         return _json_floats if base in _FLOATS else list
@@ -79,17 +86,17 @@ class JsonForm:
 class CborForm:
     """Values for CBOR."""
 
-    def scalar(self, base):
+    def scalar(self, base: str) -> Callable[..., Any]:
         return _same
 
-    def array(self, base, length):
+    def array(self, base: str, length: int) -> Callable[..., Any]:
         if base in _OF_BYTES:
             return bytes
         if length or base not in TYPED_ARRAYS:
             return list
         tag, letter = TYPED_ARRAYS[base]
 
-        def typed(values):
+        def typed(values: Sequence[float]) -> cbor2.CBORTag:
             numbers = array.array(letter, values)
             if sys.byteorder == "big":
                 numbers.byteswap()
@@ -100,26 +107,25 @@ class CborForm:
 class Writer:
     """Messages to values of one form. ``class_of(type name)`` returns the class of a message type."""
 
-    def __init__(self, class_of, form):
+    def __init__(self, class_of: Callable[[str], type], form: JsonForm | CborForm) -> None:
         self._class_of = class_of
         self._form = form
-        self._converters = {}
+        self._converters: dict[type, Callable[[Any], dict[str, Any]]] = {}
 
-    def values(self, message):
+    def values(self, message: Any) -> dict[str, Any]:
         """The message's fields as a dict of plain values."""
         return self._of_class(type(message))(message)
 
-    def _of_class(self, cls):
-        converter = self._converters.get(cls)
-        if converter is None:
+    def _of_class(self, cls: type) -> Callable[..., Any]:
+        if cls not in self._converters:
             fields = [(name, self._of_type(slot)) for name, slot in zip(cls.__slots__, cls._slot_types, strict=True)]
 
-            def converter(message):
+            def converter(message: Any) -> dict[str, Any]:
                 return {name: convert(getattr(message, name)) for name, convert in fields}
             self._converters[cls] = converter
-        return converter
+        return self._converters[cls]
 
-    def _of_type(self, slot_type):
+    def _of_type(self, slot_type: str) -> Callable[..., Any]:
         base, length = parts_of(slot_type)
         if base in _TIMES:
             return _time if length is None else _times
@@ -129,7 +135,7 @@ class Writer:
         return self._form.scalar(base) if length is None else self._form.array(base, length)
 
 
-def from_tag(tag):
+def from_tag(tag: cbor2.CBORTag) -> list[float]:
     """The numbers of a typed array as a list; raises FieldError for other tags and for lengths that do not fit."""
     letter = _LETTER_OF_TAG.get(tag.tag)
     if letter is None or not isinstance(tag.value, bytes):
@@ -152,11 +158,11 @@ class Reader:
     headers and for the text "now".
     """
 
-    def __init__(self, class_of, now):
+    def __init__(self, class_of: Callable[[str], type], now: Callable[[], Time]) -> None:
         self._class_of = class_of
         self._now = now
 
-    def fill(self, message, values, unread=None):
+    def fill(self, message: Any, values: Any, unread: list[str] | None = None) -> Message:
         """Lay ``values``, a dict, or a list in the order of the fields, over a message. Raises FieldError.
 
         rosbridge_suite passes over some values without a word: those of a list that are too many, and what is no time
@@ -174,7 +180,7 @@ class Reader:
         self._lay(message, values, "", unread)
         return message
 
-    def _lay(self, message, values, path, unread):
+    def _lay(self, message: Any, values: Any, path: str, unread: list[str] | None) -> None:
         if not isinstance(values, dict):
             raise FieldError("%s is %s; an object with the fields of %s is expected"
                              % (path or "the message", shown(values), message._type))
@@ -189,7 +195,7 @@ class Reader:
             where = path + "." + name if path else name
             setattr(message, name, self._value(types[name], value, getattr(message, name), where, unread))
 
-    def _value(self, slot_type, value, default, path, unread):
+    def _value(self, slot_type: str, value: Any, default: Any, path: str, unread: list[str] | None) -> Any:
         base, length = parts_of(slot_type)
         if length is None:
             return self._one(base, value, default, path, unread)
@@ -203,7 +209,7 @@ class Reader:
             raise FieldError("%s has %s; %d are expected" % (path, counted(len(found), "element"), length))
         return found
 
-    def _many(self, base, values, path, unread):
+    def _many(self, base: str, values: Sequence[Any], path: str, unread: list[str] | None) -> list[Any]:
         kinds = set(map(type, values))
         # Long arrays of numbers are checked without a call for each.
         if base in _FLOATS and kinds <= {float}:
@@ -217,14 +223,14 @@ class Reader:
                     for i, value in enumerate(values)]
         return [_scalar(base, value, "%s[%d]" % (path, i)) for i, value in enumerate(values)]
 
-    def _empty(self, base):
+    def _empty(self, base: str) -> Time | Duration | Message:
         """An element of an array. Times come from the caller's clock, as no type of a message has their names."""
         if base not in _TIMES:
             return self._class_of(base)()
         now = self._now()
         return type(now)() if base == "time" else now - now
 
-    def _one(self, base, value, default, path, unread):
+    def _one(self, base: str, value: Any, default: Any, path: str, unread: list[str] | None) -> Any:
         if base in _TIMES:
             return self._time(base, value, default, path, unread)
         if "/" not in base:
@@ -232,7 +238,8 @@ class Reader:
         self._lay(default, value, path, unread)
         return default
 
-    def _time(self, base, value, default, path, unread):
+    def _time(self, base: str, value: Any, default: Time | Duration, path: str,
+              unread: list[str] | None) -> Time | Duration:
         if value == "now":
             now = self._now()
             value = {"secs": now.secs, "nsecs": now.nsecs}
@@ -245,13 +252,13 @@ class Reader:
         return default
 
 
-def _pass_over(text, unread):
+def _pass_over(text: str, unread: list[str] | None) -> None:
     if unread is None:
         raise FieldError(text)
     unread.append(text)
 
 
-def _bytes(base, value, path):
+def _bytes(base: str, value: Any, path: str) -> bytes:
     if isinstance(value, bytes):
         return value
     if isinstance(value, str):
@@ -266,7 +273,7 @@ def _bytes(base, value, path):
     raise FieldError("%s is %s; base64 text or a list of numbers is expected" % (path, shown(value)))
 
 
-def _integer(value, limits, path, base):
+def _integer(value: Any, limits: tuple[int, int], path: str, base: str) -> int:
     if type(value) is not int:
         raise FieldError("%s is %s; an integer is expected (%s)" % (path, shown(value), base))
     if not limits[0] <= value <= limits[1]:
@@ -274,7 +281,7 @@ def _integer(value, limits, path, base):
     return value
 
 
-def _scalar(base, value, path):
+def _scalar(base: str, value: Any, path: str) -> Any:
     if base in RANGES:
         return _integer(value, RANGES[base], path, base)
     if base in _FLOATS:

@@ -4,12 +4,15 @@
 A stream is one answer that never ends, with a JPEG or PNG for each image. Its connection holds the image that is being
 written and the newest one after it: a client that reads slowly sees fewer images, and none of them late.
 """
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import logging
 import socket
 import time
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from tornado import iostream, web
 
@@ -19,6 +22,13 @@ from web_bridge.cameras import COMPRESSED, IMAGE
 from web_bridge.errors import BridgeError, NoSuchTopic, Refused, shown
 from web_bridge.pictures import JPEG_QUALITY, PNG_COMPRESSION, Form
 from web_bridge.websocket import MAX_CLIENTS, token_of
+
+if TYPE_CHECKING:
+    from genpy import Message
+    from tornado.httputil import HTTPServerRequest
+
+    from web_bridge.cameras import Cameras
+    from web_bridge.pictures import Picture
 
 _LOG = logging.getLogger("web_bridge")
 BOUNDARY = "boundarydonotcross"
@@ -41,7 +51,7 @@ _NOT_KEPT = {"Server": "web_video_server", "Pragma": "no-cache", "Referrer-Polic
 class QueryError(BridgeError):
     """A query that cannot be served; ``status`` of HTTP."""
 
-    def __init__(self, status, text):
+    def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
         self.status = status
 
@@ -54,7 +64,7 @@ class VideoOptions(NamedTuple):
     access: Access
     default_type: str = "mjpeg"
     repeat_s: float = 0.0
-    told: callable = _LOG.debug
+    told: Callable[[str], None] = _LOG.debug
     snapshot_s: float = SNAPSHOT_S
 
 
@@ -68,7 +78,7 @@ class Query(NamedTuple):
     transport: str = "raw"
 
 
-def check_type(name):
+def check_type(name: str) -> None:
     """Raise QueryError unless this is a type of stream that is served."""
     if name in _ENCODED_ELSEWHERE:
         raise QueryError(501, "type=%s needs a video encoder, which this server does not have; mjpeg, png and "
@@ -77,7 +87,7 @@ def check_type(name):
         raise QueryError(404, "type=%s is not known; mjpeg, png and ros_compressed are served" % name)
 
 
-def read_query(get, default_type="mjpeg"):
+def read_query(get: Callable[[str], Any], default_type: str = "mjpeg") -> Query:
     """The Query in the arguments of an address; ``get(name)`` returns the last of a name, or None. Raises
     QueryError.
     """
@@ -95,7 +105,7 @@ def read_query(get, default_type="mjpeg"):
     return Query(topic, form, "original" if name == "ros_compressed" else transport)
 
 
-def _number(get, name):
+def _number(get: Callable[[Any], Any], name: str) -> int | None:
     """A number as the nearest integer; None where there is none. Raises QueryError."""
     text = get(name)
     if text in (None, ""):
@@ -106,7 +116,7 @@ def _number(get, name):
         raise QueryError(400, "%s=%s is no number" % (name, text)) from None
 
 
-def _side(get, name):
+def _side(get: Callable[..., Any], name: str) -> int | None:
     value = _number(get, name)
     if value in (None, -1):
         return None
@@ -116,7 +126,7 @@ def _side(get, name):
     return value
 
 
-def routes(server):
+def routes(server: VideoServer) -> list[tuple[str, type, dict[str, VideoServer]]]:
     """The addresses for a tornado application."""
     return [(path, handler, {"server": server}) for path, handler in (
         ("/", ListHandler), ("/stream", StreamHandler), ("/stream_viewer", ViewerHandler),
@@ -126,29 +136,29 @@ def routes(server):
 class VideoServer:
     """State that the handlers share: cameras, options, and the open streams."""
 
-    def __init__(self, cameras, options):
+    def __init__(self, cameras: Cameras, options: VideoOptions) -> None:
         self.cameras = cameras
         self.options = options
         self.streams = set()
-        self._held = {}  # stream -> bytes
+        self._held: dict[Stream, int] = {}  # bytes
         self._held_bytes = 0
 
-    def hold(self, stream, size):
+    def hold(self, stream: Stream, size: int) -> None:
         """``stream`` holds ``size`` bytes for its client. Beyond MAX_HELD_BYTES the streams that hold most end."""
         self._held_bytes += size - self._held.get(stream, 0)
         self._held[stream] = size
         while self._held_bytes > MAX_HELD_BYTES:
-            largest = max(self._held, key=self._held.get)
+            largest = max(self._held, key=self._held.__getitem__)
             _LOG.warning("a stream ends: clients that do not read hold more than %d MB, and its image has %d MB",
                          MAX_HELD_BYTES >> 20, self._held[largest] >> 20)
             self.release(largest)
             largest.close()
 
-    def release(self, stream):
+    def release(self, stream: Stream) -> None:
         """``stream`` holds nothing more."""
         self._held_bytes -= self._held.pop(stream, 0)
 
-    async def source(self, query):
+    async def source(self, query: Query):
         """(the full name of the topic to subscribe to, the form). Raises BridgeError."""
         compressed = query.topic.rstrip("/") + "/compressed"
         if query.transport == "compressed":
@@ -159,12 +169,12 @@ class VideoServer:
                 return await self.cameras.find(compressed, (COMPRESSED,)), Form("original")
         return await self.cameras.find(query.topic), query.form
 
-    async def close_all(self):
+    async def close_all(self) -> None:
         for stream in list(self.streams):
             stream.close()
 
 
-def check_request(access, request):
+def check_request(access: Access, request: HTTPServerRequest) -> None:
     """Raise Refused unless a client, and the page that it shows, may look."""
     headers, host = request.headers, request.host
     access.may_act(token_of(request))
@@ -179,15 +189,15 @@ def check_request(access, request):
 
 
 class _Handler(web.RequestHandler):
-    def initialize(self, server):
+    def initialize(self, server: VideoServer) -> None:
         self._server = server
         self._gone = asyncio.Event()
 
-    def set_default_headers(self):
+    def set_default_headers(self) -> None:
         for name, value in _NOT_KEPT.items():
             self.set_header(name, value)
 
-    def prepare(self):
+    def prepare(self) -> None:
         self._server.options.told("%s asks for %s" % (self.request.remote_ip, self.request.path))
         try:
             check_request(self._server.options.access, self.request)
@@ -198,24 +208,24 @@ class _Handler(web.RequestHandler):
         for name, value in self.cross_origin().items():
             self.set_header(name, value)
 
-    def cross_origin(self):
+    def cross_origin(self) -> dict[str, str]:
         """Headers by which a browser lets the page of a checked origin read the answer."""
         origin = self.request.headers.get("Origin")
         return {} if origin is None else {"Access-Control-Allow-Origin": origin, "Vary": "Origin"}
 
-    def refuse(self, status, error):
+    def refuse(self, status: int, error: Any) -> None:
         """A sentence instead of an image."""
         self.set_status(status)
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(str(error) + "\n")
 
-    def last_argument(self, name):
+    def last_argument(self, name: str) -> str | None:
         return self.get_query_argument(name, None)
 
-    def on_connection_close(self):
+    def on_connection_close(self) -> None:
         self._gone.set()
 
-    async def get(self):
+    async def get(self) -> None:
         try:
             await self.answer()
         except QueryError as error:
@@ -223,19 +233,19 @@ class _Handler(web.RequestHandler):
         except BridgeError as error:
             self.refuse(404 if isinstance(error, NoSuchTopic) else 400, error)
 
-    async def answer(self):
+    async def answer(self) -> Message:
         """Serve the request. Raises BridgeError."""
         raise NotImplementedError
 
 
 class ListHandler(_Handler):
-    async def answer(self):
+    async def answer(self) -> None:
         topics = await self._server.cameras.published()
         self.finish(video_pages.topics(topics, IMAGE, token_of(self.request)))
 
 
 class ViewerHandler(_Handler):
-    async def answer(self):
+    async def answer(self) -> None:
         query = read_query(self.last_argument, self._server.options.default_type)
         self.finish(video_pages.viewer(query.topic, self.request.query))
 
@@ -243,7 +253,7 @@ class ViewerHandler(_Handler):
 class SnapshotHandler(_Handler):
     """One image: the next one, or the one that a publisher keeps for subscribers to come."""
 
-    async def answer(self):
+    async def answer(self) -> None:
         server = self._server
         query = read_query(self.last_argument)
         topic, form = await server.source(query)
@@ -272,16 +282,16 @@ class SnapshotHandler(_Handler):
 class _One:
     """A viewer that keeps one picture."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.picture = asyncio.get_running_loop().create_future()
 
-    def show(self, picture):
+    def show(self, picture: Picture) -> None:
         if not self.picture.done():
             self.picture.set_result(picture)
 
 
 class StreamHandler(_Handler):
-    async def answer(self):
+    async def answer(self) -> None:
         server = self._server
         query = read_query(self.last_argument, server.options.default_type)
         if len(server.streams) >= MAX_CLIENTS:
@@ -309,7 +319,7 @@ class StreamHandler(_Handler):
 class Stream:
     """The images of one client."""
 
-    def __init__(self, connection, topic, form, server):
+    def __init__(self, connection: iostream.IOStream, topic: str, form: Form, server: VideoServer) -> None:
         self._server = server
         self._connection = connection
         self._topic = topic
@@ -320,18 +330,19 @@ class Stream:
         self._told = ""
         connection.set_nodelay(True)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-            connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
+            own = cast("socket.socket", connection.socket)
+            own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
         connection.set_close_callback(self._changed.set)
 
-    def show(self, picture):
+    def show(self, picture: Picture) -> None:
         """The newest picture, instead of one that was not yet looked at."""
         self._newest = picture
         self._changed.set()
 
-    def close(self):
+    def close(self) -> None:
         self._connection.close()
 
-    async def run(self, headers):
+    async def run(self, headers: dict[str, str]) -> Any:
         """Write pictures until the connection ends. Raises StreamClosedError."""
         headers = {**headers, "Connection": "close", "Content-type": "multipart/x-mixed-replace;boundary=" + BOUNDARY}
         head = "".join("%s: %s\r\n" % item for item in headers.items())
@@ -352,7 +363,7 @@ class Stream:
                 frame = None
                 self._server.release(self)
 
-    async def _next(self, limit_s):
+    async def _next(self, limit_s: float):
         """The picture that came after the last one; None after ``limit_s`` (0: waits on). Raises StreamClosedError."""
         while True:
             if self._connection.closed():
@@ -366,7 +377,7 @@ class Stream:
             except TimeoutError:
                 return None
 
-    async def _encoded(self, picture):
+    async def _encoded(self, picture: Picture):
         """The picture as this client wants it, or None where it cannot be shown."""
         try:
             return await picture.encoded(self._form)

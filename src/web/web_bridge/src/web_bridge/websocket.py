@@ -6,11 +6,14 @@ is read when the last one has been served, so that a flood of operations waits i
 the client waits in its OutgoingBuffer and is written by a task of its own; a client that does not read stops that task,
 and nothing else.
 """
+from __future__ import annotations
+
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tornado import iostream, web, websocket
 
@@ -18,6 +21,13 @@ from web_bridge.access import Access, Rules
 from web_bridge.errors import Refused
 from web_bridge.outgoing import DROPPABLE_BYTES, OutgoingBuffer
 from web_bridge.session import Session
+
+if TYPE_CHECKING:
+    from tornado.httputil import HTTPServerRequest
+
+    from web_bridge.foxglove.rules import FoxgloveRules
+    from web_bridge.foxglove.session import FoxgloveSession
+    from web_bridge.loop_thread import LoopThread
 
 _LOG = logging.getLogger("web_bridge")
 #: Threads for operations that may wait for the master.
@@ -31,7 +41,7 @@ class SocketOptions(NamedTuple):
     ``buffer_bytes``: messages of topics that wait for one client."""
 
     access: Access
-    rules: Rules = Rules()
+    rules: Rules | FoxgloveRules = Rules()
     delay_s: float = 0.0
     use_compression: bool = False
     ping_interval_s: float = 0.0
@@ -43,7 +53,8 @@ class SocketOptions(NamedTuple):
 class Clients:
     """The connected clients. ``changed(list of (address, time.time() of its connection))`` is called in the loop."""
 
-    def __init__(self, bridge, loop_thread, options, changed=lambda clients: None):
+    def __init__(self, bridge: Any, loop_thread: LoopThread, options: SocketOptions,
+                 changed: Callable[[Any], None] = lambda clients: None) -> None:
         self.bridge = bridge
         self.loop_thread = loop_thread
         self.options = options
@@ -51,50 +62,50 @@ class Clients:
         self._changed = changed
         self._open = {}
 
-    def opened(self, socket, address):
+    def opened(self, socket: ClientSocket, address: str) -> None:
         self._open[socket] = (address, time.time())
         self._changed(list(self._open.values()))
 
-    def closed(self, socket):
+    def closed(self, socket: ClientSocket) -> None:
         if self._open.pop(socket, None) is not None:
             self._changed(list(self._open.values()))
 
     @property
-    def is_full(self):
+    def is_full(self) -> bool:
         return len(self._open) >= MAX_CLIENTS
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._open)
 
     @property
-    def need_time(self):
+    def need_time(self) -> bool:
         """Any thread: whether a client is connected that has not said ``time=none`` in its address."""
         return any(socket.needs_time for socket in list(self._open))
 
-    def application(self, *routes, socket=None):
+    def application(self, *routes: Any, socket: type[ClientSocket] | None = None) -> web.Application:
         """A tornado application that serves ``socket`` (a ClientSocket; None: rosbridge) at its PATHS, after further
         ``routes``.
         """
         socket = socket or RosbridgeSocket
         options = self.options
-        settings = {"websocket_max_message_size": options.largest_message}
+        settings: dict[str, Any] = {"websocket_max_message_size": options.largest_message}
         if options.ping_interval_s:
             settings["websocket_ping_interval"] = options.ping_interval_s
             settings["websocket_ping_timeout"] = min(options.ping_timeout_s, options.ping_interval_s)
         return web.Application([*routes, (socket.PATHS, socket, {"clients": self})],
                                log_function=lambda handler: None, **settings)
 
-    def shut_down(self):
+    def shut_down(self) -> None:
         """Close all connections and end the threads; not from the loop's thread."""
         self.loop_thread.run(self._close_all())
         self.pool.shutdown(wait=False)
 
-    async def _close_all(self):
+    async def _close_all(self) -> None:
         for socket in list(self._open):
             socket.close(1001, "the server ends")
 
 
-def token_of(request):
+def token_of(request: HTTPServerRequest) -> str:
     """The token of a request: ?token=… or "Authorization: Bearer …"; "" where there is none."""
     given = request.query_arguments.get("token")
     if given:
@@ -110,10 +121,10 @@ class BufferedSocket(websocket.WebSocketHandler):
     ``outgoing``: the client's OutgoingBuffer, None before it is open; ``may_act``: may it do more than watch?
     """
 
-    outgoing = None
+    outgoing: OutgoingBuffer | None = None
     may_act = False
 
-    def let_in(self, access, is_full, most):
+    def let_in(self, access: Access, is_full: bool, most: int) -> None:
         """For ``prepare()``: answer 403 to a client that ``access`` refuses, 503 where ``most`` are connected."""
         try:
             access.check_origin(self.request.headers.get("Origin"), self.request.host)
@@ -127,43 +138,46 @@ class BufferedSocket(websocket.WebSocketHandler):
             self.set_status(503)
             self.finish("%d clients are connected, which is the limit\n" % most)
 
-    def check_origin(self, origin):
+    def check_origin(self, origin: str) -> bool:
         # let_in() has checked it, with a reason.
         return True
 
-    def start_writing(self, loop_thread, buffer_bytes=DROPPABLE_BYTES, delay_s=0.0):
+    def start_writing(self, loop_thread: LoopThread, buffer_bytes: int = DROPPABLE_BYTES,
+                      delay_s: float = 0.0) -> OutgoingBuffer:
         """For ``open()``: make ``outgoing``, and write what is put into it, ``delay_s`` between two frames."""
         self.set_nodelay(True)
         self._wakeup, self._written = asyncio.Event(), asyncio.Event()
         self.outgoing = OutgoingBuffer(lambda: loop_thread.soon(self._wakeup.set), buffer_bytes)
-        self._writer = asyncio.ensure_future(self._write(delay_s))
+        self._writer = asyncio.ensure_future(self._write(self.outgoing, delay_s))
+        return self.outgoing
 
-    def stop_writing(self):
+    def stop_writing(self) -> None:
         """For ``on_close()``; also where the socket was never open."""
         if self.outgoing is not None:
             self.outgoing.close()
             self._written.set()
 
-    async def _write(self, delay_s):
+    async def _write(self, outgoing: OutgoingBuffer, delay_s: float) -> None:
         try:
-            while not self.outgoing.closed:
+            while not outgoing.closed:
                 self._wakeup.clear()
-                while (frames := self.outgoing.take()) is not None:
+                while (frames := outgoing.take()) is not None:
                     for frame in frames:
                         await self.write_message(frame, binary=isinstance(frame, bytes))
                         self._written.set()
                         if delay_s:
                             await asyncio.sleep(delay_s)
-                if self.outgoing.overflowed:
+                if outgoing.overflowed:
                     self.close(1008, "answers were not read")
                     return
                 await self._wakeup.wait()
         except (websocket.WebSocketClosedError, iostream.StreamClosedError):
             pass  # on_close does the rest
 
-    async def wait_for_room(self, kept_bytes):
+    async def wait_for_room(self, kept_bytes: int) -> None:
         """Wait until answers of at most ``kept_bytes`` wait for this client, or it has gone."""
-        while not self.outgoing.closed and self.outgoing.kept_bytes > kept_bytes:
+        outgoing = self.outgoing
+        while outgoing is not None and not outgoing.closed and outgoing.kept_bytes > kept_bytes:
             self._written.clear()
             await self._written.wait()
 
@@ -177,32 +191,32 @@ class ClientSocket(BufferedSocket):
 
     PATHS = ""
 
-    def initialize(self, clients):
+    def initialize(self, clients: Clients) -> None:
         self._clients = clients
         self._session = None
 
     @property
-    def needs_time(self):
+    def needs_time(self) -> bool:
         """False for a client that only reads what comes, and said so."""
         return self.request.query_arguments.get("time") != [b"none"]
 
-    def new_session(self, rules):
+    def new_session(self, rules: Any, outgoing: OutgoingBuffer) -> Session | FoxgloveSession:
         """The session of a client that has been let in; in the loop, so it must not wait for the master."""
         raise NotImplementedError
 
-    def prepare(self):
+    def prepare(self) -> None:
         self.let_in(self._clients.options.access, self._clients.is_full, MAX_CLIENTS)
 
-    def get_compression_options(self):
+    def get_compression_options(self) -> dict[str, Any] | None:
         return {} if self._clients.options.use_compression else None
 
-    def open(self, *_):
+    def open(self, *_: str) -> None:
         options = self._clients.options
-        self.start_writing(self._clients.loop_thread, options.buffer_bytes, options.delay_s)
-        self._session = self.new_session(options.rules._replace(may_act=self.may_act))
-        self._clients.opened(self, self.request.remote_ip)
+        outgoing = self.start_writing(self._clients.loop_thread, options.buffer_bytes, options.delay_s)
+        self._session = self.new_session(options.rules._replace(may_act=self.may_act), outgoing)
+        self._clients.opened(self, self.request.remote_ip or "")
 
-    async def on_message(self, message):
+    async def on_message(self, message: str | bytes) -> None:
         session = self._session
         if session is None:
             return
@@ -216,7 +230,7 @@ class ClientSocket(BufferedSocket):
             _LOG.exception("an operation of the client at %s failed", self.request.remote_ip)
             session.tell_fault("the server failed at this operation; its log says how")
 
-    def on_close(self):
+    def on_close(self) -> None:
         self.stop_writing()
         self._clients.closed(self)
         if self._session is None:
@@ -228,7 +242,7 @@ class ClientSocket(BufferedSocket):
             pass  # the server ends, and the node with it
 
 
-def _close(session):
+def _close(session: Session | FoxgloveSession) -> None:
     try:
         session.close()
     # Nobody waits for this thread's result.
@@ -241,5 +255,5 @@ class RosbridgeSocket(ClientSocket):
 
     PATHS = r"/(?:rosbridge)?"
 
-    def new_session(self, rules):
-        return Session(self._clients.bridge, self.outgoing, rules)
+    def new_session(self, rules: Rules, outgoing: OutgoingBuffer) -> Session:
+        return Session(self._clients.bridge, outgoing, rules)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node web_video_server: reads its parameters and listens."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from tornado import web
 
@@ -13,12 +17,12 @@ from web_bridge.video import VideoServer, routes
 from web_video_server.parameters import read_parameters
 
 
-def main():
+def main() -> int:
     """Returns the exit code."""
     return ros_node.run("web_video_server", read_parameters, _serve)
 
 
-def _serve(parameters):
+def _serve(parameters: Any) -> None:
     loop_thread = LoopThread("video")
     cameras = Cameras(ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now), loop_thread,
                       parameters.threads)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The parameters of web_video_server, by their published names. No ROS."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from web_bridge.parameters import Endpoint, ParameterError, access_of, number, port_of, switch, warnings_of
 from web_bridge.video import QueryError, VideoOptions, check_type
@@ -16,7 +19,7 @@ class ServerParameters(NamedTuple):
     warnings: tuple
 
 
-def read_parameters(get):
+def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
     """``get(name, default)`` returns a parameter of the node. Raises ParameterError."""
     address = str(get("address", "localhost"))
     access = access_of(get)
@@ -34,7 +37,7 @@ def read_parameters(get):
                             warnings_of(address, access, "see what the robot's cameras see"))
 
 
-def _period(get):
+def _period(get: Callable[[str, Any], Any]) -> float:
     """Seconds after which a stream's last image is sent again; 0: never, which web_video_server writes as -1."""
     rate = get("publish_rate", -1)
     if not isinstance(rate, bool) and isinstance(rate, int | float) and rate <= 0:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files of packages by their package:// names: meshes, textures, descriptions."""
+from __future__ import annotations
+
 import os
 import re
 import stat
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -16,11 +19,11 @@ _URI = re.compile(r"package://([A-Za-z][\w-]*)/(.+)", re.DOTALL)
 class Assets:
     """``folder_of(package)`` returns the folder of a package, or None."""
 
-    def __init__(self, folder_of, largest_file=LARGEST_FILE):
+    def __init__(self, folder_of: Callable[[str], str | None], largest_file: int = LARGEST_FILE) -> None:
         self._folder_of = folder_of
         self._largest_file = largest_file
 
-    def read(self, uri):
+    def read(self, uri: str) -> bytes:
         """The bytes of a file inside of its package's folder. Raises BridgeError."""
         parts = _URI.fullmatch(uri)
         if parts is None:
@@ -43,7 +46,7 @@ class Assets:
             reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else "a loop of links"
             raise BridgeError("%s cannot be read: %s" % (shown(uri, 200), reason)) from None
 
-    def _contents(self, path, uri):
+    def _contents(self, path: Path, uri: str) -> bytes:
         # Not to wait for a named pipe; and no link that has been put there since.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
         with open(descriptor, "rb") as stream:

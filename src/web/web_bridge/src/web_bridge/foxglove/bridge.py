@@ -1,19 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""State that all Foxglove clients share: channels, parameters, time, and the thread that looks at the graph. No ROS.
+"""State that all Foxglove clients share: channels, parameters, time, and the thread that looks at the graph. No ROS."""
+from __future__ import annotations
 
-The graph has, beside what :mod:`web_bridge.session` lists, these methods, all of which may block and raise BridgeError:
-
-- ``state()``: a GraphState
-- ``message_schema(topic, type)``: (definition with all that it holds, MD5)
-- ``service_schema(service)``: (type, definition of the request, of the response)
-- ``parameters()``: the master's tree; ``set_parameter(name, value)``, ``delete_parameter(name)``
-- ``watch_parameter(name)``: from now on changes are told to the function given to ``on_parameter(f)``: ``f(name,
-  value)``, on any thread, ``{}`` for a deleted one
-- ``package_folder(name)``: a path, or None
-"""
 import logging
 import threading
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from web_bridge.access import is_token, without_tokens
 from web_bridge.errors import BridgeError
@@ -25,6 +17,13 @@ from web_bridge.foxglove.parameters import shown_parameter
 from web_bridge.foxglove.rules import FoxgloveRules
 from web_bridge.publications import Publications
 from web_bridge.services import CallPool
+
+if TYPE_CHECKING:
+    from web_bridge.codec import Codec
+    from web_bridge.feeds import Arrival
+    from web_bridge.foxglove.session import FoxgloveSession
+    from web_bridge.graph import Subscription, WatchedGraph
+    from web_bridge.loop_thread import Later
 
 _LOG = logging.getLogger("web_bridge")
 _CLOCK = "/clock"
@@ -51,7 +50,8 @@ class FoxgloveOptions(NamedTuple):
 class FoxgloveBridge:
     """``rules``: FoxgloveRules. ``close()`` ends its thread."""
 
-    def __init__(self, graph, codec, later, rules=None, options=None):
+    def __init__(self, graph: WatchedGraph, codec: Codec, later: Callable[[float, Callable[[], None]], Later],
+                 rules: FoxgloveRules | None = None, options: FoxgloveOptions | None = None) -> None:
         self.options = options or FoxgloveOptions()
         self.rules = rules or FoxgloveRules()
         self.graph = graph
@@ -69,7 +69,7 @@ class FoxgloveBridge:
         self._watched = set()  # names that the graph tells changes of
         self._known = []  # frames for a new client
         self._state = NOTHING
-        self._clock = None
+        self._clock: Subscription | None = None
         self._time_ns = None
         self._time_waits = False
         self._told = set()
@@ -79,17 +79,17 @@ class FoxgloveBridge:
         self._thread = threading.Thread(target=self._watch, name="foxglove graph", daemon=True)
         self._thread.start()
 
-    def close(self):
+    def close(self) -> None:
         self._closing.set()
         self._wake.set()
 
-    def look_soon(self):
+    def look_soon(self) -> None:
         """Look at the graph without waiting for the next time."""
         self._wake.set()
 
     # Clients
 
-    def add(self, client):
+    def add(self, client: FoxgloveSession) -> None:
         """A new client: send it what is known, and look for what is new."""
         with self._lock:
             self._clients.add(client)
@@ -98,7 +98,7 @@ class FoxgloveBridge:
                 client.send_time(wire.time_frame(self._time_ns))
         self.look_soon()
 
-    def remove(self, client):
+    def remove(self, client: FoxgloveSession) -> None:
         with self._lock:
             self._clients.discard(client)
             self._graph_clients.discard(client)
@@ -106,24 +106,24 @@ class FoxgloveBridge:
                 clients.discard(client)
         self.look_soon()
 
-    def follow_graph(self, client):
+    def follow_graph(self, client: FoxgloveSession) -> None:
         """Send the whole connection graph, and from now on its changes."""
         with self._lock:
             if client not in self._graph_clients:
                 self._graph_clients.add(client)
                 client.send("connectionGraphUpdate", **graph_update(NOTHING, self._state))
 
-    def leave_graph(self, client):
+    def leave_graph(self, client: FoxgloveSession) -> None:
         with self._lock:
             self._graph_clients.discard(client)
 
     # Parameters
 
-    def parameters(self):
+    def parameters(self) -> dict[str, Any]:
         """The tree of all parameters that clients may know. Raises BridgeError."""
         return without_tokens(self.graph.parameters())
 
-    def watch_parameters(self, client, names):
+    def watch_parameters(self, client: FoxgloveSession, names: list[str]) -> None:
         """Tell a client changes of parameters (absolute names). Raises BridgeError."""
         for name in names:
             with self._lock:
@@ -133,12 +133,12 @@ class FoxgloveBridge:
                 self.graph.watch_parameter(name)
                 self._watched.add(name)
 
-    def leave_parameters(self, client, names):
+    def leave_parameters(self, client: FoxgloveSession, names: set[str]) -> None:
         with self._lock:
             for name in names:
                 self._parameter_clients.get(name, set()).discard(client)
 
-    def tell_parameter(self, name, value):
+    def tell_parameter(self, name: str, value: Any) -> None:
         """Send a parameter's value to the clients that watch it; ``{}``: it is no longer set."""
         with self._lock:
             clients = list(self._parameter_clients.get(name, ()))
@@ -149,13 +149,13 @@ class FoxgloveBridge:
             for client in clients:
                 client.send("parameterValues", parameters=[parameter])
 
-    def _parameter_changed(self, name, value):
+    def _parameter_changed(self, name: str, value: float) -> None:
         # On a thread that holds rospy's lock.
         self._later(0.0, lambda: self.tell_parameter(name.rstrip("/"), value))
 
     # The graph
 
-    def _watch(self):
+    def _watch(self) -> None:
         delay_s = _FIRST_LOOK_S
         while not self._closing.is_set():
             with self._lock:
@@ -174,7 +174,7 @@ class FoxgloveBridge:
                 changes = None
             delay_s = _FIRST_LOOK_S if changes or was_asked else min(2 * delay_s, self.options.longest_look_s)
 
-    def _look(self):
+    def _look(self) -> Changes | None:
         try:
             changes = self.catalogue.look(self.graph.state())
         except BridgeError as error:
@@ -198,13 +198,13 @@ class FoxgloveBridge:
         return changes
 
     @staticmethod
-    def _tell(clients, news):
+    def _tell(clients: list[FoxgloveSession] | set[FoxgloveSession], news: list[tuple[str | None, str]]) -> None:
         for client in clients:
             for capability, text in news:
                 if capability is None or client.has(capability):
                     client.send_text(text)
 
-    def _warn(self, text):
+    def _warn(self, text: str) -> None:
         # The same reason once, not with each look.
         if text not in self._told and len(self._told) < 1000:
             self._told.add(text)
@@ -212,7 +212,7 @@ class FoxgloveBridge:
 
     # Time
 
-    def _follow_clock(self):
+    def _follow_clock(self) -> bool:
         """Hear /clock as long as there are clients; returns whether there are any."""
         with self._lock:
             is_wanted = bool(self._clients)
@@ -220,11 +220,11 @@ class FoxgloveBridge:
             self._clock = self.graph.subscribe(_CLOCK, self._clock_arrived)
         elif not is_wanted and self._clock is not None:
             self._clock.close()
-            self._clock = None
+            self._clock: Subscription | None = None
             self._time_ns = None
         return is_wanted
 
-    def _clock_arrived(self, arrival):
+    def _clock_arrived(self, arrival: Arrival) -> None:
         time_ns = wire.time_of_clock(arrival.data)
         with self._lock:
             is_first, self._time_ns = not self._time_waits, time_ns
@@ -232,7 +232,7 @@ class FoxgloveBridge:
         if is_first:
             self._later(_TIME_EVERY_S, self._send_time)
 
-    def _send_time(self):
+    def _send_time(self) -> None:
         with self._lock:
             self._time_waits = False
             clients = list(self._clients)
@@ -243,7 +243,7 @@ class FoxgloveBridge:
                 client.send_time(frame)
 
 
-def _texts(changes):
+def _texts(changes: Changes) -> list[tuple[str | None, str]]:
     """[(capability that a client needs, frame)] of Changes."""
     found = [
         (None, "unadvertise", "channelIds", changes.gone_channels),

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The topics and services of the graph as channels with numbers, and what has changed since the last look."""
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from web_bridge.errors import BridgeError
+
+if TYPE_CHECKING:
+    from web_bridge.foxglove.rules import FoxgloveRules
 
 _ENCODING, _SCHEMA_ENCODING = "ros1", "ros1msg"
 
@@ -29,7 +35,7 @@ class Channel(NamedTuple):
     schema: str
     md5: str
 
-    def advertised(self):
+    def advertised(self) -> dict[str, Any]:
         return {"id": self.id, "topic": self.topic, "encoding": _ENCODING, "schemaName": self.type,
                 "schema": self.schema, "schemaEncoding": _SCHEMA_ENCODING}
 
@@ -44,13 +50,13 @@ class ServiceEntry(NamedTuple):
     response: str
     providers: frozenset = frozenset()
 
-    def advertised(self):
+    def advertised(self) -> dict[str, Any]:
         # requestSchema and responseSchema: what clients before 2024 read.
         return {"id": self.id, "name": self.name, "type": self.type, "requestSchema": self.request,
                 "responseSchema": self.response, "request": self._part("Request", self.request),
                 "response": self._part("Response", self.response)}
 
-    def _part(self, name, schema):
+    def _part(self, name: str, schema: str) -> dict[str, str]:
         return {"encoding": _ENCODING, "schemaName": self.type + name, "schemaEncoding": _SCHEMA_ENCODING,
                 "schema": schema}
 
@@ -65,7 +71,7 @@ class Changes(NamedTuple):
     graph: dict = {}  # never changed
     problems: tuple = ()
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return bool(self.channels or self.gone_channels or self.services or self.gone_services
                     or is_different(self.graph))
 
@@ -76,7 +82,8 @@ class Catalogue:
     One thread looks; others read :attr:`channels` and :attr:`services`.
     """
 
-    def __init__(self, rules, message_schema, service_schema):
+    def __init__(self, rules: FoxgloveRules, message_schema: Callable[[str, str], tuple[str, str]],
+                 service_schema: Callable[[str], tuple[str, str, str]]) -> None:
         self._rules = rules
         self._message_schema = message_schema
         self._service_schema = service_schema
@@ -86,7 +93,7 @@ class Catalogue:
         self.channels, self.services = {}, {}
         self.state = NOTHING
 
-    def look(self, state):
+    def look(self, state: GraphState) -> Changes:
         """Compare with a GraphState; returns Changes."""
         problems = []
         channels = self._updated_channels(state, problems)
@@ -99,11 +106,11 @@ class Catalogue:
         self.channels, self.services, self.state = channels, services, state
         return Changes(new_channels, gone_channels, new_services, gone_services, graph, tuple(problems))
 
-    def forget_service(self, entry):
+    def forget_service(self, entry: ServiceEntry) -> None:
         """Ask again for the type of a service at the next look."""
         self._of_service.pop(entry.name, None)
 
-    def _updated_channels(self, state, problems):
+    def _updated_channels(self, state: GraphState, problems: list[Any]) -> dict[int, Channel]:
         known, self._of_topic = self._of_topic, {}
         for topic, type_name in sorted(state.types.items()):
             if topic not in state.published or not self._rules.shows_topic(topic):
@@ -119,7 +126,7 @@ class Catalogue:
             self._of_topic[topic] = channel
         return {channel.id: channel for channel in self._of_topic.values()}
 
-    def _updated_services(self, state, problems):
+    def _updated_services(self, state: GraphState, problems: list[str]) -> dict[int, ServiceEntry]:
         known, self._of_service = self._of_service, {}
         for name, nodes in sorted(state.services.items()):
             if not self._rules.shows_service(name):
@@ -136,7 +143,7 @@ class Catalogue:
         return {entry.id: entry for entry in self._of_service.values()}
 
 
-def graph_update(before, after):
+def graph_update(before: GraphState, after: GraphState) -> dict[str, list[Any]]:
     """The fields of a connectionGraphUpdate from one GraphState to another."""
     published = _changed(before.published, after.published)
     subscribed = _changed(before.subscribed, after.subscribed)
@@ -153,15 +160,15 @@ def graph_update(before, after):
             "removedTopics": gone_topics, "removedServices": gone_services}
 
 
-def is_different(update):
+def is_different(update: dict[str, list[Any]]) -> bool:
     """Does a connectionGraphUpdate say anything?"""
     return any(update.values())
 
 
-def _changed(before, after):
+def _changed(before: dict[str, list[str]], after: dict[str, list[str]]) -> dict[str, list[str]]:
     return {name: nodes for name, nodes in after.items() if set(before.get(name, ())) != set(nodes)
             or name not in before}
 
 
-def _listed(nodes_of, key):
+def _listed(nodes_of: Mapping[str, Sequence[str]], key: str) -> list[dict[str, Any]]:
     return [{"name": name, key: sorted(nodes)} for name, nodes in sorted(nodes_of.items())]

@@ -1,22 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Messages of channels on their way to clients: serialized bytes as they came, one subscription for all clients."""
+from __future__ import annotations
+
 import threading
+from typing import TYPE_CHECKING, Any
 
 from web_bridge.feeds import Latched
 from web_bridge.foxglove.wire import message_frame, nanoseconds
+
+if TYPE_CHECKING:
+    from web_bridge.feeds import Arrival
+    from web_bridge.foxglove.catalogue import Channel
+    from web_bridge.foxglove.session import FoxgloveSession
+    from web_bridge.graph import Graph, Subscription
 
 
 class ChannelFeed:
     """One channel. A client needs ``send_message(frame)`` and ``tell_once(text)``."""
 
-    def __init__(self, channel):
+    def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self._lock = threading.Lock()
         self._clients = {}  # client -> id of its subscription
-        self._latched = Latched()
-        self.subscription = None
+        self._latched: Latched[Arrival] = Latched()
+        self.subscription: Subscription | None = None
 
-    def arrived(self, arrival):
+    def arrived(self, arrival: Arrival) -> None:
         """A message of ROS; on the thread that received it."""
         channel = self._channel
         fits = arrival.md5 in (channel.md5, "*")
@@ -39,7 +48,7 @@ class ChannelFeed:
                 frames[number] = _frame(number, arrival)
             client.send_message(frames[number])
 
-    def add(self, client, number):
+    def add(self, client: FoxgloveSession, number: int) -> None:
         """A new client gets the latched messages of publishers that are still there."""
         with self._lock:
             arrivals = self._latched.of(self.subscription) if self.subscription is not None else []
@@ -47,26 +56,26 @@ class ChannelFeed:
         for arrival in arrivals:
             client.send_message(_frame(number, arrival))
 
-    def remove(self, client):
+    def remove(self, client: FoxgloveSession) -> bool:
         """Returns whether another client is left."""
         with self._lock:
             self._clients.pop(client, None)
             return bool(self._clients)
 
 
-def _frame(number, arrival):
+def _frame(number: int, arrival: Arrival) -> bytes:
     return message_frame(number, nanoseconds(*arrival.received), arrival.data)
 
 
 class ChannelFeeds:
     """The channels that clients hear. Changes of subscriptions come one at a time; messages from any thread."""
 
-    def __init__(self, graph):
+    def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._lock = threading.Lock()
         self._feeds = {}  # channel's id -> ChannelFeed
 
-    def subscribe(self, client, number, channel):
+    def subscribe(self, client: FoxgloveSession, number: int, channel: Channel) -> None:
         """Raises BridgeError."""
         with self._lock:
             feed = self._feeds.get(channel.id)
@@ -78,14 +87,14 @@ class ChannelFeeds:
             feed.subscription = self._graph.subscribe(channel.topic, feed.arrived)
             self._feeds[channel.id] = feed
 
-    def unsubscribe(self, client, channel_id):
+    def unsubscribe(self, client: FoxgloveSession, channel_id: int) -> None:
         """The last client takes the subscription along."""
         with self._lock:
             feed = self._feeds.get(channel_id)
             if feed is not None and not feed.remove(client):
                 self._feeds.pop(channel_id).subscription.close()
 
-    def drop(self, channel_ids):
+    def drop(self, channel_ids: tuple[int, ...]) -> None:
         """End the subscriptions of channels that have gone."""
         with self._lock:
             for channel_id in channel_ids:
@@ -94,6 +103,6 @@ class ChannelFeeds:
                     feed.subscription.close()
 
     @property
-    def channel_ids(self):
+    def channel_ids(self) -> list[Any]:
         with self._lock:
             return sorted(self._feeds)

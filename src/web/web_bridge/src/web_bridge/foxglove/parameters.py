@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters of the ROS master in the protocol's form, and back."""
+from __future__ import annotations
+
 import base64
 import binascii
 import math
 import re
+from typing import Any
 from xmlrpc.client import Binary, DateTime
 
 from web_bridge.errors import BridgeError, FieldError, shown
@@ -14,7 +17,7 @@ _NOT_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]"
 _INTEGERS = range(-2 ** 31, 2 ** 31)
 
 
-def shown_parameter(name, value):
+def shown_parameter(name: str, value: Any) -> dict[str, Any] | None:
     """{name, value, type where JSON does not tell it}, or None for a value that has no form: NaN, a date."""
     if isinstance(value, Binary | bytes):
         data = value.data if isinstance(value, Binary) else value
@@ -30,7 +33,7 @@ def shown_parameter(name, value):
     return parameter
 
 
-def _is_json(value):
+def _is_json(value: Any) -> bool:
     if isinstance(value, dict):
         return all(map(_is_json, value.values()))
     if isinstance(value, list | tuple):
@@ -40,13 +43,14 @@ def _is_json(value):
     return not isinstance(value, Binary | bytes | DateTime)
 
 
-def _are_numbers(values):
+def _are_numbers(values: list[Any]) -> bool:
     return all(isinstance(one, int | float) and not isinstance(one, bool) for one in values)
 
 
-def given_value(parameter):
+def given_value(parameter: dict[str, Any]) -> Any:
     """The value of a parameter that a client sets. Raises FieldError for one that the master cannot hold."""
-    value, kind = parameter.get("value"), parameter.get("type")
+    value: Any = parameter.get("value")
+    kind = parameter.get("type")
     if kind == "byte_array":
         try:
             return Binary(base64.b64decode(value, validate=True))
@@ -66,7 +70,7 @@ def given_value(parameter):
     return value
 
 
-def _float(value):
+def _float(value: Any) -> float:
     try:
         number = float(value)
     except OverflowError:
@@ -76,7 +80,7 @@ def _float(value):
     return number
 
 
-def _check(value, depth):
+def _check(value: Any, depth: int) -> None:
     if depth > _DEEPEST:
         raise FieldError("lists and objects are nested more than %d times" % _DEEPEST)
     if isinstance(value, dict):
@@ -97,7 +101,7 @@ def _check(value, depth):
         raise FieldError("%s holds a character that the master's XML cannot hold" % shown(value))
 
 
-def flattened(tree, name=""):
+def flattened(tree: Any, name: str = "") -> dict[str, Any]:
     """{absolute name: value} of all leaves of the master's tree; an empty namespace is a leaf."""
     if not isinstance(tree, dict) or not tree:
         return {name: tree} if name else {}
@@ -107,7 +111,7 @@ def flattened(tree, name=""):
     return found
 
 
-def at(tree, name):
+def at(tree: dict[str, Any], name: str) -> Any:
     """The value of a parameter or namespace. Raises KeyError."""
     for key in name.strip("/").split("/"):
         if not isinstance(tree, dict):
@@ -116,7 +120,7 @@ def at(tree, name):
     return tree
 
 
-def check_name(name):
+def check_name(name: str) -> None:
     """Raise BridgeError for the root, which holds everything."""
     if name.strip("/") == "":
         raise BridgeError("the root of all parameters cannot be set at once; name one")

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names that a Foxglove client may use: regular expressions, as foxglove_bridge's parameters have them."""
+from __future__ import annotations
+
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from web_bridge.errors import Refused, shown
@@ -14,7 +17,7 @@ CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services"
 _OF_ACTING = ("clientPublish", "services")
 
 
-def compiled(patterns, flags=0):
+def compiled(patterns: Sequence[str], flags: re.RegexFlag | int = 0) -> tuple[re.Pattern, ...]:
     """Compiled patterns; raises re.error."""
     return tuple(re.compile(pattern, flags) for pattern in patterns)
 
@@ -30,46 +33,46 @@ class FoxgloveRules(NamedTuple):
     capabilities: tuple = CAPABILITIES
     may_act: bool = True
 
-    def shows_topic(self, topic):
+    def shows_topic(self, topic: str) -> bool:
         return _fits(self.topics, topic)
 
-    def shows_service(self, service):
+    def shows_service(self, service: str) -> bool:
         return _fits(self.services, service)
 
-    def shows_parameter(self, name):
+    def shows_parameter(self, name: str) -> bool:
         return _fits(self.parameters, name)
 
-    def has(self, capability):
+    def has(self, capability: str) -> bool:
         """May this client use a capability of the server?"""
         return capability in self.capabilities and (self.may_act or capability not in _OF_ACTING)
 
-    def check(self, capability):
+    def check(self, capability: str) -> None:
         """Raise Refused for a capability that this client may not use."""
         if capability not in self.capabilities:
             raise Refused("this server does not offer %s (~capabilities)" % capability)
         if not self.has(capability):
             raise Refused("the view token does not allow %s" % capability)
 
-    def check_publish(self, topic):
+    def check_publish(self, topic: str) -> None:
         self.check("clientPublish")
         if not _fits(self.client_topics, topic):
             raise Refused("client_topic_whitelist of this server does not allow to publish on %s" % topic)
 
-    def check_set_parameter(self, name):
+    def check_set_parameter(self, name: str) -> None:
         self.check("parameters")
         if not self.may_act:
             raise Refused("the view token does not allow to set parameters")
         self.check_parameter(name)
 
-    def check_parameter(self, name):
+    def check_parameter(self, name: str) -> None:
         if not self.shows_parameter(name):
             raise Refused("param_whitelist of this server does not allow the parameter %s" % name)
 
-    def check_asset(self, uri):
+    def check_asset(self, uri: str) -> None:
         self.check("assets")
         if ".." in uri or not _fits(self.assets, uri):
             raise Refused("asset_uri_allowlist of this server does not allow %s" % shown(uri))
 
 
-def _fits(patterns, name):
+def _fits(patterns: tuple[re.Pattern, ...], name: str) -> bool:
     return any(pattern.fullmatch(name) for pattern in patterns)

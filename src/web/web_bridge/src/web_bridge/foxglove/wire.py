@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of the Foxglove WebSocket protocol: operations in JSON, and binary frames (little-endian)."""
+from __future__ import annotations
+
 import json
 import struct
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from web_bridge.errors import FieldError, FrameError, shown
 from web_bridge.fields import field
+
+if TYPE_CHECKING:
+    from _struct import Struct
 
 #: In the server's order; a client's first match counts.
 SUBPROTOCOLS = ("foxglove.websocket.v1", "foxglove.sdk.v1")
@@ -37,44 +42,44 @@ class ServiceRequest(NamedTuple):
     data: bytes
 
 
-def text(op, **fields):
+def text(op: str, **fields: Any) -> str:
     """A JSON frame; fields that are None are left out."""
     return json.dumps({"op": op, **{name: value for name, value in fields.items() if value is not None}},
                       separators=(",", ":"))
 
 
-def message_frame(subscription_id, received_ns, data):
+def message_frame(subscription_id: int, received_ns: int, data: bytes) -> bytes:
     return _MESSAGE_HEADER.pack(_MESSAGE, subscription_id, received_ns) + data
 
 
-def time_frame(time_ns):
+def time_frame(time_ns: int) -> bytes:
     return struct.pack("<BQ", _TIME, time_ns)
 
 
-def response_frame(request, data):
+def response_frame(request: ServiceRequest, data: bytes) -> bytes:
     """The answer to a ServiceRequest, in its encoding."""
     encoding = request.encoding.encode()
     return _CALL_HEADER.pack(_RESPONSE, request.service_id, request.call_id, len(encoding)) + encoding + data
 
 
-def asset_frame(request_id, data=b"", error=""):
+def asset_frame(request_id: int, data: bytes = b"", error: str = "") -> bytes:
     """A file; with ``error`` the reason why there is none."""
     reason = error.encode()
     return _ASSET_HEADER.pack(_ASSET, request_id, bool(reason), len(reason)) + reason + data
 
 
-def nanoseconds(secs, nsecs):
+def nanoseconds(secs: int, nsecs: int) -> int:
     return secs * 1_000_000_000 + nsecs
 
 
-def time_of_clock(data):
+def time_of_clock(data: bytes) -> int:
     """The time in a serialized rosgraph_msgs/Clock [ns]. Raises FrameError."""
     if len(data) != _CLOCK.size:
         raise FrameError("%d bytes are no rosgraph_msgs/Clock" % len(data))
     return nanoseconds(*_CLOCK.unpack(data))
 
 
-def read_text(frame):
+def read_text(frame: str | bytes) -> dict[str, Any]:
     """The operation (dict) of a text frame. Raises FrameError."""
     try:
         operation = json.loads(frame)
@@ -85,7 +90,7 @@ def read_text(frame):
     return operation
 
 
-def read_binary(frame):
+def read_binary(frame: bytes) -> ClientMessage | ServiceRequest:
     """The ClientMessage or ServiceRequest of a binary frame. Raises FrameError."""
     op = frame[0] if frame else None
     if op == _CLIENT_MESSAGE:
@@ -105,21 +110,21 @@ def read_binary(frame):
                      % (len(frame), op, _CLIENT_MESSAGE, _REQUEST))
 
 
-def _unpacked(header, frame):
+def _unpacked(header: Struct, frame: bytes) -> tuple[int, ...]:
     if len(frame) < header.size:
         raise FrameError("a binary frame of type %d has %d bytes; at least %d are expected"
                          % (frame[0], len(frame), header.size))
     return header.unpack_from(frame)
 
 
-def number(value, name):
+def number(value: Any, name: str) -> int:
     """A number of 32 bits: an id. Raises FieldError."""
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= LARGEST_ID:
         raise FieldError("%s is %s; a whole number from 0 to %d is expected" % (name, shown(value), LARGEST_ID))
     return value
 
 
-def entries(operation, name, kind):
+def entries(operation: dict[str, Any], name: str, kind: type) -> list[Any]:
     """A list of objects of one kind. Raises FieldError."""
     values = field(operation, name, list)
     for value in values:
