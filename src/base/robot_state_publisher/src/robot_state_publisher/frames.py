@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The frames of a robot's links as messages of /tf, from the positions of its joints. ROS-free."""
+from __future__ import annotations
+
 import struct
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urdf_model import Robot
 from urdf_model.transforms import quaternion_from_matrix
+
+if TYPE_CHECKING:
+    from urdf_model.model import Joint
 
 _HEAD = "I"  # number of transforms, or length of a text
 _STAMPED = "III"  # sequence, seconds, nanoseconds
@@ -26,7 +32,7 @@ def tf_name(prefix: str, frame: str) -> str:
 class JointFrames:
     """Makes the bytes of a tf2_msgs/TFMessage. ``prefix``: tf_prefix of its frames."""
 
-    def __init__(self, robot: Robot, prefix: str = ""):
+    def __init__(self, robot: Robot, prefix: str = "") -> None:
         self._joints = {joint.name: joint for joint in robot.movable_joints()}
         # A planar joint counts as fixed, as in the original; only a pose could move a floating one.
         self._fixed = sorted((joint for joint in robot.joints.values() if joint.type in ("fixed", "planar")),
@@ -57,7 +63,7 @@ class JointFrames:
         """Those of the names that the description does not have."""
         return [name for name in names if name not in self._of_robot]
 
-    def _group(self, names):
+    def _group(self, names: tuple[str, ...]) -> _Group:
         rows = {}  # {joint: (place of its position in the message, multiplier, offset)}
         for place, name in enumerate(names):
             rows.setdefault(name, (place, 1.0, 0.0))
@@ -72,7 +78,7 @@ class JointFrames:
 class _Group:
     """Joints that are computed at once. rows: of (joint, place of its position in a message, multiplier, offset)."""
 
-    def __init__(self, rows, prefix):
+    def __init__(self, rows: list[tuple[Joint, int, float, float]], prefix: str) -> None:
         joints = [joint for joint, _, _, _ in rows]
         self._place = np.array([place for _, place, _, _ in rows], dtype=int)
         self._scale, self._offset = (np.array([row[column] for row in rows]) for column in (2, 3))
@@ -92,7 +98,7 @@ class _Group:
             "%s%s%ds%s%ds%s" % (_STAMPED, _HEAD, len(parent), _HEAD, len(child), _POSE) for parent, child in texts))
         self._texts = [(len(parent), parent, len(child), child) for parent, child in texts]
 
-    def packed(self, positions, time_ns):
+    def packed(self, positions: np.ndarray, time_ns: int) -> bytes:
         values = positions[self._place] * self._scale + self._offset
         angle = values * self._half
         turn = self._at_rest * np.cos(angle)[:, None] + self._turned * np.sin(angle)[:, None]
@@ -113,7 +119,7 @@ class _Group:
 class Due:
     """Which joint states are sent on: where one of their joints was sent at least ``period_ns`` [ns] before."""
 
-    def __init__(self, period_ns: int):
+    def __init__(self, period_ns: int) -> None:
         self._period_ns = period_ns
         self._last_ns = {}
 
@@ -133,7 +139,7 @@ class Due:
         self._last_ns.clear()
 
 
-def _remembered(table, names, value):
+def _remembered(table: dict[tuple[str, ...], _Group], names: tuple[str, ...], value: _Group) -> _Group:
     if names not in table and len(table) >= _MAX_SETS:
         table.clear()
     table[names] = value
