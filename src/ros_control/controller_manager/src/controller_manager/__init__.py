@@ -7,13 +7,15 @@ from .controller import Controller, ControllerContext
 from .controller_table import ControllerTable
 from .errors import ControlError, ControllerError, HardwareError, Refused
 from .hardware import RobotHardware, SwitchResult
-from .interfaces import EFFORT, JOINT_STATE, POSITION, VELOCITY
+from .interfaces import EFFORT, JOINT_STATE, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY
 from .pid import Gains, Pid
 
 __all__ = [
     "EFFORT",
     "JOINT_STATE",
     "POSITION",
+    "POS_VEL",
+    "POS_VEL_ACC",
     "VELOCITY",
     "ControlError",
     "Controller",

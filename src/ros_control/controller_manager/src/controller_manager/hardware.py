@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import ControllerError, HardwareError
-from .interfaces import COMMAND, JOINT_STATE, POSITION
+from .interfaces import COMMAND, JOINT_STATE, POSITIONS
 
 
 class SwitchResult(enum.Enum):
@@ -86,7 +86,7 @@ class RobotHardware:
         for interface, joints in claims.items():
             if interface in COMMAND:
                 index = [self._index[joint] for joint in joints]
-                self.command[interface][index] = self.position[index] if interface == POSITION else 0.0
+                self.command[interface][index] = self.position[index] if interface in POSITIONS else 0.0
 
     def let_go(self, claims: Mapping[str, Iterable[str]]) -> None:
         """The end of :meth:`hold` for the joints of ``claims``: a controller is about to start on them."""

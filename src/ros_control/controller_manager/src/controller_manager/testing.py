@@ -11,7 +11,7 @@ from loop_ros.testing import FakeLog, FakeRos
 
 from .controller import ControllerContext
 from .hardware import RobotHardware
-from .interfaces import EFFORT, POSITION, VELOCITY
+from .interfaces import EFFORT, POSITIONS, VELOCITY
 
 
 def fake_context(name: str = "controller", parameters: dict[str, Any] | None = None, root_namespace: str = "/robot",
@@ -50,7 +50,7 @@ class FakeHardware(RobotHardware):
                 self.effort[index] = command
             if self.frozen:
                 continue
-            if interface == POSITION:
+            if interface in POSITIONS:
                 target = command.clip(-self.clip, self.clip)
                 self.position[index] += (target - self.position[index]) * (1.0 - self.lag)
             elif interface == VELOCITY:

@@ -12,13 +12,15 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled
 from command_line.options import counted
 
 from .errors import HardwareError
-from .interfaces import EFFORT, POSITION, VELOCITY
+from .interfaces import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY
 from .limits import SoftLimits
 
 _INTERFACES = {
     "hardware_interface/PositionJointInterface": POSITION,
     "hardware_interface/VelocityJointInterface": VELOCITY,
     "hardware_interface/EffortJointInterface": EFFORT,
+    "hardware_interface/PosVelJointInterface": POS_VEL,
+    "hardware_interface/PosVelAccJointInterface": POS_VEL_ACC,
 }
 _DEPRECATED = {name.split("/")[1]: name for name in _INTERFACES}
 _SIMPLE = "transmission_interface/SimpleTransmission"

@@ -16,7 +16,7 @@ from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateResponse
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from command_line.options import counted
-from controller_manager import EFFORT, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
+from controller_manager import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
 from joint_trajectory import (
     Follower,
@@ -273,10 +273,22 @@ class PositionJointTrajectoryController(JointTrajectoryController):
     interface = POSITION
 
     def _start_adapter(self):
-        self.hardware.command[POSITION][self._index] = self._position
+        self.hardware.command[self.interface][self._index] = self._position
 
     def _write(self, dt):
-        self.hardware.command[POSITION][self._index] = self._next[0]
+        self.hardware.command[self.interface][self._index] = self._next[0]
+
+
+class PosVelJointTrajectoryController(PositionJointTrajectoryController):
+    """pos_vel_controllers/JointTrajectoryController: a joint that is at each tick's position has the velocity, too."""
+
+    interface = POS_VEL
+
+
+class PosVelAccJointTrajectoryController(PositionJointTrajectoryController):
+    """pos_vel_acc_controllers/JointTrajectoryController, likewise."""
+
+    interface = POS_VEL_ACC
 
 
 class _PidTrajectoryController(JointTrajectoryController):

@@ -11,10 +11,12 @@ import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus
 from control_msgs.msg import FollowJointTrajectoryResult
 
-from controller_manager import EFFORT, POSITION, VELOCITY, ControllerError
+from controller_manager import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY, ControllerError
 from joint_trajectory import ErrorCode
 from ros_controllers.joint_trajectory_controller import (
     EffortJointTrajectoryController,
+    PosVelAccJointTrajectoryController,
+    PosVelJointTrajectoryController,
     VelocityJointTrajectoryController,
 )
 
@@ -74,6 +76,21 @@ def test_stiff_joints_are_where_they_should_be_at_every_tick():
     assert arm.result_text == ""
     assert fastest > 0.7 and moved > 2490
     assert worst < 1e-9
+
+
+@pytest.mark.parametrize("controller_class, interface", [
+    (PosVelJointTrajectoryController, POS_VEL), (PosVelAccJointTrajectoryController, POS_VEL_ACC)])
+def test_positions_with_velocities_are_followed_as_positions_are(controller_class, interface):
+    arm = Arm(controller_class)
+    assert arm.controller.claims == {interface: JOINTS}
+    arm.goal(trajectory((1.0, [0.3, -0.2], [0.0, 0.0])))
+    worst = 0.0
+    while not arm.results and arm.time < 105.0:
+        arm.tick()
+        desired = arm.controller._follower.desired
+        worst = max(worst, np.abs(desired[0] - arm.hardware.position).max())
+    assert arm.results == [("goal 1", GoalStatus.SUCCEEDED, R.SUCCESSFUL)] and worst < 1e-9
+    assert arm.hardware.position == pytest.approx([0.3, -0.2])
 
 
 def test_starts_where_the_joints_are():

@@ -6,7 +6,7 @@ import numpy as np
 
 from controller_manager.errors import ControllerError, HardwareError
 from controller_manager.hardware import RobotHardware
-from controller_manager.interfaces import EFFORT, POSITION, VELOCITY
+from controller_manager.interfaces import COMMAND, EFFORT, POSITIONS, VELOCITY
 from controller_manager.limits import (
     EffortLimiter,
     PositionLimiter,
@@ -22,7 +22,7 @@ from controller_manager.transmissions import read_soft_limits, read_transmission
 # of 10 kg m2 and motors of 100 N m rely on it.
 _UNLIMITED = 1e9
 
-_LIMITERS = {POSITION: PositionLimiter, VELOCITY: VelocityLimiter, EFFORT: EffortLimiter}
+_LIMITERS = {**dict.fromkeys(POSITIONS, PositionLimiter), VELOCITY: VelocityLimiter, EFFORT: EffortLimiter}
 
 
 class SimulatedHardware(RobotHardware):
@@ -30,7 +30,7 @@ class SimulatedHardware(RobotHardware):
 
     Commands act on the joint, as in Gazebo; mechanicalReduction and offset have no effect. Per interface:
 
-    position
+    position, with or without velocity and acceleration
         the joint is at the command after the step, with unlimited effort. On a free-standing model only the load acts
         on the base, not the reaction of the motion: in Gazebo this interface is kinematic, and descriptions with very
         light links rely on it
@@ -63,7 +63,7 @@ class SimulatedHardware(RobotHardware):
         limits = [self._limits_of(robot.joints[joint.name], soft, limit_parameters, namespace, log)
                   for joint in joints]
         self._groups = []
-        for interface in (POSITION, VELOCITY, EFFORT):
+        for interface in COMMAND:
             here = [i for i, joint in enumerate(joints) if joint.interface == interface]
             gains = {} if interface == EFFORT else self._gains_of(here, gain_parameters, namespace, log)
             self._add_group(interface, [i for i in here if i not in gains], limits, None)
@@ -89,7 +89,7 @@ class SimulatedHardware(RobotHardware):
             index = group.index
             command = self.command[group.interface][index]
             if self._frozen is not None:
-                command = self._frozen[index] if group.interface == POSITION else np.zeros(len(index))
+                command = self._frozen[index] if group.interface in POSITIONS else np.zeros(len(index))
             position, velocity = self.position[index], self.velocity[index]
             group.drive(group.limiter.enforce(command, dt, position, velocity), position, velocity, dt)
         if self._held is not None:
@@ -120,7 +120,8 @@ class SimulatedHardware(RobotHardware):
     def joints_set(self):
         """The joints were moved by a service, or spawned: hold them there, and apply limits from there."""
         self.read()
-        self.command[POSITION][:] = self.position
+        for interface in POSITIONS:
+            self.command[interface][:] = self.position
         self.command[VELOCITY][:] = 0.0
         self.command[EFFORT][:] = 0.0
         if self._frozen is not None:
@@ -190,7 +191,7 @@ class SimulatedHardware(RobotHardware):
         if gains is not None:
             self._groups.append(_PidGroup(self, interface, index, model_index, limiter, effort, Gains.joined(gains)))
         else:
-            kind = _CarriedGroup if interface == POSITION and not self._model.static else _GROUPS[interface]
+            kind = _CarriedGroup if interface in POSITIONS and not self._model.static else _GROUPS[interface]
             self._groups.append(kind(self, interface, index, model_index, limiter, effort))
 
 
@@ -287,7 +288,7 @@ class _PidGroup(_Group):
         self.pid.reset()
 
     def drive(self, command, position, velocity, dt):
-        if self.interface == POSITION:
+        if self.interface in POSITIONS:
             error = command - position
             around = self._hardware._continuous[self.index]
             if around.any():
@@ -298,6 +299,6 @@ class _PidGroup(_Group):
         self._model.drive_effort(self._model_index, np.minimum(np.maximum(effort, -self._effort), self._effort))
 
 
-_GROUPS = {POSITION: _PositionGroup, VELOCITY: _VelocityGroup, EFFORT: _EffortGroup}
+_GROUPS = {**dict.fromkeys(POSITIONS, _PositionGroup), VELOCITY: _VelocityGroup, EFFORT: _EffortGroup}
 
 __all__ = ["HardwareError", "SimulatedHardware"]

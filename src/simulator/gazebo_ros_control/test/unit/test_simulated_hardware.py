@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import Pose, World
-from controller_manager import EFFORT, POSITION, VELOCITY, HardwareError
+from controller_manager import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY, HardwareError
 from gazebo_ros_control.hardware import SimulatedHardware
 from loop_ros.testing import FakeLog
 from urdf_model import parse_urdf
@@ -108,6 +108,15 @@ def test_the_position_interface_follows_a_sine_within_the_tick(make, mass, inert
         time_s += DT
         arm.run(DT, 0.3 + 0.5 * (1.0 - np.cos(2.0 * time_s)), POSITION, watch)
     assert max(errors) < 0.002
+
+
+@pytest.mark.parametrize("name, interface", [("PosVel", POS_VEL), ("PosVelAcc", POS_VEL_ACC)])
+def test_positions_with_velocities_are_positions(make, name, interface):
+    arm = make(name)
+    assert arm.hardware.interface_joints[interface] == ("joint_1", "joint_2") and not arm.log.lines
+    assert arm.run(0.5, 0.5, interface) == pytest.approx([0.5, 0.5], abs=1e-3)
+    arm.hardware.stop(True)
+    assert arm.run(0.5, 1.0, interface) == pytest.approx([0.5, 0.5], abs=1e-3)
 
 
 def test_a_position_step_moves_at_the_velocity_limit(make):
