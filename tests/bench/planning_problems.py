@@ -53,23 +53,26 @@ class Problem:
     goal: np.ndarray
 
 
-def robot(description, urdf, config, srdf):
-    """Return the Robot of two xacro files in packages."""
+def robot(description, urdf, config, srdf, limits=None):
+    """Return the Robot of two xacro files in packages. limits: file of joint limits in ``config``, None: the URDF's."""
     packages = rospkg.RosPack()
 
     def text(package, file):
         return xacro.process_file(str(Path(packages.get_path(package)) / file)).toxml()
 
-    model = PlanningModel.from_xml(text(description, urdf), text(config, srdf))
+    limits = yaml.safe_load((Path(packages.get_path(config)) / limits).read_text()) if limits else None
+    model = PlanningModel.from_xml(text(description, urdf), text(config, srdf), limits)
     return Robot(model, ExactChecker(model, MeshReader(ResourceFinder())))
 
 
-def baxter():
-    return robot("baxter_description", "urdf/baxter.urdf.xacro", "baxter_moveit_config", "config/baxter.srdf.xacro")
+def baxter(limits=None):
+    return robot("baxter_description", "urdf/baxter.urdf.xacro", "baxter_moveit_config", "config/baxter.srdf.xacro",
+                 limits)
 
 
-def probot():
-    return robot("probot_description", "urdf/probot_anno.xacro", "probot_anno_moveit_config", "config/probot_anno.srdf")
+def probot(limits=None):
+    return robot("probot_description", "urdf/probot_anno.xacro", "probot_anno_moveit_config", "config/probot_anno.srdf",
+                 limits)
 
 
 # -- the bookshelf --------------------------------------------------------------------------------------------------

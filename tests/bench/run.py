@@ -36,6 +36,7 @@ SUITES = {
     "robot": ("robot_bench", "a tick of Baxter's control logic beside the physics step of the same world"),
     "planning": ("planning_bench", "paths for Baxter and PROBOT beside OMPL's RRTConnect on exact geometry"),
     "servo": ("servo_bench", "random streams of twists: limits, contacts, dead ends, CPU of a step"),
+    "replanning": ("replanning_bench", "obstacles that enter the way of a moving arm: time to another way, stops"),
     "planned": ("planned_bench", "10,000 states of planned trajectories checked by PyBullet: contacts, limits"),
     "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without other nodes"),
     "collision": ("self_collision_bench", "a physics step of Baxter with self-collision beside one without"),

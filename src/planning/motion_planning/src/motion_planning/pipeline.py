@@ -27,6 +27,8 @@ _GOALS, _MORE_GOALS_S = 8, 0.02
 _SHARE_FOR_GOALS, _JIGGLES = 0.5, 100
 # Number of paths to time before the request fails, if timed trajectories are not valid.
 _MAX_PATHS = 4
+# Number of states that are checked between two looks at whether to stop.
+_AT_ONCE = 64
 # Greatest number of contacts in a sentence.
 _NAMED = 3
 
@@ -121,6 +123,12 @@ def plan(query, tools):
     collisions in ``tools.exact``.
     """
     return _Planning(query, tools).run()
+
+
+def checked(query, tools, timed, until):
+    """Return None, or (sentence, contacts) of the first state of a Timed up to its time ``until`` [s] that touches
+    something in the query's scene, is beyond a limit or breaks a path constraint."""
+    return _Planning(query, tools).first_hit(query.scene, timed, False, until)
 
 
 class _Planning:
@@ -343,16 +351,16 @@ class _Planning:
             self._look_up()
             points = _dense(whole, 2.0 * tolerance) if timing.startswith("iterative") else whole
             timed = time_path(points, velocity, acceleration, timing, tolerance=tolerance)
-            hit = self._first_hit(scene, timed, len(lead) > 0)
+            hit = self.first_hit(scene, timed, len(lead) > 0)
             if hit is None:
                 return Plan(self.query.scene.state, whole, timed, self._elapsed(), self.remarks)
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "a path was found, but the timed trajectory is not valid: %s"
                               % hit[0], hit[1])
 
-    def _first_hit(self, scene, timed, from_collision):
-        """Return None, or (sentence, contacts) of the first invalid state of a trajectory."""
+    def first_hit(self, scene, timed, from_collision, until=math.inf):
+        """Return None, or (sentence, contacts) of the first invalid state of a trajectory up to ``until`` [s]."""
         step = _RESOLUTION if self.query.path_constraints is None else _CONSTRAINED
-        states, _, _ = timed.sampled(timed.spaced(step))
+        states = _states(timed, step, until)
         low, high = self.model.bounds[self.indices].T
         turns = self.model.continuous[self.indices]
         # A start slightly beyond a limit is led back.
@@ -363,26 +371,29 @@ class _Planning:
             at, joint = beyond[0]
             return "joint '%s' reaches %.4f, its limits are %.4f and %.4f" % (
                 self.names[joint], states[at, joint], low[joint], high[joint]), []
-        return self._in_the_way(scene, states, from_collision) or self._in_between(scene, timed, from_collision)
+        return self._in_the_way(scene, states, from_collision) or self._in_between(
+            scene, _states(timed, _BETWEEN, until), from_collision)
 
     def _in_the_way(self, scene, states, from_collision):
-        left = not from_collision
-        for q in states:
+        exact, group = self.tools.exact, self.query.group
+        begin = 0
+        if from_collision:  # the motion leads out of the start state's collision
+            free = (exact.free(scene, scene.state.with_q(q, self.indices), group) for q in states)
+            begin = next((number for number, one in enumerate(free) if one), len(states))
+        for first in range(begin, len(states), _AT_ONCE):
             self._look_up()
-            state = scene.state.with_q(q, self.indices)
-            if not self.tools.exact.free(scene, state, self.query.group):
-                if left:
-                    contacts = self.tools.exact.contacts(scene, state, self.query.group)
-                    return _named(contacts), contacts
-            else:
-                left = True  # out of the start state's collision
-                violated = self._violated(self.query.path_constraints, state, scene)
+            some = states[first:first + _AT_ONCE]
+            blocked = exact.first_blocked(scene, some, group)
+            if blocked is not None:
+                contacts = exact.contacts(scene, scene.state.with_q(some[blocked], self.indices), group)
+                return _named(contacts), contacts
+            for q in some if self.query.path_constraints is not None else ():
+                violated = self._violated(self.query.path_constraints, scene.state.with_q(q, self.indices), scene)
                 if violated:
                     return violated, []
         return None
 
-    def _in_between(self, scene, timed, from_collision):
-        states, _, _ = timed.sampled(timed.spaced(_BETWEEN))
+    def _in_between(self, scene, states, from_collision):
         for begin in range(0, len(states), 512):
             self._look_up()
             some = states[begin:begin + 512]
@@ -416,6 +427,12 @@ class _Planning:
     def _look_up(self):
         if self.tools.stop():
             raise PlanningFailure(Code.PREEMPTED, "planning was stopped after %.2f s" % self._elapsed())
+
+
+def _states(timed, step, until):
+    """Postures (m, k) of a Timed up to ``until`` [s], between which no joint moves by more than ``step``."""
+    times = timed.spaced(step)
+    return timed.sampled(times[times <= until])[0]
 
 
 def _dense(path, spacing):

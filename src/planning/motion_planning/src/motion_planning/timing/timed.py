@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A trajectory of joints as points, and what controllers make of it between them."""
-import itertools
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,11 +40,11 @@ class Timed:
             rest = np.zeros((len(times), self.positions.shape[1]))
             return rest + self.positions, rest, rest
         segment = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
-        return _evaluated(self._polynomials()[segment], (times - self.times[segment])[:, None])
+        return _evaluated(self._polynomials[segment], (times - self.times[segment])[:, None])
 
     def peaks(self):
         """The greatest speed and acceleration (m - 1, k) within each segment."""
-        polynomials, durations = self._polynomials(), np.diff(self.times)
+        polynomials, durations = self._polynomials, np.diff(self.times)
         time = (durations[:, None] * _INSIDE)[:, :, None]
         _, velocity, acceleration = _evaluated(polynomials[:, None], time)
         return np.abs(velocity).max(axis=1), np.abs(acceleration).max(axis=1)
@@ -56,10 +56,11 @@ class Timed:
             return self.times
         speeds, _ = self.peaks()
         counts = np.maximum(1, np.ceil(speeds.max(axis=1) * np.diff(self.times) / step)).astype(int)
-        pieces = (np.linspace(a, b, count, endpoint=False)
-                  for (a, b), count in zip(itertools.pairwise(self.times), counts, strict=True))
-        return np.concatenate([*pieces, self.times[-1:]])
+        step_s = np.repeat(np.diff(self.times) / counts, counts)
+        number = np.arange(len(step_s)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.append(np.repeat(self.times[:-1], counts) + number * step_s, self.times[-1])
 
+    @functools.cached_property
     def _polynomials(self):
         return splines(self.times, self.positions, self.velocities, self.accelerations,
                        np.full(len(self.times), QUINTIC))

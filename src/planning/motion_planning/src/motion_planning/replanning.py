@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Another way for joints that move already, found and timed before they reach what has come into their way."""
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.constraints import ConstraintSet, JointTarget
+from motion_planning.pipeline import Code, Plan, PlanningFailure, checked, plan
+from motion_planning.planners import first_touching
+from motion_planning.timing import Timed
+from motion_planning.timing.joining import brakings, joinings
+
+#: How far ahead of now the new trajectory begins [s], tried in this order: planning it, and its way to the controller,
+#: take most of that. Less where the obstacle is near.
+AHEAD_S = (0.12, 0.08, 0.05)
+# What the way to the controller may take of that [s], and the share of the rest that the search may use.
+_SENDING_S, _SEARCHING = 0.02, 0.5
+# Distance of checked states [rad or m, in any joint].
+_APART = 0.01
+# Greatest deviation of goal joints [rad or m].
+_AT_GOAL = 1e-4
+
+
+class Running(NamedTuple):
+    """A trajectory under way. timed: of the group's joints; now [s]: on its time; blocked_from [s]: the first time at
+    which its joints would touch something."""
+
+    timed: Timed
+    now: float
+    blocked_from: float
+
+
+class Redirection(NamedTuple):
+    """timed: what to follow from the time ``begin`` [s] of the running trajectory on, where position, velocity and
+    acceleration are that one's; its second point is some time behind its first. plan: the Plan of the new way, which
+    begins where the old motion would have come to rest. overlap [s]: how long the joints follow both; 0: they stop
+    for an instant."""
+
+    timed: Timed
+    begin: float
+    plan: Plan
+    overlap: float
+
+
+def redirected(query, tools, running):
+    """Return a Redirection for a :class:`Running` trajectory, in the scene of a PlanQuery.
+
+    The joints of ``query.scene`` count for what the group does not move. The goal is where the running trajectory ends
+    if that is free, else the query's goals. Raises PlanningFailure if there is no other way, if it is not found in
+    time, or if the joints cannot come to rest before the obstacle; they have to be stopped then.
+    """
+    begin = tools.clock()
+    start, braking, ahead = _brake(query, tools, running)
+    end = begin + ahead - _SENDING_S
+    tools = replace(tools, stop=lambda stop=tools.stop: stop() or tools.clock() > end)
+    group = query.scene.model.groups[query.group]
+    scene = query.scene.with_state(query.scene.state.with_q(braking.positions[-1], group.indices))
+    again = replace(query, scene=scene, goals=_goals(query, tools, running, scene), attempts=1,
+                    allowed_time=max(1e-3, _SEARCHING * (end - tools.clock())))
+    found = plan(again, tools)
+    velocity = np.maximum(scene.model.velocity[group.indices] * query.velocity_scaling,
+                          np.abs(running.timed.sampled([start])[1][0]))
+    for overlap, timed in joinings(braking, found.timed, velocity, scene.model.acceleration[group.indices]):
+        flaw = checked(again, tools, timed, braking.duration + 1e-6)
+        if tools.clock() > end:
+            raise PlanningFailure(Code.TIMED_OUT, "another way was found too late, after %.3f s"
+                                  % (tools.clock() - begin))
+        if flaw is None:
+            return Redirection(timed, start, found, overlap)
+    raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot leave their way: %s" % flaw[0], flaw[1])
+
+
+def _brake(query, tools, running):
+    """(time on the running trajectory, Timed that comes to rest from there without touching anything, time until then
+    [s])."""
+    group = query.scene.model.groups[query.group]
+    acceleration = query.scene.model.acceleration[group.indices]
+    for ahead in AHEAD_S:
+        start = min(running.now + ahead, running.timed.duration)
+        if start >= running.blocked_from:
+            continue
+        for found in brakings(running.timed, start, acceleration):
+            states = found.sampled(found.spaced(_APART))[0]
+            if first_touching(tools.exact, query.scene, group, states) is None:
+                return start, found, ahead
+    raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot come to rest in time: something stands %.2f s "
+                          "ahead" % (running.blocked_from - running.now))
+
+
+def _goals(query, tools, running, scene):
+    group = query.scene.model.groups[query.group]
+    end = running.timed.positions[-1]
+    if not tools.exact.free(scene, scene.state.with_q(end, group.indices), query.group):
+        return query.goals
+    return [ConstraintSet(joints=[JointTarget(name, value, _AT_GOAL, _AT_GOAL)
+                                  for name, value in zip(group.joints, end.tolist(), strict=True)])]

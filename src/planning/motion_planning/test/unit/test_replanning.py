@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What enters the way of joints that move: another way without a stop, or the reason why they have to stop."""
+import itertools
+
+import numpy as np
+import pytest
+
+from motion_planning.constraints import ConstraintSet, JointTarget, sampler
+from motion_planning.exact import ExactChecker
+from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools
+from motion_planning.planners import plan_path
+from motion_planning.replanning import Running, redirected
+from motion_planning.scene import Scene, WorldObject
+from motion_planning.timing import time_path
+from urdf_model import Box
+from urdf_model.transforms import rigid
+
+GROUP = "manipulator"
+FROM, TO = np.array([-1.2, 0.3, 0.4, 0.0, 0.6, 0.0]), np.array([1.2, 0.3, 0.4, 0.0, 0.6, 0.0])
+NOW_S = 1.2
+
+
+class Lab:
+    """The arm on its way from FROM to TO; things appear where its tool will be."""
+
+    def __init__(self, model, exact, tick_s=1e-5):
+        self.model, self.exact = model, exact
+        ticks = itertools.count()
+        self.tools = Tools(exact, plan_path, sampler, lambda: tick_s * next(ticks))
+        self.group = model.groups[GROUP]
+        self.timed = time_path([FROM, TO], np.full(6, 0.8), np.full(6, 1.0), "ruckig")
+        self.scene = Scene(model)
+        self.scene = self.scene.with_state(self.scene.state.with_q(self.at(NOW_S), self.group.indices))
+
+    def at(self, moment):
+        return self.timed.sampled([moment])[0][0]
+
+    def place_ahead(self, seconds, size=0.05, name="thing"):
+        tip = self.model.frame_of(self.scene.state.with_q(self.at(NOW_S + seconds), self.group.indices).q, "tool0")
+        box = WorldObject(name, rigid(np.eye(3), tip[:3, 3]), ((Box((size, size, size)), np.eye(4)),))
+        self.scene = self.scene.with_object(box)
+        times = self.timed.spaced(0.02)
+        times = times[times >= NOW_S]
+        first = self.exact.first_blocked(self.scene, self.timed.sampled(times)[0], GROUP)
+        self.running = Running(self.timed, NOW_S, float(times[first]))
+        return self
+
+    def redirected(self, **changes):
+        goal = ConstraintSet(joints=[JointTarget(name, value, 1e-3, 1e-3)
+                                     for name, value in zip(self.group.joints, TO.tolist(), strict=True)])
+        return redirected(PlanQuery(self.scene, GROUP, [goal], **changes), self.tools, self.running)
+
+
+@pytest.fixture(scope="module")
+def exact(probot, meshes):
+    return ExactChecker(probot, meshes)
+
+
+def test_another_way_continues_the_motion_and_touches_nothing(probot, exact):
+    lab = Lab(probot, exact).place_ahead(1.4)
+    found = lab.redirected()
+    assert NOW_S < found.begin < lab.running.blocked_from
+    for new, old in zip(found.timed.sampled([0.0]), lab.timed.sampled([found.begin]), strict=True):
+        np.testing.assert_allclose(new, old, atol=1e-6)
+    np.testing.assert_allclose(found.timed.positions[-1], TO, atol=2e-3)
+    states, velocities, _ = found.timed.sampled(found.timed.spaced(0.004))
+    assert exact.first_blocked(lab.scene, states, GROUP) is None
+    # Without a stop: some joint moves until shortly before the end.
+    assert found.overlap > 0.0
+    moving = found.timed.sampled(np.linspace(0.0, found.timed.duration - 0.4, 100))[1]
+    assert np.abs(moving).max(axis=1).min() > 0.02
+    speeds, accelerations = found.timed.peaks()
+    assert (speeds <= probot.velocity[lab.group.indices] * 1.001).all()
+    assert (accelerations <= probot.acceleration[lab.group.indices] * 1.001).all()
+
+
+def test_path_constraints_hold_on_the_other_way(probot, exact):
+    lab = Lab(probot, exact).place_ahead(1.4)
+    low = ConstraintSet(joints=[JointTarget("joint_2", 0.3, above=2.0, below=0.02)])
+    found = lab.redirected(path_constraints=low)
+    assert found.timed.sampled(found.timed.spaced(0.01))[0][:, 1].min() > 0.3 - 0.02 - 1e-6
+
+
+def test_what_is_too_near_is_a_reason_to_stop(probot, exact):
+    with pytest.raises(PlanningFailure, match="come to rest in time"):
+        Lab(probot, exact).place_ahead(0.3, size=0.02).redirected()
+
+
+def test_a_goal_that_is_blocked_too_is_a_reason_to_stop(probot, exact):
+    lab = Lab(probot, exact)
+    lab = lab.place_ahead(lab.timed.duration - NOW_S, name="at the goal").place_ahead(1.4)
+    with pytest.raises(PlanningFailure) as failure:
+        lab.redirected()
+    assert failure.value.code == Code.GOAL_IN_COLLISION
+
+
+def test_a_way_that_is_found_too_late_is_not_taken(probot, exact):
+    with pytest.raises(PlanningFailure) as failure:
+        Lab(probot, exact, tick_s=0.01).place_ahead(1.4).redirected()
+    assert failure.value.code in (Code.TIMED_OUT, Code.PREEMPTED)
