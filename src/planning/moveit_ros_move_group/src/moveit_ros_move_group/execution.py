@@ -12,6 +12,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from command_line.options import counted
 from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
 from moveit_ros_move_group.handles import TICK_S
+from moveit_ros_move_group.rest_of_the_way import LATER_S, NewWay
 
 # Time limits [s] for a cancelled controller to report it, for the joints to come to rest, and for the first joint state
 # (MoveIt waits as long).
@@ -65,6 +66,12 @@ class Executor:
         self._handle_of = handle_of
         self._busy = threading.Lock()
         self._stop = threading.Event()
+        self._followed_by = []
+
+    def began(self):
+        """ROS time [s] at which the trajectory that is being executed began, by the word of its controllers; None as
+        long as they do not say."""
+        return max((began for handle in self._followed_by if (began := handle.began()) is not None), default=None)
 
     def stop(self):
         """End what is being executed, if anything is."""
@@ -73,9 +80,9 @@ class Executor:
     def execute(self, message, preempted=lambda: False, invalidated=lambda: None, from_anywhere=False):
         """Follow a RobotTrajectory to its end; return an Outcome.
 
-        preempted(): whether the caller wants to stop it; invalidated(): None, or the reason why the rest of the path is
-        no longer free. Both are called every few milliseconds. from_anywhere: the first point need not be near the
-        joints' positions, as for a hand with an object between its fingers.
+        preempted(): whether the caller wants to stop it; invalidated(): None, the reason why the rest of the path is no
+        longer free, or a NewWay, which is followed instead. Both are called every few milliseconds. from_anywhere: the
+        first point need not be near the joints' positions, as for a hand with an object between its fingers.
         """
         trajectory = message.joint_trajectory
         if not trajectory.points:
@@ -119,7 +126,7 @@ class Executor:
         flaw = None if from_anywhere else self._flaw_of_start(trajectory, given_up)
         if flaw is not None:
             return flaw
-        handles = [self._handle_of(controller) for controller in chosen]
+        handles = self._followed_by = [self._handle_of(controller) for controller in chosen]
         for controller, handle in zip(chosen, handles, strict=True):
             if not handle.connected(self.settings.connection_timeout, given_up):
                 if given_up():
@@ -127,8 +134,7 @@ class Executor:
                 return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; %s"
                                % (controller, controller.remedy))
         try:
-            for controller, handle in zip(chosen, handles, strict=True):
-                handle.send(part_of(trajectory, controller.joints))
+            _send(trajectory, chosen, handles)
             return self._watch(trajectory, chosen, handles, preempted, invalidated)
         except Exception:  # no motion may continue unsupervised
             for handle in handles:
@@ -162,12 +168,17 @@ class Executor:
                 break
             running[0].done.wait(TICK_S)
             now = rospy.get_time()
-            begin = min(begin, now)
+            begin = min(begin, now + LATER_S)
             if rospy.is_shutdown() or self._stop.is_set() or preempted():
                 return self._cancel(handles, MoveItErrorCodes.PREEMPTED, "stopped on request")
-            reason = invalidated()
-            if reason:
-                return self._cancel(handles, MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, reason)
+            change = invalidated()
+            if isinstance(change, NewWay):
+                trajectory, begin = change.trajectory.joint_trajectory, change.begins
+                duration = trajectory.points[-1].time_from_start.to_sec()
+                allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
+                _send(trajectory, chosen, handles)
+            elif change:
+                return self._cancel(handles, MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, change)
             failed = _failed(handles)
             if failed is not None:
                 return self._cancel(handles, failed.code, failed.text)
@@ -214,6 +225,11 @@ class Executor:
 
     def _is_alive(self, controller):
         return self._handle_of(controller).connected(0.0)
+
+
+def _send(trajectory, chosen, handles):
+    for controller, handle in zip(chosen, handles, strict=True):
+        handle.send(part_of(trajectory, controller.joints))
 
 
 def _failed(handles):

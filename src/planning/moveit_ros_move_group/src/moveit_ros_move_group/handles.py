@@ -23,6 +23,8 @@ from moveit_ros_move_group.controllers import FAKE, FOLLOW
 TICK_S = 0.01
 # Between two joint states of a fake controller that interpolates, where its ``rate`` does not say [s].
 _FAKE_STEP_S = 0.1
+# A goal counts as begun only this long [s] afterwards: some servers say 0 until then, whatever the time.
+_SINCE_S = 0.05
 
 _FOLLOW_ERRORS = {value: name for name, value in vars(FollowJointTrajectoryResult).items()
                   if isinstance(value, int) and name.isupper()}
@@ -66,16 +68,22 @@ def goal_id() -> GoalID:
 
 
 class _Goal:
-    """One goal. handle: actionlib's once it is over."""
+    """One goal. handle: actionlib's once it is over; began: when, by the server's feedback [s, ROS time]."""
 
     def __init__(self):
-        self.over, self.handle = threading.Event(), None
+        self.over, self.handle, self.began = threading.Event(), None, None
 
     def moved(self, handle):
         """The goal's state has changed; may come before send_goal returns, and again after the goal is over."""
         if handle.get_comm_state() == actionlib.CommState.DONE:
             self.handle = handle
             self.over.set()
+
+    def told(self, handle, feedback):
+        """The goal's feedback has come."""
+        since = feedback.desired.time_from_start.to_sec() if hasattr(feedback, "desired") else 0.0
+        if since > _SINCE_S:
+            self.began = feedback.header.stamp.to_sec() - since
 
 
 class _ActionHandle:
@@ -86,7 +94,7 @@ class _ActionHandle:
         # Resolved: actionlib remaps the name as written, roscpp's version remaps the resolved name.
         self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
         self._client.manager._generate_id = goal_id  # rospy's ids end in milliseconds
-        self._sent, self._goal = None, _Goal()
+        self._goal, self._open = _Goal(), []
 
     @property
     def done(self):
@@ -106,12 +114,19 @@ class _ActionHandle:
         return True
 
     def send(self, trajectory):
-        self._sent, self._goal = None, _Goal()
-        self._sent = self._client.send_goal(self._goal_of(trajectory), self._goal.moved)
+        goal = self._goal = _Goal()
+        self._open = [(sent, one) for sent, one in self._open if not one.over.is_set()]
+        self._open.append((self._client.send_goal(self._goal_of(trajectory), goal.moved, goal.told), goal))
+
+    def began(self):
+        """ROS time [s] at which the newest goal began, None as long as its feedback has not told."""
+        return self._goal.began
 
     def cancel(self):
-        if self._sent is not None:
-            self._sent.cancel()
+        # A goal that was to take another's place may have been refused, and the other still run.
+        for sent, goal in self._open:
+            if not goal.over.is_set():
+                sent.cancel()
 
     def was_preempted(self):
         return self._status() in (GoalStatus.PREEMPTED, GoalStatus.RECALLED)
@@ -204,8 +219,12 @@ class FakeHandle:
 
     def send(self, trajectory):
         # New events: the previous playback may still sleep, and must neither continue nor end this one.
+        before = self._cancelled
         self.done, self._cancelled = threading.Event(), threading.Event()
-        threading.Thread(target=self._play, args=(trajectory, self.done, self._cancelled), daemon=True).start()
+        threading.Thread(target=self._play, args=(trajectory, self.done, self._cancelled, before), daemon=True).start()
+
+    def began(self):
+        return None
 
     def cancel(self):
         self._cancelled.set()
@@ -216,10 +235,14 @@ class FakeHandle:
     def error(self):
         return ""
 
-    def _play(self, trajectory, done, cancelled):
+    def _play(self, trajectory, done, cancelled, before):
+        """before: the Event that ends the previous playback, which goes on until the trajectory's stamp."""
         def over():
             return cancelled.is_set() or rospy.is_shutdown()
 
+        while rospy.get_rostime() < trajectory.header.stamp and not over():
+            time.sleep(TICK_S)
+        before.set()
         kind = self.controller.options["type"]
         if kind == "interpolate":
             self._interpolate(trajectory, over)
@@ -242,9 +265,7 @@ class FakeHandle:
             if after == len(points):
                 self._say(trajectory.joint_names, points[-1].positions)
                 return
-            if after == 0:
-                self._say(trajectory.joint_names, points[0].positions)
-            else:
+            if after > 0:
                 a, b = points[after - 1], points[after]
                 share = (now - a.time_from_start.to_sec()) / (b.time_from_start - a.time_from_start).to_sec()
                 self._say(trajectory.joint_names, [p + share * (q - p)

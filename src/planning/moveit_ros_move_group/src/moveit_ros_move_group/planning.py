@@ -13,6 +13,7 @@ from motion_planning.constraints import sampler
 from motion_planning.errors import PlanningError
 from motion_planning.planners import Search, plan_path
 from motion_planning.planners.names import config_name, kind_of, planner_of
+from motion_planning.replanning import redirected
 from motion_planning.scene import Scene
 from motion_planning.timing import time_path
 from moveit_ros_move_group.capabilities.cartesian import slowed
@@ -40,7 +41,29 @@ class Planner:
         pipe = self._pipeline(request.pipeline_id)
         if pipe.industrial:
             return self._limited(request, self._industrial.plan(request, scene, pipe, self._tools(stop)))
-        remarks, reader = [], context.monitor.reader
+        query, remarks = self._query(request, scene, pipe)
+        try:
+            plan = pipeline.plan(query, self._tools(stop))
+        except PlanningError as error:
+            raise RequestError(getattr(error, "code", MoveItErrorCodes.FAILURE), "; ".join([str(error), *remarks]),
+                               getattr(error, "contacts", ()), getattr(error, "joints", None)) from None
+        remarks += plan.remarks
+        context.remark("planning", remarks, request.group_name)
+        return self._limited(request, plan._replace(remarks=tuple(remarks)))
+
+    def redirected(self, request, scene, running, stop=lambda: False):
+        """Return a replanning.Redirection for joints that move by a MotionPlanRequest already, see there. Raises
+        PlanningError."""
+        pipe = self._pipeline(request.pipeline_id)
+        if pipe.industrial or request.max_cartesian_speed > 0.0:
+            raise RequestError(MoveItErrorCodes.FAILURE, "motions of this planner, and those with a limit on a link's "
+                               "speed, are not changed while they run")
+        query, _ = self._query(request, scene, pipe)
+        return redirected(query, self._tools(stop), running)
+
+    def _query(self, request, scene, pipe):
+        """(pipeline.PlanQuery, remarks) of a MotionPlanRequest. Raises RequestError."""
+        remarks, reader = [], self._context.monitor.reader
         try:
             goals = [constraint_set_of(goal, scene, reader, remarks) for goal in request.goal_constraints]
             path_constraints = constraint_set_of(request.path_constraints, scene, reader, remarks)
@@ -54,14 +77,7 @@ class Planner:
             request.allowed_planning_time if request.allowed_planning_time > 0.0 else _USUAL_TIME_S,
             request.num_planning_attempts, _scaling(request.max_velocity_scaling_factor),
             _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
-        try:
-            plan = pipeline.plan(query, self._tools(stop))
-        except PlanningError as error:
-            raise RequestError(getattr(error, "code", MoveItErrorCodes.FAILURE), "; ".join([str(error), *remarks]),
-                               getattr(error, "contacts", ()), getattr(error, "joints", None)) from None
-        remarks += plan.remarks
-        context.remark("planning", remarks, request.group_name)
-        return self._limited(request, plan._replace(remarks=tuple(remarks)))
+        return query, remarks
 
     def plan_sequence(self, items, scene, stop=lambda: False):
         """Return [(group name, pipeline.Plan), ...] for MotionSequenceItems from the state of ``scene``.

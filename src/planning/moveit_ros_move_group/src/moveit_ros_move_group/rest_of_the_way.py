@@ -1,38 +1,79 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether what is left of a running trajectory is still free."""
+"""Whether what is left of a running trajectory is still free, and another way where it is not."""
+from dataclasses import dataclass
+
 import rospy
+from moveit_msgs.msg import RobotTrajectory
+
+from motion_planning.errors import PlanningError
+from motion_planning.planners import first_touching
+from motion_planning.replanning import Running
+from motion_planning.timing import Timed
+from moveit_ros_move_group.convert.scene_out import trajectory_message
 
 # Greatest distance between two checked states [rad or m, in any joint].
 _APART = 0.05
 # Greatest delay of a controller behind the trajectory [s].
 _BEHIND_S = 0.2
+#: A trajectory that takes another's place begins at most so much later [s].
+LATER_S = 0.5
+
+
+@dataclass(frozen=True)
+class NewWay:
+    """trajectory: takes the place of the running one at its header's stamp, where its positions, velocities and
+    accelerations are that one's; it has no point at its start, so that a controller leads to its first one from where
+    it really is. begins: the stamp [s]."""
+
+    trajectory: RobotTrajectory
+    begins: float
 
 
 class RestOfTheWay:
     """Looks whether a change of the scene stands in what is left of a trajectory. contacts: of the last look."""
 
-    def __init__(self, exact, group, timed, changed_scene):
+    def __init__(self, exact, group, timed, changed_scene, onward=None, began=lambda: None):
         """exact: ExactChecker; group: Group; timed: timing.Timed of its joints. changed_scene(): the Scene if it has
-        changed since it was last asked for, else None."""
+        changed since it was last asked for, else None. onward(scene, replanning.Running): a replanning.Redirection;
+        raises PlanningError; None: there is no other way. began(): ROS time [s] at which the controller says that the
+        trajectory began, None if it does not."""
         self._exact, self._group, self._timed = exact, group, timed
-        self._changed_scene = changed_scene
+        self._changed_scene, self._onward, self._began = changed_scene, onward, began
         self._begin = None
         self.contacts = []
 
     def hit(self):
-        """None, or the sentence what is in the way. The first call is when the trajectory begins."""
+        """None, the sentence what is in the way, or a NewWay around it. The first call is when the trajectory
+        begins."""
         now = rospy.get_time()
         # Time may have been set back, as by a reset of the simulation.
-        self._begin = now if self._begin is None else min(self._begin, now)
+        self._begin = now if self._begin is None else min(self._begin, now + LATER_S)
         scene = self._changed_scene()
         if scene is None:
             return None
+        self._begin = self._began() or self._begin
         times = self._timed.spaced(_APART)
         times = times[times >= min(now - self._begin - _BEHIND_S, self._timed.duration)]
         states = self._timed.sampled(times)[0]
-        first = self._exact.first_blocked(scene, states, self._group.name)
+        first = first_touching(self._exact, scene, self._group, states)
         if first is None:
             return None
         state = scene.state.with_q(states[first], self._group.indices)
         self.contacts = self._exact.contacts(scene, state, self._group.name)
-        return "in the way of what is left: %s" % self.contacts[0] if self.contacts else "something is in the way"
+        reason = "in the way of what is left: %s" % self.contacts[0] if self.contacts else "something is in the way"
+        return reason if self._onward is None else self._around(scene, float(times[first]), reason)
+
+    def _around(self, scene, blocked_from, reason):
+        try:
+            found = self._onward(scene, Running(self._timed, rospy.get_time() - self._begin, blocked_from))
+        except PlanningError as error:
+            return "%s; no other way while the joints move: %s" % (reason, error)
+        begins = self._begin + found.begin
+        late = rospy.get_time() - begins
+        if late > 0.0:
+            return "%s; another way was found %.3f s too late" % (reason, late)
+        timed = found.timed
+        self._timed, self._begin = timed, begins
+        later = Timed(*(column[1:] for column in (timed.times, timed.positions, timed.velocities, timed.accelerations)))
+        return NewWay(trajectory_message(self._group.joints, later, scene.model.frame, rospy.Time.from_sec(begins)),
+                      begins)

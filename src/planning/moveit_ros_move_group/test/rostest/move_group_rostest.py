@@ -47,6 +47,8 @@ from lab_testing.waiting import stretched, wait_until
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
 TIMEOUT_S = stretched(60.0)
 ARRIVED_RAD = 5e-3
+# Tries of a motion that depends on the machine's speed.
+MOST_TRIES = 5
 # Bent, with room on all sides.
 BENT = (0.0, 0.3, 0.4, 0.0, 0.6, 0.0)
 ASIDE = (1.2, 0.3, 0.4, 0.0, 0.6, 0.5)
@@ -257,6 +259,46 @@ class MoveGroupTest(unittest.TestCase):
         self.assertEqual(self.move.get_state(), GoalStatus.PREEMPTED)
         self.assertEqual(self.move.get_result().error_code.val, CODES.PREEMPTED)
         self.assertLess(self.positions()[0], 2.0)
+
+    def test_what_enters_the_way_is_led_around_while_the_arm_moves(self):
+        """Without a stop, unless the machine was too slow for that each time."""
+        for _ in range(MOST_TRIES):
+            states, result = self.swing_around_what_enters()
+            ask = self.services["check_state_validity"]
+            for state in states[::5]:
+                values = [state.position[state.name.index(name)] for name in JOINTS]
+                answer = ask(GetStateValidityRequest(robot_state=state_of(values), group_name="manipulator"))
+                self.assertTrue(answer.valid, answer.contacts)
+            if np.abs(result.planned_trajectory.joint_trajectory.points[0].velocities).max() > 0.05:
+                break
+        else:
+            self.fail("the arm stopped before it went another way, %d times" % MOST_TRIES)
+        # Its controller led it on as well: from the start to shortly before the end it moves.
+        speeds = np.abs([state.velocity for state in states]).max(axis=1)
+        moving = np.flatnonzero(speeds > 0.05)
+        slow = speeds[moving[0]:moving[-1]] < 0.005
+        self.assertFalse(slow.any(), speeds[moving[0]:moving[-1]].min())
+
+    def swing_around_what_enters(self):
+        """(joint states, result) of a motion into whose way a wall comes."""
+        left, right = (-1.2, *FORWARD), (1.2, *FORWARD)
+        self.assertTrue(self.apply(CollisionObject(operation=CollisionObject.REMOVE)))
+        self.go(joint_goal(left))
+        middle = self.tip((0.5, *FORWARD)).position
+        states = []
+        subscriber = rospy.Subscriber("/joint_states", JointState, states.append, queue_size=1000)
+        goal = self.goal(joint_goal(right), speed=0.4)
+        goal.planning_options.replan, goal.planning_options.replan_attempts = True, 5
+        self.move.send_goal(goal)
+        wait_until(lambda: states and states[-1].position[states[-1].name.index("joint_1")] > -0.8, "the arm to move",
+                   TIMEOUT_S, 0.002)
+        wall = box("wall", (middle.x, middle.y, middle.z), (0.04, 0.04, 0.1))
+        self.assertTrue(self.apply(wall))
+        self.assertTrue(self.move.wait_for_result(rospy.Duration(TIMEOUT_S)), "move_group does not end")
+        subscriber.unregister()
+        self.assertEqual(self.move.get_result().error_code.val, CODES.SUCCESS, self.move.get_goal_status_text())
+        np.testing.assert_allclose(self.positions(), right, atol=ARRIVED_RAD)
+        return states, self.move.get_result()
 
     def test_an_old_plan_is_not_executed(self):
         self.go(joint_goal(BENT))

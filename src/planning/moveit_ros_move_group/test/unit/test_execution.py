@@ -8,7 +8,7 @@ import actionlib
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import FollowJointTrajectoryResult
+from control_msgs.msg import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -16,6 +16,7 @@ from lab_testing.waiting import wait_until
 from moveit_ros_move_group import handles, node
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings, Executor, part_of
+from moveit_ros_move_group.rest_of_the_way import NewWay
 
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 90.0
@@ -57,7 +58,10 @@ class Handle:
 
     def __init__(self, there=True):
         self.there, self.done, self.sent, self.cancelled = there, threading.Event(), [], False
-        self.text, self.preempted = "", False
+        self.text, self.preempted, self.begins = "", False, None
+
+    def began(self):
+        return self.begins
 
     def connected(self, timeout_s, given_up=lambda: False):
         with contextlib.suppress(AssertionError):
@@ -193,6 +197,36 @@ def test_executions_end_early(hooks, code):
     assert lab.outcome().code == code and all(handle.cancelled for handle in lab.handles.values())
 
 
+def test_a_new_way_is_followed_in_the_place_of_the_old_one():
+    new = trajectory(2.0)
+    new.joint_trajectory.header.stamp = rospy.Time.from_sec(rospy.get_time() + 0.05)
+    ways = iter([None, NewWay(new, new.joint_trajectory.header.stamp.to_sec())])
+    lab = Lab(wait_for_rest=False).start(seconds=0.2, invalidated=lambda: next(ways, None))
+    until(lambda: all(len(handle.sent) == 2 for handle in lab.handles.values()))
+    for joint, handle in lab.handles.items():
+        assert handle.sent[1].joint_names == [joint] and handle.sent[1].header == new.joint_trajectory.header
+        assert not handle.cancelled
+        handle.end()
+    assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_the_time_limit_is_that_of_the_new_way():
+    new = trajectory(0.01)
+    ways = iter([NewWay(new, rospy.get_time())])
+    outcome = Lab(scaling=1.0, margin=0.01).start(invalidated=lambda: next(ways, None)).outcome()
+    assert outcome.code == MoveItErrorCodes.TIMED_OUT and "0.01 s planned" in outcome.text
+
+
+def test_controllers_say_when_a_trajectory_began():
+    lab = Lab().start()
+    lab.wait_until_sent()
+    assert lab.executor.began() is None
+    lab.handles["turn"].begins, lab.handles["reach"].begins = 10.0, 10.1
+    assert lab.executor.began() == 10.1
+    lab.executor.stop()
+    lab.outcome()
+
+
 def test_stop_ends_the_wait_for_a_controller():
     lab = Lab(connection_timeout=LONG_S)
     lab.handles["reach"].there = False
@@ -259,8 +293,9 @@ class Client:
     def __init__(self, *_):
         self.sent, self.manager = [], SimpleNamespace()
 
-    def send_goal(self, goal, moved):
+    def send_goal(self, goal, moved, told):
         self.sent.append(Sent(moved))
+        self.told = told
         return self.sent[-1]
 
 
@@ -279,6 +314,31 @@ def test_the_late_end_of_an_older_goal_ends_no_other(follow):
     assert not follow.done.is_set() and not follow.error() and not follow.was_preempted()
     newer.end(GoalStatus.ABORTED)
     assert follow.done.is_set() and "'a/f' ended with ABORTED, PATH_TOLERANCE_VIOLATED" in follow.error()
+
+
+def test_a_cancel_ends_all_goals_that_run(follow):
+    """A goal that was to take another's place may have been refused, and the other still run."""
+    for _ in range(3):
+        follow.send(trajectory(1.0).joint_trajectory)
+    first, second, third = follow._client.sent
+    first.end(GoalStatus.PREEMPTED)
+    third.end(GoalStatus.REJECTED)
+    follow.cancel()
+    assert [one.cancelled for one in (first, second, third)] == [False, True, False]
+
+
+def test_feedback_tells_when_a_goal_began(follow):
+    follow.send(trajectory(1.0).joint_trajectory)
+    assert follow.began() is None
+    feedback = FollowJointTrajectoryFeedback()
+    feedback.header.stamp = rospy.Time(20.0)
+    follow._client.told(None, feedback)  # some servers say nothing of time
+    assert follow.began() is None
+    feedback.desired.time_from_start = rospy.Duration(2.5)
+    follow._client.told(None, feedback)
+    assert follow.began() == 17.5
+    follow.send(trajectory(1.0).joint_trajectory)
+    assert follow.began() is None
 
 
 class Heard(list):
@@ -308,6 +368,19 @@ def test_a_fake_controller_that_was_cancelled_plays_what_comes_next():
     one._step = 0.001
     one.send(trajectory(0.01).joint_trajectory)
     assert one.done.wait(PATIENCE_S) and not one.was_preempted()
+
+
+def test_a_fake_controller_follows_the_old_way_until_the_new_one_begins():
+    one = fake("interpolate", rate=1000)
+    one.send(trajectory(0.4).joint_trajectory)
+    new = trajectory(0.2, positions=[-3.0, 0.0]).joint_trajectory
+    new.header.stamp, new.points = rospy.Time.from_sec(rospy.get_time() + 0.2), new.points[1:]
+    one.send(new)
+    assert one.done.wait(PATIENCE_S)
+    turns = [message.position[0] for message in one._publisher]
+    assert max(turns) > 0.1 and turns[-1] == -3.0
+    # Nothing of the old way comes behind the new one.
+    assert all(turn <= 0.0 for turn in turns[turns.index(max(turns)) + 1:])
 
 
 @pytest.mark.parametrize("rate", [0, -1.0, "fast", None])

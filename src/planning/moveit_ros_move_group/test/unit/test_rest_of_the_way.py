@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import rospy
 
+from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
+from motion_planning.replanning import Redirection
 from motion_planning.scene import WorldObject
 from motion_planning.timing import time_path
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
@@ -33,8 +35,8 @@ def timed(model):
     return time_path(ends, np.ones(2), 10.0 * np.ones(2), tolerance=0.001)
 
 
-def look(model, scene, timed, scenes):
-    return RestOfTheWay(ExactChecker(model, None), model.groups["arm"], timed, iter(scenes).__next__)
+def look(model, scene, timed, scenes, *more):
+    return RestOfTheWay(ExactChecker(model, None), model.groups["arm"], timed, iter(scenes).__next__, *more)
 
 
 def with_needle(scene, angle):
@@ -66,3 +68,40 @@ def test_time_that_goes_back_restarts(model, scene, clock):
     watch.hit()
     clock.now = 0.0
     assert watch.hit() is not None
+
+
+def test_another_way_takes_the_place_at_a_time_ahead(model, scene, clock):
+    timed, other = (time_path(np.array(ends), np.ones(2), np.ones(2)) for ends in (
+        [[0.9, 0.2], [-0.8, 0.2]], [[0.5, 0.2], [0.7, 0.2]]))
+    asked = []
+
+    def onward(_, running):
+        asked.append(running)
+        clock.now += 0.04  # what it takes
+        return Redirection(other, running.now + 0.1, None, 0.0)
+
+    blocked = with_needle(scene, np.pi / 4)
+    watch = look(model, scene, timed, [None, blocked, blocked], onward, lambda: clock.now - 0.3)
+    watch.hit()
+    new = watch.hit()
+    # The controller's word counts: it began 0.3 s before.
+    assert asked[0].now == pytest.approx(0.3) and 0.3 < asked[0].blocked_from < timed.duration
+    assert new.begins == pytest.approx(clock.now + 0.06)
+    message = new.trajectory.joint_trajectory
+    assert message.header.stamp.to_sec() == pytest.approx(new.begins)
+    # A controller leads to the first point from where it is.
+    assert [point.time_from_start.to_sec() for point in message.points] == pytest.approx(other.times[1:].tolist())
+    # From then on the new way is looked at.
+    assert watch.hit() is None
+
+
+@pytest.mark.parametrize("ahead_s, sentence", [(0.0, "no other way while the joints move: a wall"), (0.1, "too late")])
+def test_without_another_way_in_time_the_sentence_says_why(model, scene, timed, clock, ahead_s, sentence):
+    def onward(_, running):
+        if not ahead_s:
+            raise PlanningError("a wall")
+        clock.now += 2.0 * ahead_s
+        return Redirection(timed, running.now + ahead_s, None, 0.0)
+
+    watch = look(model, scene, timed, [with_needle(scene, np.pi / 4)], onward)
+    assert sentence in watch.hit() and watch.contacts[0].b == "needle"

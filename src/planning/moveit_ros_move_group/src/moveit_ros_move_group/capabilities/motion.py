@@ -120,8 +120,8 @@ class MoveAction:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
         group = context.model.groups[request.group_name]
         require_state(context, group)
-        attempts = 1 + (max(0, options.replan_attempts or self.replan_attempts) if options.replan else 0)
-        for attempt in range(attempts):
+        left = _Attempts(max(0, options.replan_attempts or self.replan_attempts) if options.replan else 0)
+        while True:
             self._changed.clear()
             scene = context.monitor.scene()
             scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=True)
@@ -130,12 +130,14 @@ class MoveAction:
                 result.error_code.val = MoveItErrorCodes.SUCCESS
                 return "; ".join(plan.remarks)
             self._feedback("MONITOR")
-            watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options))
+            watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options),
+                                 self._onward(request, left, result) if options.replan else None,
+                                 context.executor.began)
             outcome = context.executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
             again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
-            if not again or attempt + 1 == attempts:
+            if not again or not left.take():
                 break
             rospy.loginfo("move_group: %s; planning again", outcome.text)
             self._pause(options.replan_delay)
@@ -156,6 +158,22 @@ class MoveAction:
 
         return changed
 
+    def _onward(self, request, left, result):
+        """A function that finds another way for joints that move, as RestOfTheWay asks for it."""
+        def onward(scene, running):
+            if not left.take():
+                raise RequestError(MoveItErrorCodes.FAILURE, "all attempts to plan again are used up")
+            begin = time.monotonic()
+            found = self._planner.redirected(request, scene, running, self._server.is_preempt_requested)
+            rospy.loginfo("move_group: something new is in the way; another one was found in %.3f s, %s",
+                          time.monotonic() - begin, "without a stop" if found.overlap else "with a stop")
+            result.planned_trajectory = trajectory_message(self.context.model.groups[request.group_name].joints,
+                                                           found.timed, self.context.model.frame)
+            self.context.show_path(found.plan.start, result.planned_trajectory)
+            return found
+
+        return onward
+
     def _pause(self, seconds):
         end = time.monotonic() + max(0.0, min(seconds, 60.0))
         while time.monotonic() < end and not self._server.is_preempt_requested() and not rospy.is_shutdown():
@@ -164,6 +182,18 @@ class MoveAction:
     def _feedback(self, state):
         if self._server.is_active():
             self._server.publish_feedback(MoveGroupFeedback(state))
+
+
+class _Attempts:
+    """How often may still be planned again, moving or not."""
+
+    def __init__(self, count):
+        self._left = count
+
+    def take(self):
+        """Whether there was one more, which is used then."""
+        self._left -= 1
+        return self._left >= 0
 
 
 class ExecuteAction:
