@@ -53,7 +53,7 @@ HONOURED = {
     "material/script": "uri name",
     "material/pbr/metal": "albedo_map",
     "material/pbr/specular": "albedo_map",
-    "joint": "parent child pose axis axis2 sensor",
+    "joint": "parent child pose axis axis2 sensor gearbox_ratio gearbox_reference_body thread_pitch",
     "joint/physics/ode": "implicit_spring_damper cfm_damping",
     "axis": "xyz use_parent_model_frame",
     "axis/limit": "lower upper effort velocity",
@@ -165,8 +165,6 @@ WITHOUT_EFFECT = (
     ("material/pbr/specular", dict.fromkeys((
         "specular_map", "glossiness_map", "glossiness", "environment_map", "ambient_occlusion_map", "normal_map",
         "emissive_map", "light_map")), "the renderer has one shader"),
-    ("joint", {"gearbox_ratio": "1", "gearbox_reference_body": None, "thread_pitch": "1"},
-     "a joint of this type is held fixed"),
     ("joint/physics/ode", {"fudge_factor": "0", "cfm": "0", "erp": "0.2", "bounce": "0", "max_force": "0",
                            "velocity": "0"}, _SOLVER),
     ("joint/physics/ode/limit", {"cfm": "0", "erp": "0.2"}, _HARD_STOPS),

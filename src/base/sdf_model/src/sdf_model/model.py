@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from urdf_model import Limit, OutOfBounds, Robot, bounds, check_robot, read_file
+from urdf_model import Gear, Limit, OutOfBounds, Robot, bounds, check_robot, read_file
 
 from .actors import actor_robot
 from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
+from .gears import Gearbox
 from .lights import Light, read_light
 from .links import read_link
 from .materials import MaterialScripts
@@ -171,6 +172,9 @@ class ModelReader:
             document.note(element, "static of the models in '%s', beside links that are not" % element.get("name"))
         names = {joint.name for joint in parts.joints}
         for joint in element.iterchildren("joint"):
+            if joint.get("type") == "gearbox":
+                parts.gearboxes.append(_gearbox(document, joint, frames, frame_of[joint]))
+                continue
             read = _joint(document, joint, frames, frame_of[joint])
             read[0].parent, read[-1].child = frames.plain(read[0].parent), frames.plain(read[-1].child)
             if read[0].name in names:
@@ -232,6 +236,7 @@ class ModelReader:
             if len(parts.links) > bounds.LINKS:
                 raise document.error(child, "more than %d links in one model" % bounds.LINKS)
             parts.joints += below.joints
+            parts.gearboxes += below.gearboxes
             parts.gazebo += below.gazebo
         return held
 
@@ -267,10 +272,13 @@ def _moved(parts, prefix, origin):
     for joint in parts.joints:
         joint.name, joint.frame = prefix + joint.name, origin @ joint.frame
         joint.parent, joint.child = (end if end == "world" else prefix + end for end in (joint.parent, joint.child))
+        if joint.follows is not None:
+            joint.follows = Gear(prefix + joint.follows.joint, prefix + joint.follows.other, joint.follows.ratio)
     for said in parts.gazebo:
         if said.get("reference"):
             said.set("reference", prefix + said.get("reference"))
-    return Parts(links, parts.joints, parts.gazebo, parts.static, parts.static_is_said)
+    gearboxes = [gearbox.moved(prefix, origin[:3, :3]) for gearbox in parts.gearboxes]
+    return Parts(links, parts.joints, parts.gazebo, gearboxes, parts.static, parts.static_is_said)
 
 
 def _sensors_and_lights(document, link, name):
@@ -320,11 +328,14 @@ def _joint(document, element, frames, own_frame):
         rows = [_turn(document, element, "axis", kind, frame, frames)]
     elif kind in _TWO_AXES:
         rows = [_turn(document, element, tag, "revolute", frame, frames) for tag in ("axis", "axis2")]
+    elif kind == "screw":
+        turn = _turn(document, element, "axis", "revolute", frame, frames)
+        rows = [turn, ("prismatic", Limit(), turn[2], Dynamics())]
     elif kind == "ball":
         rows = [("continuous", Limit(), axis, Dynamics()) for axis in np.eye(3)]
     else:
         if not kind:
-            raise document.error(element, "joint '%s' has no type; known: %s, fixed, ball, %s"
+            raise document.error(element, "joint '%s' has no type; known: %s, fixed, ball, screw, gearbox, %s"
                                  % (name, ", ".join(_MOVABLE), ", ".join(_TWO_AXES)))
         if kind != "fixed":
             document.note(element, "joint '%s' of type %s, which is held fixed" % (name, kind))
@@ -332,9 +343,29 @@ def _joint(document, element, frames, own_frame):
     implicit = any(document.flag(element, "physics/ode/" + tag) for tag in ("implicit_spring_damper", "cfm_damping"))
     ends = [_end(document, element, "parent"), *("%s_cross%d" % (name, number) for number in range(1, len(rows))),
             _end(document, element, "child")]
-    return [SdfJoint(name if number == 0 else "%s_axis%d" % (name, number + 1), kind, *ends[number:number + 2], frame,
-                     axis, limit, dynamics, implicit, element)
-            for number, (kind, limit, axis, dynamics) in enumerate(rows)]
+    found = [SdfJoint(name if number == 0 else "%s_axis%d" % (name, number + 1), turning, *ends[number:number + 2],
+                      frame, axis, limit, dynamics, implicit, element)
+             for number, (turning, limit, axis, dynamics) in enumerate(rows)]
+    if kind == "screw":
+        found[1].follows = Gear(found[0].name, found[1].name, -1.0 / _pitch(document, element))
+    return found
+
+
+def _pitch(document, screw):
+    """The <thread_pitch> of a screw [rad/m]: it goes on by -1 / pitch for each radian (ODE's sign)."""
+    pitch = document.number(screw, "thread_pitch", 1.0)
+    if not 1.0 / bounds.JOINT_POSITION.high <= abs(pitch) <= bounds.JOINT_POSITION.high:
+        document.mend(screw, "<thread_pitch> of %g, for which 1 is used" % pitch)
+        return 1.0
+    return pitch
+
+
+def _gearbox(document, element, frames, own_frame):
+    """Return the Gearbox of a <joint>."""
+    name, frame = document.name(element), frames.where(own_frame, element)
+    axes = [frame[:3, :3] @ _turn(document, element, tag, "revolute", frame, frames)[2] for tag in ("axis", "axis2")]
+    ends = [frames.plain(_end(document, element, role)) for role in ("parent", "child", "gearbox_reference_body")]
+    return Gearbox(name, *ends, document.number(element, "gearbox_ratio", 1.0), tuple(axes), element)
 
 
 def _turn(document, joint, tag, kind, frame, frames):

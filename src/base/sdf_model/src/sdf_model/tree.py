@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from urdf_model import Inertial, Joint, Limit, Link, Loop, Robot
+from urdf_model import Gear, Inertial, Joint, Limit, Link, Loop, Robot
 from urdf_model.transforms import inverse
+
+from .gears import gear_of
 
 WORLD = "world"
 # Mass and moments of a link between the axes of a joint, as a part of the lighter link's.
@@ -39,6 +41,7 @@ class SdfJoint:
     dynamics: Dynamics
     implicit_damping: bool
     element: Any
+    follows: Gear | None = None  # of a screw's thread, between its turn and this joint
 
 
 @dataclass
@@ -48,6 +51,7 @@ class Parts:
     links: dict = field(default_factory=dict)  # name -> (Link, 4x4)
     joints: list = field(default_factory=list)
     gazebo: list = field(default_factory=list)  # <gazebo> elements, as urdf_model.Robot has them
+    gearboxes: list = field(default_factory=list)
     static: bool = False
     static_is_said: bool = False  # whether an element says so
 
@@ -129,8 +133,20 @@ def build_robot(document, name, parts):
         gazebo=parts.gazebo,
         root_origin=links[root][1],
         loops=[loop for joint in loops for loop in _loop(document, links, joint)],
+        gears=_gears(document, parts, joints),
         keeps_links=True,
     )
+
+
+def _gears(document, parts, joints):
+    """The Gears between the ``joints`` (by name) of the tree."""
+    found = [joint.follows for joint in parts.joints if joint.follows is not None]
+    for gearbox in parts.gearboxes:
+        try:
+            found.append(gear_of(gearbox, parts.joints))
+        except ValueError as error:
+            document.note(gearbox.element, "gearbox '%s': %s" % (gearbox.name, error))
+    return [gear for gear in found if gear.joint in joints and gear.other in joints]
 
 
 def _without_welds(parts):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sdf_model import ModelFolders, SdfError, description_file, parse_sdf_model, parse_sdf_world
-from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, drawing_urdf, gazebo_links, merge_fixed, parse_urdf
+from urdf_model import Box, Cylinder, Gear, Mesh, Plane, Sphere, drawing_urdf, gazebo_links, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, pose_matrix, rigid
 
 LINK = '<link name="%s"><pose>%s</pose></link>'
@@ -206,8 +206,32 @@ def test_what_a_tree_cannot_have_is_said():
     assert where(loose.robot)["b"][0, 3] == 1.0 and loose.warning == ""
     assert merge_fixed(loose.robot).loose == ("b",) and merge_fixed(loose.robot, held=True).loose == ()
     assert merge_fixed(parse_sdf_model(sdf("<static>1</static>" + content), "m.sdf").robot).loose == ()
-    screw = parse_sdf_model(sdf(content + joint("j", "a", "b", "screw")), "m.sdf")
-    assert "joint 'j' of type screw, which is held fixed" in screw.warning
+    unknown = parse_sdf_model(sdf(content + joint("j", "a", "b", "rope")), "m.sdf")
+    assert "joint 'j' of type rope, which is held fixed" in unknown.warning
+
+
+def test_screws_and_gearboxes_couple_joints_also_in_a_model_inside_of_another():
+    content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "1 0 0 0 0 0") + LINK % ("c", "2 0 0 0 0 0")
+    screw = joint("j", "a", "b", "screw", axis="<axis><xyz>0 0 1</xyz></axis><thread_pitch>4</thread_pitch>")
+    found = parse_sdf_model(sdf(content + screw), "m.sdf")
+    assert [(each.name, each.type) for each in found.robot.joints.values()][:2] == [
+        ("j", "continuous"), ("j_axis2", "prismatic")]
+    assert found.robot.gears == [Gear("j", "j_axis2", -0.25)] and found.warning == ""
+    nested = parse_sdf_model('<sdf version="1.6"><model name="o"><model name="m">%s</model></model></sdf>'
+                             % (content + screw), "m.sdf")
+    assert nested.robot.gears == [Gear("m::j", "m::j_axis2", -0.25)]
+    box = ('<joint name="g" type="gearbox"><parent>a</parent><child>c</child><gearbox_ratio>2</gearbox_ratio>'
+           "<gearbox_reference_body>%s</gearbox_reference_body><axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 0 %d</xyz>"
+           "</axis2></joint>")
+    hinges = joint("h", "b", "a") + joint("i", "c", "b")
+    for sign in (1, -1):
+        # Of joint i the reference body is the child: it turns the other way.
+        found = parse_sdf_model(sdf(content + hinges + box % ("b", sign)), "m.sdf")
+        assert found.robot.gears == [Gear("h", "i", 2.0 * sign)] and found.warning == ""
+    lost = parse_sdf_model(sdf(content + hinges + box % ("a", 1)), "m.sdf")
+    assert "gearbox 'g': no hinge joins 'a' and the reference body 'a'" in lost.warning and not lost.robot.gears
+    mended = parse_sdf_model(sdf(content + screw.replace(">4<", ">0<")), "m.sdf")
+    assert "<thread_pitch> of 0, for which 1 is used" in mended.warning
 
 
 def test_a_joint_of_several_axes_is_a_chain_of_hinges():

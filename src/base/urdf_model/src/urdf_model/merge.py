@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import Inertial, Joint, Loop, Robot, Shape, Surface
+from .model import Gear, Inertial, Joint, Loop, Robot, Shape, Surface
 
 
 class MergedFrame(NamedTuple):
@@ -51,6 +51,7 @@ class MergedRobot:
     joints: dict[str, Joint]
     frames: dict[str, MergedFrame]
     loops: list[Loop] = field(default_factory=list)
+    gears: list[Gear] = field(default_factory=list)
     loose: tuple[str, ...] = ()  # roots of further trees, which move freely
 
     @property
@@ -102,7 +103,8 @@ def merge_fixed(robot: Robot, held: bool = False) -> MergedRobot:
                      in_parent=frames[loop.parent].offset @ loop.in_parent,
                      in_child=frames[loop.child].offset @ loop.in_child) for loop in robot.loops]
     loops = [loop for loop in loops if loop.parent != loop.child]
-    return MergedRobot(robot.name, robot.root, links, ordered, frames, loops,
+    gears = [gear for gear in robot.gears if gear.joint in ordered and gear.other in ordered]
+    return MergedRobot(robot.name, robot.root, links, ordered, frames, loops, gears,
                        tuple(body for body in links if body in loose))
 
 

@@ -177,6 +177,15 @@ class Loop:
 
 
 @dataclass(frozen=True)
+class Gear:
+    """Joint ``other`` moves ``ratio`` times as far as ``joint``."""
+
+    joint: str
+    other: str
+    ratio: float  # rad or m per rad or m
+
+
+@dataclass(frozen=True)
 class TransmissionJoint:
     name: str  # empty where the description has none
     hardware_interfaces: tuple[str, ...]
@@ -205,6 +214,7 @@ class Robot:
     # 4x4, the root link's frame in the model's, which is what a pose in the world refers to. One in a URDF, not in SDF.
     root_origin: np.ndarray = field(default_factory=lambda: np.eye(4))
     loops: list[Loop] = field(default_factory=list)
+    gears: list[Gear] = field(default_factory=list)
     keeps_links: bool = False  # whether fixed links all stay links for Gazebo, as those of an SDF
 
     def movable_joints(self):

@@ -197,6 +197,8 @@ class World:
         if pairs:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
+        for gear in merged.gears:
+            model.couple(*model.index([gear.joint, gear.other]), gear.ratio)
         if pairs and not self_collision_pairs:
             self._part_rough_pairs(model, pairs)
         if model.free:

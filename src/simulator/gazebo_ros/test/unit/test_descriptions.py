@@ -252,3 +252,45 @@ def test_boxes_in_one_model_slide_by_themselves_as_in_gazebos_friction_pyramid()
     assert places == pytest.approx([speed ** 2 / (2 * 0.3 * 9.8) for speed in speeds], abs=0.01)
     assert model.model_pose().position[0] == pytest.approx(places[0], abs=1e-6) and found.warning == ""
     world.close()
+
+
+BAR = """<link name="%s"><inertial><mass>%g</mass><inertia><ixx>%g</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
+</link>"""
+
+
+def test_a_screw_goes_on_as_its_thread_says():
+    """A torque accelerates it by T / (I + m / pitch²), and it goes on by -1 / pitch for each radian."""
+    world = World(time_step_s=0.001, gravity=(0.0, 0.0, 0.0))
+    screw = world.spawn(parse_sdf_model("""<sdf version="1.6"><model name="m">%s<joint name="j" type="screw">
+        <parent>world</parent><child>bar</child><axis><xyz>1 0 0</xyz></axis><thread_pitch>4</thread_pitch></joint>
+        </model></sdf>""" % (BAR % ("bar", 5.0, 0.5)), "m.sdf").robot, "m")
+    index = screw.index(["j"])
+    for _ in range(1000):
+        screw.drive_effort(index, np.array([2.0]))
+        world.step()
+    angle, way = screw.read_joints()[0]
+    assert angle == pytest.approx(0.5 * 2.0 / (0.5 + 5.0 / 16.0), rel=0.01)
+    assert way == pytest.approx(-angle / 4.0, abs=1e-4)
+    assert screw.link_pose("bar").position[0] == pytest.approx(way, abs=1e-6)
+    world.close()
+
+
+def test_a_gearbox_turns_its_child_by_its_ratio():
+    """Gazebo's gearbox.world: the child turns by -ratio times the parent's angle; both inertias are felt."""
+    world = World(time_step_s=0.001, gravity=(0.0, 0.0, 0.0))
+    hinge = """<joint name="%s" type="revolute"><parent>%s</parent><child>%s</child><axis><xyz>1 0 0</xyz></axis>
+        </joint>"""
+    gears = world.spawn(parse_sdf_model("""<sdf version="1.6"><model name="m">%s%s%s<joint name="fix" type="fixed">
+        <parent>world</parent><child>middle</child></joint>%s%s<joint name="gear" type="gearbox"><parent>one</parent>
+        <child>two</child><gearbox_ratio>-1.5</gearbox_ratio><gearbox_reference_body>middle</gearbox_reference_body>
+        <axis><xyz>1 0 0</xyz></axis><axis2><xyz>1 0 0</xyz></axis2></joint></model></sdf>""" % (
+            BAR % ("middle", 1.0, 1.0), BAR % ("one", 1.0, 0.4), BAR % ("two", 1.0, 0.3),
+            hinge % ("first", "middle", "one"), hinge % ("second", "middle", "two")), "m.sdf").robot, "m", static=True)
+    index = gears.index(["second"])
+    for _ in range(1000):
+        gears.drive_effort(index, np.array([0.6]))
+        world.step()
+    first, second = gears.read_joints()[0]
+    assert second == pytest.approx(1.5 * first, abs=1e-3)
+    assert second == pytest.approx(0.5 * 0.6 / (0.3 + 0.4 / 1.5 ** 2), rel=0.01)
+    world.close()
