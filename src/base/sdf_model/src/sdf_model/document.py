@@ -13,6 +13,8 @@ from .elements import TABLE
 from .lenient import attributes_to_elements
 
 ROOT_TAGS = ("sdf", "gazebo")
+#: The size of a shape whose size is 0 [m].
+NO_SIZE_M = 1e-4
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
 
@@ -130,14 +132,16 @@ class Document:
         return tuple(default) if child is None else self.numbers(child, len(default))
 
     def positive(self, element, tag, count):
-        """Return ``count`` positive numbers in a child that must be there."""
+        """Return ``count`` positive numbers in a child that must be there; 0 is NO_SIZE_M, as in Gazebo."""
         child = element.find(tag)
         if child is None:
             raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
         values = self.numbers(child, count)
-        if min(values) <= 0.0:
+        if min(values) < 0.0:
             raise self.error(child, "<%s> is '%s', expected positive numbers" % (tag, child.text.strip()))
-        return values
+        if min(values) == 0.0:
+            self.mend(child, "<%s> of %s, of which %g is used for 0" % (tag, child.text.strip(), NO_SIZE_M))
+        return tuple(value or NO_SIZE_M for value in values)
 
     def numbers(self, element, count, may_be_infinite=False):
         """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something."""

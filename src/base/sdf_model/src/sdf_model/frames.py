@@ -35,10 +35,12 @@ class Frames:
         return name
 
     def plain(self, name):
-        """Return ``name`` without the scope's name in front of it, if only that is the name of a frame."""
-        rest = name[len(self._scope):]
-        is_scoped = self._scope and name.startswith(self._scope) and name not in self
-        return rest if is_scoped and rest in self else name
+        """Return ``name`` without the scope's name in front of it, and those of the scopes around that, if only that is
+        the name of a frame."""
+        if not self._scope or name in self:
+            return name
+        before, scope, rest = ("::" + name).rpartition("::" + self._scope)
+        return rest if scope and rest in self else name
 
     def __contains__(self, name):
         return name in OWN or name in self._given

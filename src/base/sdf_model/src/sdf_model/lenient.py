@@ -20,19 +20,23 @@ _INSIDE = {
     "model": ("static",),
     "link": ("gravity", "kinematic", "self_collide"),
 }
+# Numbers that are the text of their element today.
+_TEXTS = {"gravity": "xyz", "ambient": "rgba", "diffuse": "rgba", "specular": "rgba", "emissive": "rgba",
+          "background": "rgba"}
 _RENAMED = {"filename": "uri"}
 
 
 def attributes_to_elements(root):
     """Convert attributes of ``root``'s elements to elements, in place; return a list of (what, line)."""
     mended = []
-    for element in list(root.iter(*_INSIDE, "origin", "gravity")):
+    for element in list(root.iter(*_INSIDE, *_TEXTS, "origin")):
         if any(True for _ in element.iterancestors("plugin", "sensor")):
             continue
-        if element.tag == "gravity":
-            if element.get("xyz") and not (element.text or "").strip():
-                element.text = element.get("xyz")
-                mended.append(("attribute xyz of <gravity>", element.sourceline))
+        if element.tag in _TEXTS:
+            name = _TEXTS[element.tag]
+            if element.get(name) and not (element.text or "").strip():
+                element.text = element.get(name)
+                mended.append(("attribute %s of <%s>" % (name, element.tag), element.sourceline))
         elif element.tag == "origin":
             parent = element.getparent()
             if element.get("pose") and parent is not None and parent.find("pose") is None:

@@ -530,3 +530,21 @@ def test_a_heightmap_is_a_mesh_of_its_size_at_its_place():
     shape, = model.robot.links["l"].collisions
     assert shape.geometry == Mesh("model://hills/hills.png", (129, 64, 10)) and model.warning == ""
     assert shape.origin[:3, 3].tolist() == [1, 2, 3]
+
+
+def test_names_in_a_nested_model_may_begin_with_all_models_around_it():
+    """As in Gazebo's deeply_nested_models.world."""
+    inner = "".join(LINK % (name, "0 0 0 0 0 0") for name in "ab") + joint("j", "o::m::n::a", "o::m::n::b")
+    text = '<sdf version="1.6"><model name="o"><model name="m"><model name="n">%s</model></model></model></sdf>' % inner
+    found = parse_sdf_model(text, "m.sdf").robot
+    hinge = found.joints["m::n::j"]
+    assert (hinge.parent, hinge.child) == ("m::n::a", "m::n::b")
+
+
+def test_a_shape_without_a_size_is_tiny_and_a_negative_one_is_refused():
+    box = '<link name="l"><collision name="c"><geometry><box><size>%s</size></box></geometry></collision></link>'
+    found = parse_sdf_model(sdf(box % "0 1 0"), "m.sdf")
+    assert found.robot.links["l"].collisions[0].geometry.size == (1e-4, 1.0, 1e-4)
+    assert "<size> of 0 1 0, of which 0.0001 is used for 0 (m.sdf line" in found.warning
+    with pytest.raises(SdfError, match="-1"):
+        parse_sdf_model(sdf(box % "1 1 -1"), "m.sdf")
