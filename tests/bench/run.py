@@ -35,7 +35,7 @@ SUITES = {
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
     "robot": ("robot_bench", "a tick of Baxter's control logic beside the physics step of the same world"),
     "planning": ("planning_bench", "paths for Baxter and PROBOT beside OMPL's RRTConnect on exact geometry"),
-    "servo": ("servo_bench", "random streams of twists: limits, contacts, dead ends, CPU of a step"),
+    "servo": ("servo_bench", "random streams of twists in physics: contacts, limits, tracking, dead ends, CPU"),
     "replanning": ("replanning_bench", "obstacles that enter the way of a moving arm: time to another way, stops"),
     "planned": ("planned_bench", "10,000 states of planned trajectories checked by PyBullet: contacts, limits"),
     "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without other nodes"),

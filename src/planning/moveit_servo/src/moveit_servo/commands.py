@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from moveit_servo.settings import ServoSettings
 
 
+#: Of a command: a link or the model's frame by its name, "" where the settings say; or a pose (4, 4) in the latter.
+Frame = str | np.ndarray
+
+
 class CommandIgnored(ValueError):
     """A command that is not carried out, with the reason."""
 
@@ -24,7 +28,7 @@ class _Newest:
 
     since: float = -np.inf
     value: Any = None
-    frame: str = ""
+    frame: Frame = ""
 
 
 @dataclass
@@ -43,8 +47,8 @@ class Commands:
     def __post_init__(self) -> None:
         self._twist, self._jog, self._pose = _Newest(), _Newest(), _Newest()
 
-    def take_twist(self, values: Any, frame: str, since: float, settings: ServoSettings) -> None:
-        """A twist (6,), of ``frame``; empty: of the command frame. Raises CommandIgnored; then nothing moves."""
+    def take_twist(self, values: Any, frame: Frame, since: float, settings: ServoSettings) -> None:
+        """A twist (6,) in the axes of ``frame``, "": the command frame. Raises CommandIgnored; then nothing moves."""
         self._twist = _Newest(since)
         twist = np.array(values, dtype=float)
         if not np.isfinite(twist).all():
@@ -77,11 +81,11 @@ class Commands:
         self._jog = _Newest(since, wanted if values.any() else None)
         return foreign
 
-    def take_pose(self, pose: np.ndarray, frame: str, since: float) -> None:
+    def take_pose(self, pose: np.ndarray, frame: Frame, since: float) -> None:
         """A pose (4, 4) of the tip in ``frame``."""
         self._pose = _Newest(since, pose, frame)
 
-    def newest(self, now: float, settings: ServoSettings) -> tuple[str, Any, str]:
+    def newest(self, now: float, settings: ServoSettings) -> tuple[str, Any, Frame]:
         """Return (kind, value, frame) of the command in force at ``now`` [s]: "twist", "joints" or "pose"; "" if there
         is none."""
         for kind, newest, timeout in (("twist", self._twist, settings.incoming_command_timeout),

@@ -7,11 +7,13 @@ others go on. Motion towards the singularity brakes before it, as before a joint
 where the arm is stretched, its joints move although the hand does not yet, since bending the elbow either way brings
 the hand back.
 """
-from __future__ import annotations
-
+import math
 from typing import NamedTuple
 
 import numpy as np
+
+from arm_kinematics.kernels.motion import tip_and_jacobian
+from moveit_servo.compiled import compiled
 
 # Step along a singular direction by which its change is looked up [rad].
 _PROBE_RAD = 0.02
@@ -39,6 +41,21 @@ class Wanted(NamedTuple):
     condition: float
 
 
+class Arm(NamedTuple):
+    """An arm, and the rows of twists that count: rotations, offsets, prismatic of arm_kinematics.Chain.arrays; turn
+    (3, 3) from the chain's base to the axes of the twist; keep (r,) rows; lower, upper, velocity (k,) as in
+    JointLimits."""
+
+    rotations: np.ndarray
+    offsets: np.ndarray
+    prismatic: np.ndarray
+    turn: np.ndarray
+    keep: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+
+
 class Thresholds(NamedTuple):
     """Condition numbers: from which a direction is singular, and at which motion towards the singularity ends."""
 
@@ -46,68 +63,105 @@ class Thresholds(NamedTuple):
     hard: float
 
 
-def velocity_for(twist, jacobian, jacobian_at, q, limits, thresholds) -> Wanted:
-    """Return the Wanted joint velocities for ``twist`` (r,).
+@compiled
+def jacobian_of(arm, q):
+    """Return the Jacobian (r, k) of an Arm at ``q`` (k,), in the rows that count."""
+    whole = tip_and_jacobian(arm.rotations, arm.offsets, arm.prismatic, q)[1]
+    rows, k = len(arm.keep), len(q)
+    jacobian = np.empty((rows, k))
+    for i in range(rows):
+        row = arm.keep[i]
+        first = row - row % 3
+        for j in range(k):
+            jacobian[i, j] = (arm.turn[row % 3, 0] * whole[first, j] + arm.turn[row % 3, 1] * whole[first + 1, j]
+                              + arm.turn[row % 3, 2] * whole[first + 2, j])
+    return jacobian
 
-    jacobian (r, k): at ``q`` (k,), in the rows of the twist; jacobian_at(q) returns it elsewhere. limits: JointLimits.
-    thresholds: Thresholds.
+
+@compiled
+def velocity_for(twist, jacobian, arm, q, thresholds):
+    """Return the Wanted joint velocities for ``twist`` (r,), the rows of an Arm that count.
+
+    jacobian (r, k): that of the Arm at ``q`` (k,). thresholds: Thresholds.
     """
-    bounds = limits.lower, limits.upper
     left, values, right = np.linalg.svd(jacobian)
-    rank = len(values)
+    rank, k = len(values), len(q)
     fading, gone = values[0] / max(thresholds.lower, 1.0), values[0] / max(thresholds.hard, thresholds.lower, 1.0)
-    parts = left.T @ twist
-    rates = np.empty(rank)
-    for i, value in enumerate(values):
-        if value >= fading or abs(parts[i]) < 1e-9:
-            rates[i] = parts[i] / max(value, gone)
+    velocity, metric = np.zeros(k), np.zeros((k, k))
+    size, lost = 0.0, 0.0
+    for i in range(rank):
+        part, value, along = 0.0, values[i], right[i]
+        for a in range(rank):
+            part += left[a, i] * twist[a]
+        if value >= fading or abs(part) < 1e-9:
+            rate = part / max(value, gone)
         else:
-            most = _MAX_SLOWING * float((limits.velocity / np.maximum(np.abs(right[i]), 1e-6)).min())
-            rate = _singular_rate(parts[i], value, (left[:, i], right[i]), jacobian_at, q, bounds, gone)
-            rates[i] = min(max(rate, -most), most)
-    velocity = right[:rank].T @ rates
-    lost = parts - values * rates
-    size = float(np.linalg.norm(twist))
-    free = right[rank:]
-    if len(free):
-        effort = min(1.0, float(np.linalg.norm(velocity)) / _POSTURE_FULL_AT)
-        velocity = velocity + effort * free.T @ (free @ _away_from_limits(q, *bounds))
-    weights = np.maximum(values, _MIN_WEIGHT * values[0]) ** 2
-    metric = (right[:rank].T * weights) @ right[:rank]
-    if len(free):
-        metric = metric + (_FREE_WEIGHT * values[0]) ** 2 * (free.T @ free)
-    return Wanted(velocity, metric, float(np.linalg.norm(lost)) / size if size > 0.0 else 0.0,
-                  float(values[0] / max(values[-1], 1e-12)))
+            most = math.inf
+            for a in range(k):
+                most = min(most, arm.velocity[a] / max(abs(along[a]), 1e-6))
+            rate = _singular_rate(part, value, left[:, i], along, arm, q, gone)
+            rate = min(max(rate, -_MAX_SLOWING * most), _MAX_SLOWING * most)
+        size += part * part
+        lost += (part - value * rate) ** 2
+        weight = max(value, _MIN_WEIGHT * values[0]) ** 2
+        for a in range(k):
+            velocity[a] += rate * along[a]
+            for b in range(k):
+                metric[a, b] += weight * along[a] * along[b]
+    if k > rank:
+        effort = min(1.0, math.sqrt(np.sum(velocity * velocity)) / _POSTURE_FULL_AT)
+        away = _away_from_limits(q, arm.lower, arm.upper)
+        for i in range(rank, k):
+            along, share = right[i], 0.0
+            for a in range(k):
+                share += along[a] * away[a]
+            for a in range(k):
+                velocity[a] += effort * share * along[a]
+                for b in range(k):
+                    metric[a, b] += (_FREE_WEIGHT * values[0]) ** 2 * along[a] * along[b]
+    return Wanted(velocity, metric, math.sqrt(lost / size) if size > 0.0 else 0.0, values[0] / max(values[-1], 1e-12))
 
 
-def _singular_rate(part, value, direction, jacobian_at, q, bounds, gone) -> float:
+@compiled
+def _singular_rate(part, value, of_hand, of_joints, arm, q, gone):
     """The rate along a singular direction of the joints, of which the hand's motion is ``part`` / ``value``."""
-    of_hand, of_joints = direction
     probe = _PROBE_RAD * of_joints
-    change = float(of_hand @ (jacobian_at(q + probe) - jacobian_at(q - probe)) @ of_joints) / (2.0 * _PROBE_RAD)
-    towards = np.sign(part)
+    difference = jacobian_of(arm, q + probe) - jacobian_of(arm, q - probe)
+    change = 0.0
+    for a in range(len(of_hand)):
+        for b in range(len(q)):
+            change += of_hand[a] * difference[a, b] * of_joints[b]
+    change /= 2.0 * _PROBE_RAD
+    towards = math.copysign(1.0, part)
     if towards * change < -_LEVEL:
         return towards * min(abs(part) / max(value, gone), max(value - gone, 0.0) / abs(change) / _BRAKING_S)
     rate = part / max(value, gone)
     if abs(change) > _LEVEL:
-        pocket = value / abs(change) + _room(q, towards * of_joints, *bounds)
-        if pocket < _POCKET_RAD < _room(q, -towards * of_joints, *bounds):
+        pocket = value / abs(change) + _room(q, towards * of_joints, arm.lower, arm.upper)
+        if pocket < _POCKET_RAD < _room(q, -towards * of_joints, arm.lower, arm.upper):
             return -rate
     return rate
 
 
-def _room(q, direction, lower, upper) -> float:
+@compiled
+def _room(q, direction, lower, upper):
     """How far ``q`` can move along ``direction`` before a joint is at its limit [rad]."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        room = np.where(direction > 0.0, upper - q, q - lower) / np.abs(direction)
-    return float(np.nanmin(np.where(np.abs(direction) > 1e-3, room, np.inf)))
+    least = math.inf
+    for a in range(len(q)):
+        if abs(direction[a]) > 1e-3:
+            room = upper[a] - q[a] if direction[a] > 0.0 else q[a] - lower[a]
+            least = min(least, room / abs(direction[a]))
+    return least
 
 
+@compiled
 def _away_from_limits(q, lower, upper):
     """Velocities (k,) away from limits that are near."""
-    travel = upper - lower
-    finite = np.isfinite(travel) & (travel > 0.0)
-    zone = np.where(finite, _POSTURE_SHARE * np.where(finite, travel, 1.0), 1.0)
-    below = np.where(finite, np.clip(1.0 - (q - np.where(finite, lower, 0.0)) / zone, 0.0, 1.0), 0.0)
-    above = np.where(finite, np.clip(1.0 - (np.where(finite, upper, 0.0) - q) / zone, 0.0, 1.0), 0.0)
-    return _POSTURE_SPEED * (below - above)
+    away = np.zeros(len(q))
+    for a in range(len(q)):
+        travel = upper[a] - lower[a]
+        if 0.0 < travel < math.inf:
+            zone = _POSTURE_SHARE * travel
+            below, above = 1.0 - (q[a] - lower[a]) / zone, 1.0 - (upper[a] - q[a]) / zone
+            away[a] = _POSTURE_SPEED * (min(max(below, 0.0), 1.0) - min(max(above, 0.0), 1.0))
+    return away

@@ -22,6 +22,10 @@ COLUMNS = 10
 MAX_OF_CLUSTER, _APART_M, _SAME_DIRECTION = 6, 0.08, 0.9
 # Of one pair of bodies, gaps count that are larger than the smallest one by at most this [m].
 _SIMILAR_M = 0.03
+# Objects beside the nearest one count up to this much farther away [m]: before others the arm can brake later.
+_BESIDE_M = 0.05
+# The same for one sphere: bodies side by side have some 100,000 pairs of spheres that are near.
+_OF_ONE_BALL_M = 0.005
 
 
 @compiled
@@ -168,24 +172,55 @@ def _fill(new, distance, normal, centre, radius):
 
 
 @compiled
-def _object_gaps(tables, c, k, reach, places, found):
-    """Keep the gaps of cluster ``c`` and object ``k``; places (s, 3): of the cluster's spheres."""
-    robot, (_, _, kinds, objects) = tables
+def _nearest_object(world, node, end, ball, reach, any_will_do, normal):
+    """Return the distance [m] of a ``ball`` (4,), centre and radius, from the nearest object of the nodes ``node`` ...
+    ``end`` - 1, or ``reach`` if all are farther; writes ``normal`` (3,). any_will_do: the first within reach will."""
+    links, nodes, kinds, objects = world
+    direction, radius = np.empty(3), ball[3]
+    while node < end:
+        square, far = 0.0, reach + radius
+        for a in range(3):
+            out = max(nodes[6 * node + a] - ball[a], ball[a] - nodes[6 * node + 3 + a], 0.0)
+            square += out * out
+        if far <= 0.0 or square > far * far:
+            node = links[2 * node]
+            continue
+        k = links[2 * node + 1]
+        node += 1
+        if k >= 0:
+            distance = object_distance(kinds[k], objects, _OBJECT * k, ball, direction) - radius
+            if distance < reach:
+                reach = distance
+                for a in range(3):
+                    normal[a] = direction[a]
+                if any_will_do:
+                    return reach
+    return reach
+
+
+@compiled
+def _object_gaps(tables, test, reach, places, found):
+    """Keep the gaps of a ``test`` (3,): cluster, first and last + 1 node of the objects; of each sphere the smallest.
+    places (s, 3): of the cluster's spheres."""
+    robot, world = tables
     rows, counts = found
     clusters, spheres, skips = robot[2], robot[4], robot[8]
+    c = test[0]
     joint, s, last = clusters[_CLUSTER * c], clusters[_CLUSTER * c + 1], clusters[_CLUSTER * c + 2]
-    normal, new = np.empty(3), np.empty(COLUMNS)
+    normal, new, ball = np.empty(3), np.empty(COLUMNS), np.empty(4)
     new[7], new[8], new[9] = joint, -1.0, c
     while s < last:
-        distance = object_distance(kinds[k], objects, _OBJECT * k, places[s], normal)
-        radius = spheres[4 * s + 3]
-        if distance - radius > reach:
+        for a in range(3):
+            ball[a] = places[s, a]
+        ball[3] = spheres[4 * s + 3]
+        distance = _nearest_object(world, test[1], test[2], ball, reach, skips[s] > 0, normal)
+        if distance >= reach:
             s = skips[s] if skips[s] else s + 1
             continue
         if not skips[s]:
-            _fill(new, distance, normal, places[s], radius)
+            _fill(new, distance + ball[3], normal, places[s], ball[3])
             _keep(rows, counts, c, new)
-            reach = min(reach, distance - radius + _SIMILAR_M)
+            reach = min(reach, max(distance, 0.0) + _BESIDE_M)
         s += 1
 
 
@@ -199,9 +234,9 @@ def _pair_gaps(robot, a, b, reach, places, found):
     normal, new = np.empty(3), np.empty(COLUMNS)
     new[7], new[8], new[9] = joint, other, a
     while s < last:
-        radius, o, is_near = spheres[4 * s + 3], first, False
+        radius, o, is_near, reach_of_ball = spheres[4 * s + 3], first, False, reach
         while o < end:
-            far = reach + radius + spheres[4 * o + 3]
+            far = reach_of_ball + radius + spheres[4 * o + 3]
             x, y, z = places[s, 0] - places[o, 0], places[s, 1] - places[o, 1], places[s, 2] - places[o, 2]
             if far <= 0.0 or x * x + y * y + z * z > far * far:
                 o = skips[o] if skips[o] else o + 1
@@ -214,6 +249,7 @@ def _pair_gaps(robot, a, b, reach, places, found):
                 _fill(new, distance, normal, places[s], radius)
                 _keep(rows, counts, a, new)
                 reach = min(reach, distance - radius + _SIMILAR_M)
+                reach_of_ball = min(reach, reach_of_ball, distance - radius + _OF_ONE_BALL_M)
             o += 1
         s = skips[s] if skips[s] and not is_near else s + 1
 
@@ -233,8 +269,8 @@ def _length(p, origin, normal):
 
 @compiled
 def near(tables, checks, reach, frames, rows):
-    """Write the gaps smaller than ``reach`` [m] into ``rows`` (m, COLUMNS), the smallest of each cluster; return their
-    number.
+    """Write the gaps smaller than ``reach`` [m] into ``rows`` (m, COLUMNS), of each cluster and of all the smallest, in
+    their order; return their number.
 
     tables: (robot, world). checks: (pairs (p, 2) of clusters, tests (t, 3): cluster, first and last + 1 node), those of
     the tables that matter. frames (j, 3, 4): of the joints, as ``place`` writes them.
@@ -242,7 +278,6 @@ def near(tables, checks, reach, frames, rows):
     robot, world = tables
     clusters, balls = robot[2], robot[3]
     pairs, tests = checks
-    links, nodes, kinds, objects = world
     count = len(clusters) // _CLUSTER
     found, counts = np.empty((count, MAX_OF_CLUSTER, COLUMNS)), np.zeros(count, np.int64)
     kept = (found, counts)
@@ -250,34 +285,29 @@ def near(tables, checks, reach, frames, rows):
     placed, places = np.zeros(count, np.bool_), np.empty((len(robot[4]) // 4, 3))
     for c in range(count):
         _place_balls(frames[clusters[_CLUSTER * c]], balls, c, c + 1, centres)
+    ball, normal = np.empty(4), np.empty(3)
     for t in range(len(tests)):
-        c, node, end = tests[t, 0], tests[t, 1], tests[t, 2]
-        far = balls[4 * c + 3] + reach
-        while node < end:
-            square = 0.0
-            for a in range(3):
-                out = max(nodes[6 * node + a] - centres[c, a], centres[c, a] - nodes[6 * node + 3 + a], 0.0)
-                square += out * out
-            if square > far * far:
-                node = links[2 * node]
-                continue
-            k = links[2 * node + 1]
-            node += 1
-            if k >= 0 and object_distance(kinds[k], objects, _OBJECT * k, centres[c], direction) < far:
-                _place_cluster(robot, frames, c, placed, places)
-                _object_gaps(tables, c, k, reach, places, kept)
+        c = tests[t, 0]
+        ball[:3], ball[3] = centres[c], balls[4 * c + 3]
+        if _nearest_object(world, tests[t, 1], tests[t, 2], ball, reach, True, normal) < reach:
+            _place_cluster(robot, frames, c, placed, places)
+            _object_gaps(tables, tests[t], reach, places, kept)
     for p in range(len(pairs)):
         a, b = pairs[p, 0], pairs[p, 1]
         if _length(centres[a], centres[b], direction) < balls[4 * a + 3] + balls[4 * b + 3] + reach:
             _place_cluster(robot, frames, a, placed, places)
             _place_cluster(robot, frames, b, placed, places)
             _pair_gaps(robot, a, b, reach, places, kept)
-    total = 0
+    where = np.empty((counts.sum(), 2), np.int64)
+    distances, total = np.empty(len(where)), 0
     for c in range(count):
         for k in range(counts[c]):
-            if total < len(rows):
-                rows[total] = found[c, k]
-                total += 1
+            where[total, 0], where[total, 1], distances[total] = c, k, found[c, k, 0]
+            total += 1
+    total = min(total, len(rows))
+    order = np.argsort(distances)
+    for n in range(total):
+        rows[n] = found[where[order[n], 0], where[order[n], 1]]
     return total
 
 

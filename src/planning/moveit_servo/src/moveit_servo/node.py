@@ -34,7 +34,7 @@ from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 from moveit_ros_move_group.monitor import SceneMonitor
-from moveit_servo.commands import CommandIgnored, Commands, sent_at
+from moveit_servo.commands import CommandIgnored, Commands, Frame, sent_at
 from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
 from moveit_servo.settings import ServoSettings, SettingsError
@@ -77,7 +77,6 @@ class ServoNode:
         self._q, self._velocity = model.default_state().q.copy(), np.zeros(len(model.variables))
         self._heard: set[str] = set()
         self._indices = [model.index[name] for name in self.servo.joints]
-        self._frames: dict[str, np.ndarray] = {}
         self._sent, self._halts, self._new_settings = False, 0, settings
         self._said = (Status.NO_WARNING, "")
         self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
@@ -148,10 +147,11 @@ class ServoNode:
                                        arrived - since, self.servo.settings.incoming_command_timeout))
         frame = header.frame_id.lstrip("/")
         try:
-            if frame and frame not in self.model.link_index and frame != self.model.frame:
-                self._frames[frame] = self.monitor.tf_frame(frame)
+            # What tf alone knows is looked up once for each command, which keeps it.
+            of_robot = not frame or frame in self.model.link_index or frame == self.model.frame
+            place = frame if of_robot else self.monitor.tf_frame(frame)
             with self._lock:
-                take(frame, since)
+                take(place, since)
         except (CommandIgnored, PlanningError) as error:
             rospy.logwarn_throttle(_TOLD_EVERY_S, "%s; it is ignored" % error)
         self._news.set()
@@ -252,24 +252,25 @@ class ServoNode:
                            or self._halts <= settings.num_outgoing_halt_msgs_to_publish):
             self._out.publish(message_of(step, q[self._indices], servo.joints, settings, seconds, now))
 
-    def _command(self, kind: str, value: Any, frame: str, q: np.ndarray, settings: ServoSettings) -> Command:
+    def _command(self, kind: str, value: Any, frame: Frame, q: np.ndarray, settings: ServoSettings) -> Command:
         if not kind:
             return Command()
         if kind == "joints":
             return Command(joints=value)
         axes = self._axes(settings.planning_frame, q)[:3, :3]
         if kind == "pose":
-            return Command(pose=self._axes(frame or settings.planning_frame, q) @ value, axes=axes,
+            return Command(pose=self._axes(frame if len(frame) else settings.planning_frame, q) @ value, axes=axes,
                            drift=self.commands.drift)
-        turn = axes.T @ self._axes(frame or settings.robot_link_command_frame or settings.planning_frame, q)[:3, :3]
+        frame = frame if len(frame) else settings.robot_link_command_frame or settings.planning_frame
+        turn = axes.T @ self._axes(frame, q)[:3, :3]
         return Command(twist=np.concatenate([turn @ value[:3], turn @ value[3:]]), drift=self.commands.drift, axes=axes)
 
-    def _axes(self, frame: str, q: np.ndarray) -> np.ndarray:
+    def _axes(self, frame: Frame, q: np.ndarray) -> np.ndarray:
         """The pose (4, 4) of a frame in the model's frame; that of a link moves with the arm."""
+        if isinstance(frame, np.ndarray):
+            return frame
         frame = frame.lstrip("/")
-        if frame in self.model.link_index:
-            return self.servo.pose(q, frame)
-        return self._frames.get(frame, np.eye(4))
+        return self.servo.pose(q, frame) if frame in self.model.link_index else np.eye(4)
 
     # -- beside the steps ----------------------------------------------------------------------------------------
 

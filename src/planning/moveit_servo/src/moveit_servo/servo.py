@@ -4,18 +4,19 @@ those wanted. Time and state are arguments.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from arm_kinematics import Chain, ChainError
-from moveit_servo.directions import Thresholds, velocity_for
+from moveit_servo.directions import Arm, Thresholds, jacobian_of, velocity_for
 from moveit_servo.limits import JointLimits, Motion, speed_towards, stoppable
 from moveit_servo.pose_tracking import PoseTracker
 from moveit_servo.quadratic import nearest_within
 from moveit_servo.settings import STOP_DISTANCE, SettingsError
+from moveit_servo.straight import StraightWay
 
 if TYPE_CHECKING:
     from motion_planning.model import PlanningModel
@@ -81,6 +82,18 @@ class Command:
         return self.pose is not None or any(part is not None and part.any() for part in (self.twist, self.joints))
 
 
+class _Wanted(NamedTuple):
+    """What is wanted and possible: velocity (k,); together: as for Motion.follow; slope (m, k) @ velocity >= least (m,)
+    keeps what is near from coming too near."""
+
+    velocity: np.ndarray
+    status: Status = Status.NO_WARNING
+    reason: str = ""
+    together: bool = True
+    slope: np.ndarray = np.empty((0, 1))
+    least: np.ndarray = np.empty(0)
+
+
 class Servo:
     """The arm of one group of a model. ``settings`` and ``surroundings`` (None: nothing is checked) may be replaced
     between steps. joints: names of the k joints, in the order of all arrays; tip: link that is steered."""
@@ -98,7 +111,7 @@ class Servo:
         self.base = np.eye(4)
         self.surroundings: Surroundings | None = None
         self._motion: Motion | None = None
-        self._tracker, self._target = PoseTracker(), None
+        self._tracker, self._target, self._way = PoseTracker(), None, StraightWay()
         self.settings = settings
 
     @property
@@ -129,6 +142,7 @@ class Servo:
     def reset(self) -> None:
         """Forget the motion: the next step begins at the measured posture, at rest."""
         self._motion, self._target = None, None
+        self._way.reset()
 
     def pose(self, q: np.ndarray, link: str = "") -> np.ndarray:
         """Return the pose (4, 4) of ``link``, empty: the tip, in the model's frame at ``q`` (n,)."""
@@ -151,17 +165,22 @@ class Servo:
         reached = False
         if command.pose is not None:
             command, reached = self._towards(whole, command, seconds)
+            self._way.reset()
         else:
             self._target = None
+            command = self._along(whole, command, seconds)
         if not command and self._at_rest():
             motion.rest_at(motion.position)
             return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), Status.NO_WARNING,
                         "", True, reached)
-        wanted, status, reason, together = np.zeros(len(measured)), Status.NO_WARNING, "", True
+        wanted = _Wanted(np.zeros(len(measured)))
         if command:
-            wanted, status, reason, together = self._wanted(whole, velocity, measured, command)
+            wanted = self._wanted(whole, velocity, measured, command)
+        status, reason = wanted.status, wanted.reason
+        if status is not Status.NO_WARNING:
+            self._way.reset()
         try:
-            motion.follow(wanted, seconds, together)
+            motion.follow(wanted.velocity, seconds, wanted.together, wanted.slope, wanted.least)
         except ArithmeticError as error:
             motion.rest_at(motion.position)
             status, reason = Status.INVALID, str(error)
@@ -187,23 +206,32 @@ class Servo:
         twist = np.concatenate([axes.T @ twist[:3], axes.T @ twist[3:]])
         return Command(twist=twist, drift=command.drift, axes=axes), False
 
+    def _along(self, whole: np.ndarray, command: Command, seconds: float) -> Command:
+        """The command with a twist that keeps the hand on its way."""
+        if command.twist is None or not command.twist.any():
+            self._way.reset()
+            return command
+        axes = command.axes
+        twist = np.concatenate([axes @ command.twist[:3], axes @ command.twist[3:]])
+        back = self._way.correction(self.pose(whole), twist, seconds)
+        back = np.concatenate([axes.T @ back[:3], axes.T @ back[3:]])
+        return replace(command, twist=command.twist + back)
+
     # -- the motion that is wanted and possible ------------------------------------------------------------------
 
-    def _wanted(self, whole, velocity, measured, command) -> tuple[np.ndarray, Status, str, bool]:
+    def _wanted(self, whole, velocity, measured, command) -> _Wanted:
         q = self._motion.position
         lost, condition, behind = 0.0, 1.0, float(np.abs(q - measured).max())
         if command.twist is not None and command.twist.any():
             keep = np.flatnonzero(~command.drift)
             turn = command.axes.T @ self.pose(whole, self._chain.base)[:3, :3]
-
-            def jacobian_at(posture):
-                jacobian = self._chain.jacobian(posture)
-                return np.vstack([turn @ jacobian[:3], turn @ jacobian[3:]])[keep]
-
-            jacobian = jacobian_at(q)
+            limits, settings = self.limits, self.settings
+            arm = Arm(*self._chain.arrays, turn, keep, limits.lower, limits.upper, limits.velocity)
+            jacobian = jacobian_of(arm, q)
             wanted, metric, lost, condition = velocity_for(
-                command.twist[keep], jacobian, jacobian_at, q, self.limits,
-                Thresholds(self.settings.lower_singularity_threshold, self.settings.hard_stop_singularity_threshold))
+                command.twist[keep], jacobian, arm, q,
+                Thresholds(float(settings.lower_singularity_threshold),
+                           float(settings.hard_stop_singularity_threshold)))
             metric = metric + 1e-6 * np.eye(len(q))
         else:
             wanted, metric, jacobian = np.array(command.joints, dtype=float), np.eye(len(q)), np.eye(len(q))
@@ -219,7 +247,7 @@ class Servo:
         if behind > 0.8 * _LEAD_RAD and status is Status.JOINT_BOUND:
             reason = ("the arm does not follow: joint %s is %.2f rad behind its set-point; is the robot enabled, and "
                       "does its controller run?" % (self.joints[int(np.abs(q - measured).argmax())], behind))
-        return found, status, reason, not held
+        return _Wanted(found, status, reason, not held, slope, least)
 
     def _box(self, q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest velocities (k,): joint limits with their margin, and the lead of set-points."""

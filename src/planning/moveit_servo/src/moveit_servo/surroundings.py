@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from motion_planning.spheres import SphereModel
 
 # Number of gaps that are looked at in one step.
-_MAX_GAPS = 48
+_MAX_GAPS = 64
 
 
 class Near(NamedTuple):

@@ -23,4 +23,5 @@ def warm_up() -> None:
     servo = Servo(model, ServoSettings(move_group_name="arm", command_out_topic="command"))
     scene = Scene(model).with_object(WorldObject("box", np.eye(4), ((Box((0.1, 0.9, 0.1)), np.eye(4)),)))
     servo.surroundings = Surroundings(SphereModel.of(model, None), servo.group, scene)
-    servo.step(np.zeros(1), np.zeros(1), Command(joints=np.array([0.5])), 0.01)
+    for command in (Command(joints=np.array([0.5])), Command(twist=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5]))):
+        servo.step(np.zeros(1), np.zeros(1), command, 0.01)

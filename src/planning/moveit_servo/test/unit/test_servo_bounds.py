@@ -10,6 +10,7 @@ from motion_planning.scene import Scene, WorldObject
 from motion_planning.shapes import Octree
 from motion_planning.spheres import SphereModel, kernel
 from moveit_servo import gaps
+from moveit_servo import surroundings as module
 from moveit_servo.quadratic import nearest_within
 from moveit_servo.surroundings import Surroundings
 from urdf_model import Box, Cylinder, Plane, Sphere
@@ -98,6 +99,19 @@ def test_slopes_are_the_changes_of_the_gaps(planar):
                 compared += 1
                 assert after.distance[k] - before.distance[k] == pytest.approx(before.slope[k] @ step, abs=2e-6)
     assert compared > 5
+
+
+def test_of_many_gaps_the_smallest_are_kept(planar, monkeypatch):
+    rng, compared = np.random.default_rng(6), 0
+    everything = around(planar, OBJECTS)
+    monkeypatch.setattr(module, "_MAX_GAPS", 2)
+    few = around(planar, OBJECTS)
+    for q in rng.uniform(-2.5, 2.5, (40, 3)):
+        all_of_them = everything.near(q, np.zeros(3), 0.15).distance
+        kept = few.near(q, np.zeros(3), 0.15).distance
+        assert kept == pytest.approx(np.sort(all_of_them)[:2])
+        compared += len(all_of_them) > 2
+    assert compared > 10
 
 
 def test_a_point_inside_an_object_is_pushed_out_of_it():
