@@ -144,13 +144,17 @@ class Document:
         return tuple(value or NO_SIZE_M for value in values)
 
     def numbers(self, element, count, may_be_infinite=False):
-        """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something."""
+        """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something. Further
+        ones are left out, as by Gazebo, with a note."""
         text = (element.text or "").strip()
         try:
             values = tuple(float(word) for word in text.split())
         except ValueError:
             values = ()
         known = all(math.isfinite(value) or may_be_infinite and math.isinf(value) for value in values)
+        if len(values) > count and known:
+            self.mend(element, "<%s> of %s, of which the first %d are used" % (element.tag, text, count))
+            values = values[:count]
         if len(values) != count or not known:
             raise self.error(
                 element, "<%s> is '%s', expected %d number%s" % (element.tag, text, count, "s" * (count > 1))

@@ -147,7 +147,7 @@ WITHOUT_EFFECT = (
     ("geometry/heightmap", {"texture": None, "blend": None}, "heightmaps have one colour"),
     ("geometry", {"image": None, "polyline": None}, "this shape is left out"),
     ("surface/bounce", {"threshold": "100000"}, "bodies bounce at any speed"),
-    ("surface/friction/ode", {"mu2": "@mu=1|+fdir1"}, _ONE_MU),
+    ("surface/friction/ode", {"mu2": "@mu=1|+fdir1|>mu=1"}, _ONE_MU),
     ("surface/friction/ode", {"slip1": "0", "slip2": "0"}, "contacts do not slip"),
     ("surface/friction/torsional", {"coefficient": "1", "use_patch_radius": "1", "patch_radius": "0",
                                     "surface_radius": "0"}, "points of contact resist no turning"),

@@ -22,7 +22,7 @@ _INSIDE = {
 }
 # Numbers that are the text of their element today.
 _TEXTS = {"gravity": "xyz", "ambient": "rgba", "diffuse": "rgba", "specular": "rgba", "emissive": "rgba",
-          "background": "rgba"}
+          "background": "rgba", "direction": "xyz"}
 _RENAMED = {"filename": "uri"}
 
 

@@ -548,3 +548,11 @@ def test_a_shape_without_a_size_is_tiny_and_a_negative_one_is_refused():
     assert "<size> of 0 1 0, of which 0.0001 is used for 0 (m.sdf line" in found.warning
     with pytest.raises(SdfError, match="-1"):
         parse_sdf_model(sdf(box % "1 1 -1"), "m.sdf")
+
+
+def test_numbers_too_many_are_left_out_with_a_note():
+    plane = ('<link name="l"><visual name="v"><geometry><plane><normal>0 0 1</normal><size>2 3 4</size></plane>'
+             "</geometry></visual></link>")
+    found = parse_sdf_model(sdf(plane), "m.sdf")
+    assert found.robot.links["l"].visuals[0].geometry == Plane((2.0, 3.0))
+    assert "<size> of 2 3 4, of which the first 2 are used (m.sdf line" in found.warning

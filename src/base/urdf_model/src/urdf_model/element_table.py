@@ -14,7 +14,8 @@ class Row(NamedTuple):
 
     ``harmless``: the texts, with | between them, with which it has none in Gazebo either; None where its presence
     counts. ``@mu=1`` is the text of the element <mu> beside it, or 1; ``?mu=mu2`` is any text, where the elements <mu>
-    and <mu2> are the same; ``+fdir1`` any, where <fdir1> has a number that is not 0.
+    and <mu2> are the same; ``+fdir1`` any, where <fdir1> has a number that is not 0; ``>mu=1``
+    one of 1 or more, where <mu> is so, too.
     """
 
     reason: str = ""
@@ -113,12 +114,23 @@ def placed(table: Mapping[str, Mapping[str, list[Any]]]) -> str:
 
 def _is(text, harmless, parent):
     """Whether ``text``, of an element in ``parent``, is the text that ``harmless`` means."""
+    if harmless[:1] not in "@?+>" or not harmless:
+        return _same(text, harmless)
     name, _, other = harmless[1:].partition("=")
+    if harmless.startswith(">"):
+        return min(_number(text), _number(parent.findtext(name))) >= float(other)
     if harmless.startswith("+"):
         return any(word.strip("-+0.") for word in (parent.findtext(name) or "").split())
     if harmless.startswith("?"):
         return _same(parent.findtext(name) or "1", parent.findtext(other) or "1")
-    return _same(text, (parent.findtext(name) or other) if harmless.startswith("@") else harmless)
+    return _same(text, parent.findtext(name) or other)
+
+
+def _number(text):
+    try:
+        return float(text or "")
+    except ValueError:
+        return 0.0
 
 
 def _same(text, other):

@@ -25,7 +25,7 @@ KNOWN = {
              "preserveFixedJoint disableFixedJointLumping",
 }
 WITHOUT_EFFECT = (
-    ("link", {"mu2": "@mu1=1|+fdir1"}, _ONE_MU),
+    ("link", {"mu2": "@mu1=1|+fdir1|>mu1=1"}, _ONE_MU),
     ("link", {"minDepth": "0"}, "overlaps of any depth are corrected"),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
