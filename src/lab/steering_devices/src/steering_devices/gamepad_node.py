@@ -15,7 +15,7 @@ from steering_devices.hands import Hands
 from steering_devices.steering import Gamepad, LayoutError, Steering
 
 _RATE_HZ = 50.0
-_DESCRIPTION = """Steer by a gamepad. Subscribes: joy. Publishes: twists to the servos, ~mark.
+_DESCRIPTION = """Steer by a gamepad. Subscribes: joy. Publishes: twists to the servos, /steering/mark.
 Parameters: ~layout (config/gamepad_*.yaml), ~servos, ~grippers, ~linear_speed [m/s], ~angular_speed [rad/s],
 ~joy_timeout [s]: without a message for this long all counts as released.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where steering goes: twists to servos, commands to grippers, marks to whoever records. Used by the devices' nodes."""
+"""Where steering goes: twists and joint velocities to servos, commands to grippers, marks to whoever records."""
 from __future__ import annotations
 
 import threading
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
+from control_msgs.msg import JointJog
 from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Int8, String
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 # Of a servo's parameter command_in_type: a twist's 1 means its own full speed.
 UNITLESS = "unitless"
+#: Where all devices, and the page, publish success, failure and again (std_msgs/String), for recorders.
+MARK_TOPIC = "/steering/mark"
 # Twists of zero that end a motion.
 _MAX_STOPS = 5
 
@@ -27,16 +30,17 @@ class Hand:
     def __init__(self, name: str, gripper: str = "") -> None:
         self.name, self.reason, self.status = name, "", 0
         # A device may be started before the servo whose parameters these are.
-        self._linear = rospy.get_param("~linear_speed", 0.2)
-        self._angular = rospy.get_param("~angular_speed", 0.6)
+        #: What 1 means, of a twist's two halves [m/s, rad/s].
+        self.speeds = float(rospy.get_param("~linear_speed", 0.2)), float(rospy.get_param("~angular_speed", 0.6))
         self._stops, self._gripper_name, self._gripper, self._gripping = _MAX_STOPS, gripper, None, threading.Lock()
         self._twists = rospy.Publisher(name + "/delta_twist_cmds", TwistStamped, queue_size=1, tcp_nodelay=True)
+        self._jogs = rospy.Publisher(name + "/delta_joint_cmds", JointJog, queue_size=1, tcp_nodelay=True)
         self._kept = [rospy.Subscriber(name + "/status", Int8, self._on_status, queue_size=1),
                       rospy.Subscriber(name + "/status_reason", String, self._on_reason, queue_size=1)]
 
     def close(self) -> None:
         """Steer no longer; the hand must rest."""
-        for end in (*self._kept, self._twists):
+        for end in (*self._kept, self._twists, self._jogs):
             end.unregister()
 
     def _on_status(self, message: Int8) -> None:
@@ -58,8 +62,7 @@ class Hand:
             return
         else:
             self._stops += 1
-        speeds = (1.0, 1.0) if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS else (
-            self._linear, self._angular)
+        speeds = (1.0, 1.0) if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS else self.speeds
         message = TwistStamped()
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = rospy.get_param_cached(self.name + "/ee_frame_name", "") if in_tool else ""
@@ -67,6 +70,15 @@ class Hand:
         (message.twist.linear.x, message.twist.linear.y, message.twist.linear.z, message.twist.angular.x,
          message.twist.angular.y, message.twist.angular.z) = values
         self._twists.publish(message)
+
+    def jog(self, velocities: dict[str, float]) -> None:
+        """Send {joint: velocity [rad/s]}; all zero: the joints come to rest."""
+        scale = 1.0
+        if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS:
+            scale = rospy.get_param_cached(self.name + "/scale/joint", 1.0)
+        message = JointJog(joint_names=list(velocities), velocities=[value / scale for value in velocities.values()])
+        message.header.stamp = rospy.Time.now()
+        self._jogs.publish(message)
 
     def grip(self, how: str) -> None:
         """"open" or "close" Baxter's gripper of this side, if the node has one."""
@@ -95,7 +107,7 @@ class Hands:
         grippers = grippers.split() if isinstance(grippers, str) else list(grippers)
         grippers += [""] * (len(names) - len(grippers))
         self.hands = [Hand(rospy.resolve_name(name), gripper) for name, gripper in zip(names, grippers, strict=False)]
-        self._marks = rospy.Publisher("~mark", String, queue_size=10)
+        self._marks = rospy.Publisher(MARK_TOPIC, String, queue_size=10)
 
     def __len__(self) -> int:
         return len(self.hands)
@@ -107,4 +119,8 @@ class Hands:
         if steering.gripper:
             self.hands[steering.hand].grip(steering.gripper)
         if steering.mark:
-            self._marks.publish(String(steering.mark))
+            self.mark(steering.mark)
+
+    def mark(self, what: str) -> None:
+        """Publish "success", "failure" or "again"."""
+        self._marks.publish(String(what))

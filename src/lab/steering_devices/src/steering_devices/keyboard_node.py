@@ -14,7 +14,7 @@ from steering_devices.hands import Hands
 from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
 
 _PERIOD_S, _DRAWN_EVERY_S = 0.02, 0.1
-_DESCRIPTION = """Steer by the keys of this terminal. Publishes: twists to the servos, ~mark.
+_DESCRIPTION = """Steer by the keys of this terminal. Publishes: twists to the servos, /steering/mark.
 Parameters: ~servos, ~grippers, ~linear_speed [m/s], ~angular_speed [rad/s].
 """
 
