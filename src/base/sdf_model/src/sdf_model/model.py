@@ -277,6 +277,8 @@ def _moved(parts, prefix, origin):
     for said in parts.gazebo:
         if said.get("reference"):
             said.set("reference", prefix + said.get("reference"))
+        else:
+            said.set("scope", prefix + said.get("scope", ""))
     gearboxes = [gearbox.moved(prefix, origin[:3, :3]) for gearbox in parts.gearboxes]
     return Parts(links, parts.joints, parts.gazebo, gearboxes, parts.static, parts.static_is_said)
 

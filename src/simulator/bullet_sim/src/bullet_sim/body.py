@@ -8,8 +8,7 @@ import numpy as np
 from urdf_model import Inertial, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
-from .builder import inertial_frame, most_friction, set_collision_filter
-from .directions import directed
+from .builder import directed_bodies, inertial_frame, set_collision_filter
 from .errors import BulletSimError, within
 from .parts import link_indices
 from .pose import Pose
@@ -60,10 +59,8 @@ class Body:
         #: {body's name: parts of its speed and turn rate that each step takes}
         self.decaying = {link.name: link.decay for link in merged.links.values()
                          if any(link.decay) and not (self.static and link.name == merged.root)}
-        by_child = {joint.child: joint for joint in merged.joints.values()}
         #: The bodies whose friction depends on the direction.
-        self.directed = frozenset(link.name for link in merged.links.values()
-                                  if directed(link.surface, most_friction(by_child.get(link.name))) is not None)
+        self.directed = directed_bodies(merged)
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
             if not link.gravity:
@@ -212,10 +209,8 @@ class Body:
     def wake(self):
         """Wake the model up if Bullet has put it to sleep."""
         for index in self.free:
-            pybullet.changeDynamics(
-                *self.parts.places[index], activationState=pybullet.ACTIVATION_STATE_WAKE_UP,
-                physicsClientId=self._client
-            )
+            pybullet.changeDynamics(*self.parts.places[index], physicsClientId=self._client,
+                                    activationState=pybullet.ACTIVATION_STATE_WAKE_UP)
         if self.free:
             self._world.note_touched(self)
 
@@ -282,11 +277,8 @@ class Body:
         link = self._body(body)
         offset = self.merged.frames[body].offset
         rotation = offset[:3, :3]
-        return Inertial(
-            link.inertial.mass,
-            rotation.T @ (link.inertial.centre - offset[:3, 3]),
-            rotation.T @ link.inertial.inertia @ rotation,
-        )
+        return Inertial(link.inertial.mass, rotation.T @ (link.inertial.centre - offset[:3, 3]),
+                        rotation.T @ link.inertial.inertia @ rotation)
 
     def set_inertial(self, body, mass, inertia, centre=None):
         """Set mass [kg] and inertia (3, 3) about the centre of mass [kg m^2, axes of the link's frame] of a body, and
@@ -456,10 +448,8 @@ class Body:
         """Return the MergedLink ``body``; raises BulletSimError, which names the body for a link that was merged."""
         if body not in self.merged.links:
             frame = self._frame(body)
-            raise BulletSimError(
-                "link '%s' of '%s' is fixed to link '%s' and has its mass there; ask for that one"
-                % (body, self.name, frame.link)
-            )
+            raise BulletSimError("link '%s' of '%s' is fixed to link '%s' and has its mass there; ask for that one"
+                                 % (body, self.name, frame.link))
         return self.merged.links[body]
 
     def _find_canonical(self):

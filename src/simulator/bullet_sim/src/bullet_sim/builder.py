@@ -218,6 +218,13 @@ def most_friction(joint):
     return _WHEEL_FRICTION if joint is not None and is_wheel(joint) else 1.0
 
 
+def directed_bodies(merged):
+    """The bodies of a urdf_model.MergedRobot whose friction depends on the direction."""
+    by_child = {joint.child: joint for joint in merged.joints.values()}
+    return frozenset(link.name for link in merged.links.values()
+                     if directed(link.surface, most_friction(by_child.get(link.name))) is not None)
+
+
 def _contact(surface, most, axes):
     """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one; ``axes`` (3, 3) of the
     inertial frame in the body's."""

@@ -6,6 +6,8 @@ ground, then flies 100 m high. Gazebo (ODE) corrects an overlap by the position 
 """
 import numpy as np
 
+from urdf_model.model import ALL_BITS
+
 from .quiet_pybullet import pybullet
 
 # Shallower overlaps stay: bodies that rest on each other have them [m].
@@ -14,16 +16,17 @@ _ALLOWED_M = 1e-3
 _ROUNDS = 10
 
 
-def come_out(client, body, others):
-    """Move the free multibody that PyBullet numbers ``body`` out of the Models ``others``; its velocity is kept.
+def come_out(client, model, index, others):
+    """Move a free root of a Model, by its ``index``, out of the Models ``others``; its velocity is kept.
 
     It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's.
     """
+    body = model.parts.places[index].body
     start, turn = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
     twist = pybullet.getBaseVelocity(body, physicsClientId=client)
     place = np.array(start)
     for _ in range(_ROUNDS):
-        way = _deepest(client, body, others)
+        way = _deepest(client, model, body, others)
         if way is None:
             break
         place = place + way
@@ -37,13 +40,19 @@ def _put(client, body, place, turn, twist):
     pybullet.resetBaseVelocity(body, *twist, physicsClientId=client)
 
 
-def _deepest(client, body, others):
-    """Return the way (3,) [m, world] out of what ``body`` is deepest in, or None."""
+def _deepest(client, model, body, others):
+    """Return the way (3,) [m, world] out of what the multibody ``body`` of ``model`` is deepest in, or None."""
     depth, way = _ALLOWED_M, None
-    for obstacle in (obstacle for other in others for obstacle in other.parts.bodies):
+    for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
         for point in pybullet.getClosestPoints(body, obstacle, 0.0, physicsClientId=client) or ():
-            if -point[8] > depth:
+            if -point[8] > depth and _bits(model, body, point[3]) & _bits(owner, obstacle, point[4]):
                 # The normal points to the first body.
                 depth = -point[8]
                 way = depth * np.array(point[7])
     return way
+
+
+def _bits(model, body, index):
+    """The ``Surface.bitmask`` of the link that PyBullet numbers ``index`` in the multibody ``body`` of ``model``."""
+    surface = model.merged.links[model.link_name(body, index)].surface
+    return ALL_BITS if surface is None or surface.bitmask is None else surface.bitmask

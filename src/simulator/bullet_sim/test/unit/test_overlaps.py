@@ -98,3 +98,16 @@ def test_what_was_pressed_into_the_board_leaves_it_no_faster_than_max_vel(speed,
     if speed:
         assert piece.base_pose().position[2] > 0.0181
     world.close()
+
+
+def test_what_passes_through_is_not_moved_out(world):
+    """As the crossed beams of Gazebo's collide_bitmask.world, of which one was put on the other."""
+    mask = '<gazebo reference="it"><collision><surface><contact><collide_bitmask>%d</collide_bitmask></contact>' \
+           "</surface></collision></gazebo>"
+    world.set_gravity((0, 0, 0))
+    for x, bits, deep in ((0.0, 2, 0.15), (5.0, 3, 0.0)):
+        one, two = (world.spawn(parse_urdf(BOX % (mask % each)), "%d at %g" % (number, x), Pose((x, 0.0, z)))
+                    for number, (each, z) in enumerate(((1, 0.1), (bits, 0.15))))
+        world.step()
+        overlap = 0.2 - abs(two.base_pose().position[2] - one.base_pose().position[2])
+        assert overlap == pytest.approx(deep, abs=2e-3)

@@ -99,7 +99,7 @@ class Elevator(ModelPlugin):
 
 class InitialVelocity(ModelPlugin):
     """``libInitialVelocityPlugin.so``: the model starts, and starts again after a reset, with the velocities ``linear``
-    [m/s] and ``angular`` [rad/s], in world axes."""
+    [m/s] and ``angular`` [rad/s], in world axes; of a model in a model, its own links."""
 
     required = False
 
@@ -122,8 +122,13 @@ class InitialVelocity(ModelPlugin):
         return values
 
     def _start(self):
-        if self.context.model.free:
-            self.context.model.set_base_twist(*self._twist)
+        model, scope = self.context.model, self.context.element.getparent().get("scope", "")
+        if not scope:
+            model.set_base_twist(*self._twist)
+            return
+        for root in model.merged.roots[1 if model.static else 0:]:
+            if root.startswith(scope):
+                model.set_root_twist(root, *self._twist)
 
     def reset(self):
         self._start()

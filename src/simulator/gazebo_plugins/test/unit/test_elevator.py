@@ -3,8 +3,12 @@
 import pytest
 from std_msgs.msg import String
 
+from bullet_sim import World
 from gazebo_plugins.elevator import Elevator, InitialVelocity
-from gazebo_ros.model_plugin import PluginError
+from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
+from gazebo_ros.urdf_extras import plugins
+from loop_ros.testing import FakeLog, FakeRos
+from sdf_model import parse_sdf_model
 
 INERTIA = '<inertial><mass value="%g"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 LIFT = """<robot name="lift"><link name="world"/><link name="cabin">%s</link><link name="leaf">%s</link>
@@ -58,3 +62,16 @@ def test_a_model_starts_with_its_velocity_and_so_again_after_a_reset(make):
         lab.plugin.reset()
     with pytest.raises(PluginError, match="expected three numbers"):
         make(BALL, InitialVelocity, {"linear": "1 2"})
+
+
+def test_in_a_model_of_models_each_has_its_own_velocity():
+    world = World(time_step_s=0.001, gravity=(0, 0, 0))
+    ball = """<model name="%s"><pose>%g 0 0 0 0 0</pose><link name="it"/><plugin name="p"
+        filename="libInitialVelocityPlugin.so"><linear>0 %g 0</linear></plugin></model>"""
+    robot = parse_sdf_model('<sdf version="1.6"><model name="m">%s%s</model></sdf>' % (
+        ball % ("one", 0, 1), ball % ("two", 3, 2)), "m.sdf").robot
+    model = world.spawn(robot, "m")
+    for element in plugins(robot):
+        InitialVelocity(PluginContext(world, model, PluginSource(robot, element, "", ""), FakeLog(), FakeRos(), {}))
+    assert [model.link_twist(link)[0][1] for link in ("one::it", "two::it")] == pytest.approx([1.0, 2.0])
+    world.close()
