@@ -2,8 +2,9 @@
 """Obstacles that enter the way of joints that move: how soon another way is there, how often it needs no stop.
 
 A box appears around the arm's tip as it will be some time later. CPU times of one thread, so that other work on the
-machine counts little: from the changed scene to the trajectory that takes the other's place. A way exists if the same planner finds one from rest within seconds. Every
-motion that takes over is walked by exact geometry, from the moment at which it begins.
+machine counts little: from the changed scene to the trajectory that takes the other's place. A way exists if the same
+planner finds one from rest within seconds. Every motion that takes over is walked by exact geometry, from the moment at
+which it begins.
 """
 import time
 from dataclasses import replace

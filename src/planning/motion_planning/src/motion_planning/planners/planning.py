@@ -43,6 +43,9 @@ _EXACT_REACH = 0.25
 # Exact geometry checks one in this many states of a path even if spheres prove them free; number of states per call.
 _SEEN, _AT_ONCE = 8, 64
 
+# Polling period while another thread prepares the robot [s].
+_LOOK_UP_S = 0.05
+
 _sphere_models, _checkers, _made_links = (weakref.WeakKeyDictionary() for _ in range(3))
 _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
@@ -86,13 +89,22 @@ def checker_of(exact, scene, group, patience=None):
     return known[group.name]
 
 
-def _make_links(exact, scene, group):
-    """Make what of a robot does not depend on the scene. Most callers have done so before, by ``prepare``."""
+def _make_links(exact, scene, group, stop):
+    """Make what of a robot does not depend on the scene. Most callers have done so before, by ``prepare``; where
+    another thread is at it, this one waits. Raises NoPath if it is stopped then."""
     with _sphere_models_lock:
-        made = _made_links.setdefault(exact, set())
-    if group.name not in made:
-        make_links(sphere_model_of(exact), group, scene.allowed)
-        made.add(group.name)
+        made, making = _made_links.setdefault(exact, (set(), threading.Lock()))
+    if group.name in made:
+        return
+    while not making.acquire(timeout=_LOOK_UP_S):
+        if stop():
+            raise NoPath("stopped while the robot was prepared for planning", stopped=True)
+    try:
+        if group.name not in made:
+            make_links(sphere_model_of(exact), group, scene.allowed)
+            made.add(group.name)
+    finally:
+        making.release()
 
 
 def first_touching(exact, scene, group, states):
@@ -140,7 +152,7 @@ class _Planning:
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
         # The first plan of a robot may have to make its spheres: that must not use up its time.
-        _make_links(search.exact, scene, self.group)
+        _make_links(search.exact, scene, self.group, search.stop)
         self.begin = self.last = search.clock()
         self.times = {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)

@@ -122,13 +122,16 @@ def _greedy(wanted, centres, reach):
 def _shrunk(spheres, wanted, between):
     """Without the spheres whose points others contain as well, each as small as the points that only it contains
     allow."""
-    spheres, members, apart = spheres.copy(), [], []
-    for sphere in spheres:
-        distance = np.linalg.norm(wanted - sphere[:3], axis=1) + between + ROUNDING
-        # They were chosen in single precision.
-        inside = np.flatnonzero(distance <= sphere[3] + 0.1 * ROUNDING)
-        members.append(inside)
-        apart.append(distance[inside])
+    # They were chosen in single precision.
+    reach = spheres + [0.0, 0.0, 0.0, 0.1 * ROUNDING]
+    spheres, room = spheres.copy(), 8 * len(wanted)
+    while True:
+        starts, inside, far = np.empty(len(spheres) + 1, np.int64), np.empty(room, np.int64), np.empty(room)
+        count = covering.within(np.ascontiguousarray(wanted), reach, between + ROUNDING, starts, inside, far)
+        if count <= room:
+            break
+        room = count
+    members, apart = (np.split(values[:count], starts[1:-1]) for values in (inside, far))
     times = np.bincount(np.concatenate([*members, np.empty(0, dtype=int)]), minlength=len(wanted))
     kept = []
     for k, inside in enumerate(members):

@@ -102,6 +102,28 @@ def choose(points, count, balls, chosen):
 
 
 @compiled
+def within(points, spheres, beyond, starts, members, apart):
+    """Which of ``points`` (n, 3) lie in which of ``spheres`` (m, 4), by the distance from the centre and ``beyond``.
+
+    Fills starts (m + 1,) with where the points of each sphere begin in members and apart, and these with the indices
+    and distances of as many as there is room for. Returns their number.
+    """
+    count = 0
+    for k in range(len(spheres)):
+        starts[k] = count
+        x, y, z, radius = spheres[k, 0], spheres[k, 1], spheres[k, 2], spheres[k, 3]
+        for i in range(len(points)):
+            dx, dy, dz = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
+            far = np.sqrt(dx * dx + dy * dy + dz * dz) + beyond
+            if far <= radius:
+                if count < len(members):
+                    members[count], apart[count] = i, far
+                count += 1
+    starts[len(spheres)] = count
+    return count
+
+
+@compiled
 def nearest(points, count, places, found):
     """Write into ``found`` (m,) float32 the distance of each of ``places`` (m, 3) float32 from the nearest of the first
     ``count`` points."""
