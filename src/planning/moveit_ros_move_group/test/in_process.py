@@ -10,6 +10,9 @@ from actionlib_msgs.msg import GoalStatus
 
 from moveit_ros_move_group import node
 
+# Longer than a slow machine needs to prepare a small robot [s].
+PREPARED_S = 90.0
+
 
 class Server:
     """An action server that runs a goal where it is called. preempted: what the goal's code is told."""
@@ -52,9 +55,10 @@ class Server:
 
 class Node:
     """The node of some parameters (a tree, the private ones in its "~"), with what it says kept: published [(topic,
-    message)], logged [line]. on_service(name) is called when a service is offered."""
+    message)], logged [line]. on_service(name) is called when a service is offered. prepared_s: as the node's own."""
 
-    def __init__(self, monkeypatch, parameters, on_service=lambda name: None):
+    def __init__(self, monkeypatch, parameters, on_service=lambda name: None,
+                 prepared_s=PREPARED_S):
         self.services, self.topics, self.servers = {}, {}, {}
         self.published, self.logged = [], []
         self._parameters, self._on_service = parameters, on_service
@@ -65,6 +69,7 @@ class Node:
         monkeypatch.setattr(rospy, "Subscriber", self._subscriber)
         monkeypatch.setattr(rospy, "Publisher", self._publisher)
         monkeypatch.setattr(actionlib, "SimpleActionServer", self._server)
+        monkeypatch.setattr(node, "_PREPARED_S", prepared_s)
         for level in ("logdebug", "loginfo", "logwarn", "logerr", "logfatal"):
             monkeypatch.setattr(rospy, level, lambda text, *values, **_: self.logged.append(text % values))
         monkeypatch.setattr(rospy, "logwarn_throttle", lambda _, text, *values: self.logged.append(text % values))

@@ -39,6 +39,9 @@ _DESCRIPTION_TIMEOUT_S = 60.0
 # Wall time after the start in which controllers may come up before they are missed [s].
 _CONTROLLERS_TIMEOUT_S = 10.0
 
+# Wall time in which a robot is prepared for planning before services are offered [s]. Many clients wait 5 s for them.
+_PREPARED_S = 2.0
+
 _DESCRIPTION = """Plan and execute motions behind MoveIt's interface.
 
 Actions: move_group, execute_trajectory, pickup, place, sequence_move_group.
@@ -100,7 +103,7 @@ def _executor(monitor):
 
 def _capabilities(context, wanted, description, may_execute):
     planner = Planner(context, IndustrialPlanner(context, description))
-    planner.warm_up()
+    planner.prepare(_PREPARED_S, compiler_pages.release)
     timeouts = {group: entry["kinematics_solver_timeout"]
                 for group, entry in (rospy.get_param(description + "_kinematics", {}) or {}).items()
                 if isinstance(entry, dict) and isinstance(entry.get("kinematics_solver_timeout"), (int, float))}
@@ -158,7 +161,6 @@ def main():
         if not rospy.is_shutdown():
             sys.exit("move_group: %s" % error)
         return
-    compiler_pages.release()
     # Scripts wait for this line.
     print("\nYou can start planning now!\n", flush=True)
     tell_of_silent_controllers(kept[0].executor)

@@ -2,6 +2,7 @@
 """MotionPlanRequests to plans."""
 import itertools
 import math
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -94,8 +95,28 @@ class Planner:
                                "pilz_industrial_motion_planner and name it as pipeline_id" % other)
         return self._industrial.plan_sequence(items, scene, pipes, self._tools(stop))
 
-    def warm_up(self):
-        """Load compiled code and make the robot's spheres, so that the first request does not wait for them."""
+    def prepare(self, patience_s, done=lambda: None):
+        """Load compiled code and make the robot's spheres, so that the first request does not wait for them. Returns
+        when that is done, or after ``patience_s`` [s], and goes on beside: plans wait for it, nothing else does.
+        ``done()`` is called in the end."""
+        def work():
+            begin = wall_clock()
+            try:
+                self._warm_up()
+            except Exception as error:  # a plan for the same group will say it as well
+                rospy.logerr("the robot could not be prepared for planning: %s: %s", type(error).__name__, error)
+            else:
+                rospy.loginfo("the robot was prepared for planning in %.1f s", wall_clock() - begin)
+            done()
+
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        thread.join(patience_s)
+        if thread.is_alive():
+            rospy.logwarn("this robot is planned for the first time: its links are covered by spheres, which may take "
+                          "half a minute. Plans wait for that; everything else answers already")
+
+    def _warm_up(self):
         context = self._context
         scene = Scene(context.model)
         for name, group in context.model.groups.items():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node as its parameters make it; no ROS around it."""
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -10,14 +11,16 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import ExecuteKnownTrajectoryRequest
 
+from disk_cache import compiler_pages
 from motion_planning.spheres import checker, sphere_model
 from moveit_ros_move_group import settings
 from moveit_ros_move_group.capabilities.motion import MoveAction
+from moveit_ros_move_group.planning import Planner
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bad_requests import outcome  # noqa: E402
 from good_requests import good_requests  # noqa: E402
-from in_process import Node, Server  # noqa: E402
+from in_process import PREPARED_S, Node, Server  # noqa: E402
 from small_arm import SIX, joint_state, parameters  # noqa: E402
 
 
@@ -63,6 +66,19 @@ def test_nothing_is_served_before_spheres_and_scene_are_ready(monkeypatch):
     code, text = outcome(node.ask("plan_kinematic_path", good_requests(SIX)["plan_kinematic_path"]))
     assert code == MoveItErrorCodes.SUCCESS, text
     assert "spheres" not in events[served:]
+
+
+def test_a_robot_that_takes_long_to_prepare_delays_nothing_but_plans(monkeypatch):
+    may_end, ended = threading.Event(), threading.Event()
+    monkeypatch.setattr(Planner, "_warm_up", lambda self: may_end.wait(PREPARED_S))
+    monkeypatch.setattr(compiler_pages, "release", ended.set)
+    node = Node(monkeypatch, parameters(), prepared_s=0.01)
+    node.topics["joint_states"](joint_state())
+    code, text = outcome(node.ask("compute_fk", good_requests(SIX)["compute_fk"]))
+    assert code == MoveItErrorCodes.SUCCESS, text
+    assert any("planned for the first time" in line for line in node.logged) and not ended.is_set()
+    may_end.set()
+    assert ended.wait(PREPARED_S)
 
 
 def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
