@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Hands that move as long as something is held: a button of the page, a key, a gamepad. Servos move the arms.
+// Hands that move as long as something is held: a button of the page, a key, a gamepad, a headset's controller. Servos
+// move the arms.
 import {element} from "./panel.js";
 import {text} from "./texts.js";
 
@@ -13,7 +14,9 @@ const MOTIONS = [
   ["up", 2, 1, "r"], ["down", 2, -1, "f"], ["roll_plus", 3, 1, "u"], ["roll_minus", 3, -1, "o"],
   ["pitch_plus", 4, 1, "k"], ["pitch_minus", 4, -1, "i"], ["yaw_plus", 5, 1, "j"], ["yaw_minus", 5, -1, "l"]];
 // The browser's standard gamepad: its buttons; nothing moves unless the right shoulder button is held.
-const PAD = {open: 0, close: 1, hand: 4, hold: 5, tool: 9, up: 12, down: 13, left: 14, right: 15};
+const PAD = {open: 0, close: 1, failure: 2, success: 3, hand: 4, hold: 5, again: 8, tool: 9, up: 12, down: 13, left: 14,
+  right: 15};
+const MARKS = ["success", "failure", "again"];
 const DEAD_ZONE = 0.12;
 const FINE = 0;
 
@@ -24,6 +27,8 @@ export class Steering {
   constructor(send, view) {
     Object.assign(this, {send, view, topics: null, sides: [], driving: false, chosen: "left", tool: false, padLocked: true});
     this.held = new Map();
+    // What a headset leads: side to its motion.
+    this.led = new Map();
     this.pressed = new Set();
     this.isMoving = false;
     this.states = Object.fromEntries(SIDES.map((side) => [side, {status: FINE, reason: ""}]));
@@ -65,6 +70,9 @@ export class Steering {
     byId("steer-hands").replaceChildren(...this.hands);
     this.buttons = MOTIONS.map((motion) => this.button(motion));
     byId("steer-motions").replaceChildren(...this.buttons);
+    this.marks = MARKS.map((mark) => element("button", {id: `steer-${mark}`, className: "plain small",
+      textContent: text(`steer_${mark}`), onclick: () => this.send({op: "mark", mark})}));
+    byId("steer-marks").replaceChildren(...this.marks);
     this.opened();
     this.refresh();
   }
@@ -123,8 +131,22 @@ export class Steering {
   // Nothing is held any more, whatever the hands still do; a gamepad's hold has to be pressed again.
   letGo() {
     this.held.clear();
+    this.led.clear();
     this.padLocked = true;
+    for (const grip of this.headset?.grips.values() ?? []) grip.ended = true;
     this.changed();
+  }
+
+  // Whether something that is held moves a hand.
+  get ready() {
+    return this.isOpen && this.driving;
+  }
+
+  // A headset leads these hands: {number, shift, turn} each. The timer sends it; letting go must not wait.
+  lead(led) {
+    const fewer = [...this.led.keys()].some((side) => !led.has(side));
+    this.led = led;
+    if (fewer || (led.size > 0 && !this.isMoving)) this.changed();
   }
 
   twist() {
@@ -141,13 +163,15 @@ export class Steering {
     if (!pad || !this.isOpen || !this.driving) return none;
     const down = (name) => pad.buttons[PAD[name]]?.pressed ?? false;
     const now = new Set(Object.keys(PAD).filter(down));
-    const fresh = (name) => now.has(name) && !this.pressed.has(name);
+    const before = this.pressed;
+    const fresh = (name) => now.has(name) && !before.has(name);
     const [opens, closes, changes, turns] = ["open", "close", "hand", "tool"].map(fresh);
     this.pressed = now;
     if (!now.has("hold")) this.padLocked = false;
     for (const [is, action] of [[opens, "open"], [closes, "close"]]) {
       if (is) for (const side of CHOICES[this.chosen]) this.send({op: "grip", side, action});
     }
+    for (const mark of MARKS.filter(fresh)) this.send({op: "mark", mark});
     if (changes) this.choose(this.nextHand());
     if (turns) byId("steer-tool").click();
     if (!now.has("hold") || this.padLocked) return none;
@@ -158,9 +182,9 @@ export class Steering {
   // Send what is held, at once and again and again; once nothing when it was let go.
   changed() {
     const twist = this.twist();
-    const moves = this.driving && this.isOpen && twist.some(Boolean);
+    const moves = this.ready && (this.led.size > 0 || twist.some(Boolean));
     const hands = Object.fromEntries(CHOICES[this.chosen].map((side) => [side, twist]));
-    if (moves) this.send({op: "steer", tool: this.tool, hands});
+    if (moves) this.send({op: "steer", tool: this.tool, hands, led: Object.fromEntries(this.led)});
     else if (this.isMoving) this.send({op: "steer", hands: {}});
     this.isMoving = moves;
   }
@@ -202,7 +226,7 @@ export class Steering {
   }
 
   refresh() {
-    for (const button of this.buttons ?? []) button.disabled = !this.driving || !this.sides.length;
+    for (const button of [...this.buttons ?? [], ...this.marks ?? []]) button.disabled = !this.driving || !this.sides.length;
     (this.hands ?? []).forEach((button, number) => {
       const name = Object.keys(CHOICES)[number];
       button.disabled = !CHOICES[name].every((side) => this.sides.includes(side));
@@ -210,6 +234,7 @@ export class Steering {
     });
     byId("steer-speed-said").textContent = `${byId("steer-speed").value} %`;
     byId("steer-off").hidden = this.sides.length > 0;
+    this.headset?.refresh();
     this.say();
   }
 

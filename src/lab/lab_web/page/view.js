@@ -6,6 +6,8 @@ import {TransformControls} from "three/controls/TransformControls.js";
 
 const FIELD_OF_VIEW_DEG = 40;
 const TARGET = [0.25, 0, 1.0];
+// Where a headset begins: behind the robot, at the height of a head.
+const BEHIND = [-0.9, 0, 1.6];
 const PLACES = {front: [3.6, 1.2, 1.9], side: [0.25, -3.9, 1.3], top: [0.2, 0, 5.2]};
 // Pictures a second at most; and drawing gets this share of the time where no graphics card helps.
 const SHORTEST_MS = 33;
@@ -239,8 +241,33 @@ export class View {
     if (this.timer) this.plan();
   }
 
+  // A headset draws pictures of its own, from behind the robot's shoulder, and looks ahead as the robot does.
+  async enter(session) {
+    this.before = this.camera.clone();
+    this.rig = new THREE.Group();
+    this.rig.position.set(...BEHIND);
+    this.rig.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(
+      new THREE.Vector3(0, -1, 0), new THREE.Vector3(0, 0, 1), new THREE.Vector3(-1, 0, 0)));
+    this.rig.add(this.camera);
+    this.scene.add(this.rig);
+    this.renderer.xr.enabled = true;
+    this.renderer.xr.setReferenceSpaceType("local");
+    await this.renderer.xr.setSession(session);
+    this.renderer.setAnimationLoop(() => this.renderer.render(this.scene, this.camera));
+  }
+
+  leave() {
+    this.renderer.setAnimationLoop(null);
+    this.renderer.xr.enabled = false;
+    this.rig?.removeFromParent();
+    this.camera.removeFromParent();
+    if (this.before) this.camera.copy(this.before);
+    this.fit();
+  }
+
   drawNow() {
     this.planned = false;
+    if (this.renderer.xr.isPresenting) return;
     const began = performance.now();
     this.renderer.render(this.scene, this.camera);
     this.lastEnd = performance.now();

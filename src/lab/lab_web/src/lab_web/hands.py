@@ -50,6 +50,13 @@ class Hands:
                 return base_of(picture, chain, {name: measured[name] for name in chain.joint_names})
         return None
 
+    def pose(self, side, measured):
+        """The pose (4, 4) of a hand in its arm's base frame at ``measured`` {joint: [rad]}, or None."""
+        chain = self._chains.get(side)
+        if chain is None or not all(name in measured for name in chain.joint_names):
+            return None
+        return chain.fk([measured[name] for name in chain.joint_names])
+
     def ask(self, client, question):
         """An operation "reach" of a page: ``side``, ``number``, and ``position`` [m], ``orientation`` (x, y, z, w) of
         the hand in the robot's base frame; without them, the hand as it is. Does not wait.

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import rosgraph
@@ -26,12 +26,13 @@ from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
 from lab_web import jupyter, page_files
 from lab_web.buttons import Buttons
+from lab_web.certificate import CertificateError, certificate
 from lab_web.comparison import Comparison, findings_of
 from lab_web.errands import Errands
 from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
-from lab_web.libraries import LibrariesError, fetched
+from lab_web.libraries import LibrariesError, fetched, kept_in
 from lab_web.loops import attended
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
@@ -63,7 +64,7 @@ from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
 from web_bridge.errors import shown
 from web_bridge.loop_thread import LoopThread
-from web_bridge.serving import Serving
+from web_bridge.serving import Serving, tls_context
 from web_bridge.session import Bridge
 from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer
 from web_bridge.websocket import Clients, SocketOptions
@@ -209,13 +210,14 @@ def serve(options, page, libraries):
         serving = Serving(loop_thread, application, port, network)
     except OSError as error:
         raise _no_port(port, error) from None
+    secure = _serve_securely(loop_thread, application, port, network) if options.public else None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
         ("the robot's states", watch), *equipment.loops.items())]
     for thread in threads:
         thread.start()
     address = ""
     try:
-        address = _announce(serving.port, tokens, options.public)
+        address = _announce(serving.port, tokens, options.public, secure.port if secure else None)
         lasting(faults, "the robot's parts", partial(_watch, robot, equipment, pages, is_needed))(rospy.is_shutdown)
     finally:
         page_files.remove_address(rosgraph.get_master_uri(), address)
@@ -226,7 +228,9 @@ def serve(options, page, libraries):
             thread.join()
         equipment.guard.close()
         clients.shut_down()
-        serving.close()
+        for one in (serving, secure):
+            if one is not None:
+                one.close()
         video.cameras.shut_down()
         loop_thread.stop()
 
@@ -302,8 +306,9 @@ def _equip(pages, robot, faults):
     lab.add("play", lambda client, _operation: play(lab, client, recorder))
     servos = Servos()
     steering = Steering(lambda: servos.hands, lambda side: robot.explain(
-        side + "_s0", lambda why: pages.tell(lab.holder, "held", "the %s arm: %s" % (side, why))))
+        side + "_s0", lambda why: pages.tell(lab.holder, "held", "the %s arm: %s" % (side, why))), hands.pose)
     lab.add("steer", steer_operation(lab, steering, lambda: servos.hands))
+    lab.add("mark", servos.mark)
     comparison = Comparison(_findings, comparisons, partial(pages.share, "interface"), time.time)
     lab.add("compare", comparison.ask, needs_control=False)
     lab.add("nod", parts.nod, needs_power=True)
@@ -351,9 +356,24 @@ def forwarded_address(variables: Mapping[str, str], port: int) -> str:
     return "https://%s-%d.%s" % (name, port, domain) if name and domain else ""
 
 
-def _announce(port, tokens, public):
+def _host() -> str:
+    """This machine's name or address for others."""
+    return os.environ.get("ROS_IP") or socket.gethostname()
+
+
+def _serve_securely(loop_thread: LoopThread, application: Any, port: int, network: str) -> Serving | None:
+    """The same pages by https on another port, for headsets and telephones; None where there is no certificate."""
+    try:
+        tls = tls_context(*certificate(kept_in(), [_host(), "localhost"]))
+        return Serving(loop_thread, application, ports.free_port(range(port + 1, port + 100)), network, tls)
+    except (CertificateError, OSError) as error:
+        rospy.logwarn("no page by https, which headsets need: %s", error)
+        return None
+
+
+def _announce(port, tokens, public, secure_port=None):
     """Make the addresses known, and print them once the lab has started; returns the operator's."""
-    host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
+    host = _host() if public else "localhost"
     address = (forwarded_address(os.environ, port) or "http://%s:%d" % (host, port)) + "/"
     # A token of the user may hold signs that mean something else in an address.
     operators, viewers = ("%s?token=%s" % (address, quote(token, safe="")) for token in tokens)
@@ -362,7 +382,8 @@ def _announce(port, tokens, public):
     with contextlib.suppress(OSError):
         page_files.write_address(rosgraph.get_master_uri(), operators)
     # What else roslaunch starts still prints lines.
-    text = announcement(operators, viewers, port if public else None, _is_launched())
+    secure = "https://%s:%d/?token=%s" % (host, secure_port, quote(tokens[0], safe="")) if secure_port else ""
+    text = announcement(operators, viewers, port if public else None, _is_launched(), secure)
     threading.Thread(target=_print_when_started, args=(text,), daemon=True).start()
     return operators
 
@@ -372,12 +393,15 @@ def _is_launched() -> bool:
     return "__name" in rosgraph.names.load_mappings(sys.argv)
 
 
-def announcement(operators: str, viewers: str, public_port: int | None, is_launched: bool) -> str:
+def announcement(operators: str, viewers: str, public_port: int | None, is_launched: bool, secure: str = "") -> str:
     """The printed text of the addresses; the operator's is the last line."""
     text = "To watch, and to stop the robot:\n\n    %s\n\n" % viewers
     if public_port is not None:
         text += ("Port %d is open to every machine of the network: who has the operator's address moves the robot. The "
                  "connection is not encrypted.\n\n" % public_port)
+    if secure:
+        text += ("For a headset or a telephone that moves the hands, encrypted by a certificate of its own, which "
+                 "the browser asks about once:\n\n    %s\n\n" % secure)
     if not is_launched:
         text += "Ctrl-C here ends the page; the lab goes on.\n\n"
     return text + "Open in a browser:\n\n    %s" % operators

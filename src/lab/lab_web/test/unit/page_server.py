@@ -44,7 +44,7 @@ class Robot:
         self.limits = dict.fromkeys(JOINTS, Limits(-LIMIT_RAD, LIMIT_RAD, VELOCITY))
         self.poses = {"neutral": dict(self.positions)}
         self.enabled, self.stopped = False, False
-        self.switched = []
+        self.switched, self.gripped = [], []
         #: {joint: how far it gets [rad]}
         self.walls = {}
 
@@ -76,12 +76,16 @@ class Robot:
     def switch(self, *what):
         self.switched.append(what)
 
+    def grip(self, *what):
+        self.gripped.append(what)
+
 
 class Servo:
     """Keeps what steers it. ``status``, ``reason``: what it says of itself."""
 
     def __init__(self):
         self.is_there, self.status, self.reason, self.sent = True, 0, "", []
+        self.speeds = 0.2, 0.6
 
     def steer(self, twist, in_tool):
         self.sent.append((twist.tolist(), in_tool))
@@ -162,8 +166,10 @@ class Server:
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
         self.servos = {side: Servo() for side in SIDES}
-        steering = Steering(lambda: self.servos, lambda side: None)
+        steering = Steering(lambda: self.servos, lambda side: None, hands.pose)
         self.lab.add("steer", steer_operation(self.lab, steering, lambda: self.servos))
+        self.marks = []
+        self.lab.add("mark", lambda client, asked: self.marks.append(asked["mark"]))
         recorder = Recorder(lambda state: self.pages.share("recording", state))
         self.shown, self.planned, self.notebook_asks, self.watched, self.compared = [], [], [], {}, []
         self.lab.add("watch", self.watched.__setitem__, needs_control=False, for_viewers=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arms that pages steer: only while something is held, and by the rules of the lab. Servos of the test's own."""
+import numpy as np
 import pytest
 from test_lab import Hall, move
 
@@ -12,7 +13,7 @@ UP = [0, 0, 1, 0, 0, 0]
 
 class Servo:
     def __init__(self):
-        self.is_there, self.reason, self.sent = True, "", []
+        self.is_there, self.reason, self.sent, self.speeds = True, "", [], (0.2, 0.6)
 
     def steer(self, twist, in_tool):
         self.sent.append((twist.tolist(), in_tool))
@@ -29,7 +30,9 @@ class Steered(Hall):
     def __init__(self):
         super().__init__()
         self.servos, self.explained = {side: Servo() for side in ("left", "right")}, []
-        self.steering = Steering(lambda: self.servos, self.explained.append)
+        #: Of both hands.
+        self.pose = np.eye(4)
+        self.steering = Steering(lambda: self.servos, self.explained.append, lambda side, measured: self.pose)
         self.lab.add("steer", operation(self.lab, self.steering, lambda: self.servos))
         self.lab.serve(1, True, {"op": "take"})
 
@@ -127,3 +130,47 @@ def test_servos_that_are_no_longer_listened_to_are_no_error(hall):
     hall.pass_time(0.05, beats_of=1)
     hall.lab.gone(1)
     assert not hall.lab.is_moving
+
+
+def led(number=1, shift=(0, 0, 0), turn=(0, 0, 0, 1)):
+    return {"number": number, "shift": list(shift), "turn": list(turn)}
+
+
+def test_a_hand_that_is_led_goes_where_it_is_led_from_where_it_is(hall):
+    left = hall.servos["left"]
+
+    def lead(**what):
+        hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": {"left": led(**what)}})
+        hall.pass_time(TICK_S, beats_of=1)
+        return left.sent[-1][0]
+
+    assert lead() == pytest.approx([0.0] * 6, abs=1e-9)
+    assert lead(shift=(0.01, 0, 0)) == pytest.approx([0.3, 0, 0, 0, 0, 0])
+    assert lead(shift=(0.1, 0.1, 0)) == pytest.approx([0.5**0.5, 0.5**0.5, 0, 0, 0, 0]), "no faster than at full speed"
+    hall.pose[:3, 3] = (0.1, 0.1, 0)
+    assert lead(shift=(0.1, 0.1, 0)) == pytest.approx([0.0] * 6, abs=1e-9), "it has arrived"
+    turn = [0, 0, np.sin(0.025), np.cos(0.025)]
+    assert lead(shift=(0.1, 0.1, 0), turn=turn) == pytest.approx([0, 0, 0, 0, 0, 0.5])
+    # Tracking that leaps, and another grip, begin anew.
+    assert lead(shift=(0.5, 0.1, 0), turn=turn) == pytest.approx([0.0] * 6, abs=1e-9)
+    assert lead(number=2) == pytest.approx([0.0] * 6, abs=1e-9)
+    hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": {}})
+    assert not left.moves and not hall.servos["right"].sent
+
+
+def test_a_hand_that_is_led_rests_when_nothing_comes(hall):
+    hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": {"left": led()}})
+    hall.pass_time(TICK_S, beats_of=1)
+    hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": {"left": led(shift=(0.01, 0, 0))}})
+    hall.pass_time(FRESH_S - 2 * TICK_S, beats_of=1)
+    assert hall.servos["left"].moves
+    hall.pass_time(4 * TICK_S, beats_of=1)
+    assert not hall.servos["left"].moves
+
+
+@pytest.mark.parametrize("bad", [[], {"left": 1}, {"left": {}}, {"left": led(number="x")}, {"left": led(shift=(1, 2))},
+                                 {"left": led(turn=(0, 0, 0, 0))}, {"left": led(shift=(float("nan"), 0, 0))}])
+def test_what_leads_nowhere_is_refused(hall, bad):
+    before = len(hall.told)
+    hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": bad})
+    assert len(hall.told) > before and not hall.servos["left"].sent
