@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh labs up N | list | start | pause | stop | renew | down | logs`: the command line."""
+from __future__ import annotations
+
 import argparse
 import csv
 import functools
@@ -11,6 +13,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import rospkg
@@ -37,7 +40,7 @@ _DONE, _FAILED, _WRONG_WORDS, _INTERRUPTED = 0, 1, 2, 130
 _COLUMNS = "%-20s %-9s %5s %6s %8s %8s %8s  %s"
 
 
-def main(arguments=None):
+def main(arguments: list[str] | None = None) -> int:
     """Returns the exit code: 0, 1 for what failed, 2 for wrong words."""
     options = _parser().parse_args(arguments)
     store = Store(options.folder)
@@ -52,7 +55,7 @@ def main(arguments=None):
         return _INTERRUPTED
 
 
-def _parser():
+def _parser() -> Parser:
     defaults = Options()
     parser = Parser(prog="./baxter.sh labs", description="Labs for a class on this machine, each behind walls, with "
                     "one address for each student; docs/class.md.")
@@ -108,7 +111,7 @@ def _parser():
     return parser
 
 
-def _number(text, words, least=0.0):
+def _number(text: str, words: str, least: float = 0.0):
     try:
         value = float(text)
     except ValueError:
@@ -118,19 +121,19 @@ def _number(text, words, least=0.0):
     return value
 
 
-def _minutes(text):
+def _minutes(text: str):
     return 60.0 * _number(text, "minutes, 0 or more", -1e-9)
 
 
-def _gigabytes(text):
+def _gigabytes(text: str) -> int:
     return int(_number(text, "a number of GB above 0") * 2**30)
 
 
-def _positive(text):
+def _positive(text: str) -> int:
     return int(_number(text, "a whole number from 1", 0.5))
 
 
-def _server(text):
+def _server(text: str) -> str:
     parts = urlsplit(text)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.query or parts.fragment or \
             not re.fullmatch(r"[A-Za-z0-9/._~-]*", parts.path):
@@ -139,7 +142,7 @@ def _server(text):
     return text.rstrip("/")
 
 
-def _launch(text):
+def _launch(text: str) -> tuple[str, ...]:
     """The words of a launch line. A file of this folder gets its whole path: labs run in another folder."""
     words = text.split()
     if words and Path(words[0]).is_file():
@@ -147,7 +150,7 @@ def _launch(text):
     return tuple(words)
 
 
-def _students(who):
+def _students(who: str) -> list[roster.Student]:
     if who.isdecimal():
         return roster.numbered(int(who))
     try:
@@ -162,7 +165,7 @@ def _students(who):
     return roster.read(text)
 
 
-def _record(options, store):
+def _record(options: argparse.Namespace, store: Store) -> ClassRecord:
     """The ClassRecord of this `up`. Raises RosterError, StoreError."""
     earlier = store.read()
     if options.who is None and earlier is None:
@@ -182,7 +185,7 @@ def _record(options, store):
     return ClassRecord.made(Options(**values), _students(options.who), earlier)
 
 
-def _is_up(store):
+def _is_up(store: Store) -> bool:
     try:
         control.call(store, "GET", "/labs")
     except control.NoClass:
@@ -190,7 +193,7 @@ def _is_up(store):
     return True
 
 
-def _up(options, store):
+def _up(options: argparse.Namespace, store: Store):
     if _is_up(store):
         raise ClassError("a class runs in %s already; %s ends it" % (store.folder, store.command("down")))
     store.make()
@@ -234,7 +237,7 @@ def _up(options, store):
     return _DONE if options.no_wait else _await_labs(store)
 
 
-def _refuse_launch_outside(options):
+def _refuse_launch_outside(options: Options) -> None:
     """Labs behind walls see the workspace, and no other folder of this user."""
     file = Path(options.launch[0])
     seen = [*isolation.workspaces(os.environ), "/usr", "/opt"]
@@ -243,7 +246,7 @@ def _refuse_launch_outside(options):
                          % (file, ", ".join(seen)))
 
 
-def _say_who_has_left(earlier, record):
+def _say_who_has_left(earlier: ClassRecord | None, record: ClassRecord) -> None:
     names = {student.name for student in record.students}
     for student in earlier.students if earlier else ():
         if student.name not in names:
@@ -251,7 +254,7 @@ def _say_who_has_left(earlier, record):
                   % (student.full_name, student.name, student.name, HOME), flush=True)
 
 
-def _await_door(store, supervisor, log):
+def _await_door(store: Store, supervisor: subprocess.Popen[bytes], log: Path) -> None:
     deadline = time.monotonic() + OPEN_S
     while not _is_up(store):
         if supervisor.poll() is not None or time.monotonic() > deadline:
@@ -260,7 +263,7 @@ def _await_door(store, supervisor, log):
         time.sleep(_LOOK_S)
 
 
-def _print_addresses(record, store):
+def _print_addresses(record: ClassRecord, store: Store) -> None:
     print("The instructor's page:\n\n    %s\n\nThe students' addresses:\n" % _address(record, store, INSTRUCTOR))
     for student in record.students:
         print("    %-24s %s" % (student.full_name, _address(record, store, student.name)))
@@ -275,7 +278,7 @@ def _print_addresses(record, store):
     print("\n%s ends the class.\n" % store.command("down"), flush=True)
 
 
-def _address(record, store, name):
+def _address(record: ClassRecord, store: Store, name: str) -> str:
     """Of a student's lab, or of the instructor's page."""
     host = os.environ.get("ROS_IP") or socket.gethostname() if record.options.public else "localhost"
     server = record.options.address or "http://%s:%d" % (host, _port(record, store))
@@ -283,11 +286,11 @@ def _address(record, store, name):
     return "%s/%s/?token=%s" % (server, name, token)
 
 
-def _port(record, store):
+def _port(record: ClassRecord, store: Store) -> int:
     return store.running().get("port", record.options.port)
 
 
-def _await_labs(store):
+def _await_labs(store: Store) -> int:
     """Print each lab that has finished starting; Ctrl-C only ends the watching. Returns the exit code."""
     shown = set()
     try:
@@ -309,7 +312,7 @@ def _await_labs(store):
         return _DONE
 
 
-def _list(options, store):
+def _list(options: argparse.Namespace, store: Store) -> int:
     overview = control.call(store, "GET", "/labs")
     if options.addresses:
         _print_addresses(store.read(), store)
@@ -329,11 +332,11 @@ def _list(options, store):
     return _DONE
 
 
-def _shown(value, form, unit=1.0):
+def _shown(value: Any, form: str, unit: float = 1.0):
     return "-" if value is None else form % (value / unit)
 
 
-def _change(options, store):
+def _change(options: argparse.Namespace, store: Store):
     names = options.names
     if names == ["all"]:
         wanted = {"pause": (State.RUNNING.value,)}.get(options.verb)
@@ -346,7 +349,7 @@ def _change(options, store):
     return _DONE
 
 
-def _renew(options, store):
+def _renew(options: argparse.Namespace, store: Store) -> int:
     record = store.read()
     if record is None:
         raise ClassError("there is no class in %s" % store.folder)
@@ -364,7 +367,7 @@ def _renew(options, store):
     return _DONE
 
 
-def _down(options, store):
+def _down(options: argparse.Namespace, store: Store) -> int:
     try:
         supervisor = store.running().get("pid", 0)
         control.call(store, "POST", "/down")
@@ -386,7 +389,7 @@ def _down(options, store):
     return _DONE
 
 
-def _remove_left_over(store):
+def _remove_left_over(store: Store) -> None:
     """The files of a supervisor that was killed, or whose host lost power: it may have left any part of them. Raises
     StoreError where one is just starting or ending."""
     if not store.folder.is_dir():
@@ -401,7 +404,7 @@ def _remove_left_over(store):
         store.remove_run()
 
 
-def _logs(options, store):
+def _logs(options: argparse.Namespace, store: Store):
     if options.name is None:
         path = store.folder / _LOG
     elif roster.slug(options.name) == options.name:

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests to the supervisor at its control socket."""
+from __future__ import annotations
+
 import http.client
 import json
 import socket
+from typing import TYPE_CHECKING, Any
 
 from lab_class.labs import ClassError
+
+if TYPE_CHECKING:
+    from lab_class.store import Store
 
 _TIMEOUT_S = 20.0
 
@@ -14,17 +20,17 @@ class NoClass(ClassError):
 
 
 class _Connection(http.client.HTTPConnection):
-    def __init__(self, path):
+    def __init__(self, path: str) -> None:
         super().__init__("localhost", timeout=_TIMEOUT_S)
         self._path = path
 
-    def connect(self):
+    def connect(self) -> None:
         self.sock = socket.socket(socket.AF_UNIX)
         self.sock.settimeout(self.timeout)
         self.sock.connect(self._path)
 
 
-def call(store, method, path):
+def call(store: Store, method: str, path: str) -> Any | None:
     """The answer of the supervisor of this store.Store, as data (None for an empty one).
 
     Raises NoClass, and ClassError with the supervisor's words where it refuses.

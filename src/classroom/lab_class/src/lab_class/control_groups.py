@@ -4,6 +4,8 @@ Linux itself keeps. They are made below this process's own groups, where this us
 
 Sources: https://docs.kernel.org/admin-guide/cgroup-v2.html, .../cgroup-v1/memory.html and .../cgroup-v1/cgroups.html
 """
+from __future__ import annotations
+
 import contextlib
 import errno
 import getpass
@@ -11,8 +13,10 @@ import os
 import shutil
 import subprocess
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 #: Where control groups are mounted, and the file with the groups of this process (cgroups(7)).
 MOUNT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
@@ -49,21 +53,21 @@ class _Home:
 class Group:
     """The groups of one lab: a folder in each _Home."""
 
-    def __init__(self, folders):
+    def __init__(self, folders: list[tuple[_Home, Path]]) -> None:
         """folders: [(_Home, Path)]."""
         self._folders = folders
         self._kills_before = self._kills()
 
     @property
-    def entrances(self):
+    def entrances(self) -> list[Path]:
         """Files to which a process writes 0 to enter [Path]."""
         return [folder / "cgroup.procs" for _, folder in self._folders]
 
-    def _of(self, controller):
+    def _of(self, controller: str) -> tuple[int, Path | None]:
         return next(((home.version, folder) for home, folder in self._folders if controller in home.controllers),
                     (0, None))
 
-    def share_processors(self, share):
+    def share_processors(self, share: float) -> None:
         """Its part of the processors while there is more work than they can do; 1.0 is that of any lab."""
         version, folder = self._of("cpu")
         if folder is not None:
@@ -72,7 +76,7 @@ class Group:
             with contextlib.suppress(OSError):
                 _write(folder / file, round(share * weight))
 
-    def memory_bytes(self):
+    def memory_bytes(self) -> int | None:
         """Memory that its processes have written to, files in memory and buffers of network sockets included; None
         without the controller."""
         version, folder = self._of("memory")
@@ -82,18 +86,18 @@ class Group:
         sockets = sum(map(int, _words(folder / _SOCKETS_USED)))  # of version 1
         return sockets + sum(int(value) for name, _, value in _rows(folder / "memory.stat") if name in names)
 
-    def has_run_out(self):
+    def has_run_out(self) -> bool:
         """Whether Linux has ended a process of it that had no memory left within the limit."""
         return self._kills() > self._kills_before
 
-    def _kills(self):
+    def _kills(self) -> int:
         version, folder = self._of("memory")
         if folder is None:
             return 0
         name = "memory.oom_control" if version == 1 else "memory.events"
         return sum(int(value) for row, _, value in _rows(folder / name) if row == "oom_kill")
 
-    def remove(self):
+    def remove(self) -> None:
         """Remove it, once its processes have gone; they are expected to go at once."""
         for _, folder in self._folders:
             _remove(folder)
@@ -102,26 +106,26 @@ class Group:
 class ControlGroups:
     """Those of one class. `found` makes them."""
 
-    def __init__(self, homes, problems):
+    def __init__(self, homes: list[_Home], problems: list[str]) -> None:
         self._homes, self._problems = homes, problems
 
     @property
-    def controllers(self):
+    def controllers(self) -> tuple[str, ...]:
         """The controllers that this class has, of CONTROLLERS."""
         return tuple(name for name in CONTROLLERS if any(name in home.controllers for home in self._homes))
 
     @property
-    def folders(self):
+    def folders(self) -> list[str]:
         """The folders to be removed by `removed`, also by another process later [str]."""
         return [str(home.folder) for home in self._homes if not home.is_own]
 
-    def __str__(self):
+    def __str__(self) -> str:
         if len(self.controllers) == len(CONTROLLERS):
             return "control groups limit each lab's memory and processes, and share the processors out equally"
         what = "control groups for " + ", ".join(self.controllers) if self.controllers else "no control groups"
         return "%s (%s); the supervisor looks at each lab's memory" % (what, "; ".join(self._problems))
 
-    def lab(self, name, memory_bytes, tasks):
+    def lab(self, name: str, memory_bytes: int, tasks: int) -> Group:
         """A Group with its limits. Raises OSError."""
         made = []
         for home in self._homes:
@@ -136,7 +140,7 @@ class ControlGroups:
                     _write(folder / file, value)
         return Group(made)
 
-    def remove(self):
+    def remove(self) -> None:
         """Remove all groups of the class."""
         for home in self._homes:
             if home.is_own:
@@ -145,7 +149,7 @@ class ControlGroups:
             remove_left_over(home.folder)
 
 
-def found(name, labs, mount=MOUNT, own=OWN):
+def found(name: str, labs: int, mount: Path = MOUNT, own: Path = OWN) -> ControlGroups:
     """The ControlGroups of a class: folders ``name`` below this process's groups, with weights for ``labs`` labs.
 
     This process moves to a group beside the labs'. Without groups that this user may make, it has no controllers.
@@ -166,7 +170,7 @@ def found(name, labs, mount=MOUNT, own=OWN):
     return ControlGroups(homes, problems or ["none are mounted at %s" % mount])
 
 
-def way_in(user=None, mount=MOUNT):
+def way_in(user: str | None = None, mount: Path = MOUNT) -> list[str]:
     """The command prefix that starts a program in a separate control group of systemd, which it may divide; [] where
     there is none, or where it would end with the last session of this user.
 
@@ -188,7 +192,7 @@ def way_in(user=None, mount=MOUNT):
     return []
 
 
-def remove_left_over(folder):
+def remove_left_over(folder: Path | str) -> None:
     """Remove a class's folder of groups, of which all processes have ended."""
     folder = Path(folder)
     for below in [*(path for path in folder.glob("*") if path.is_dir()), folder]:
@@ -196,7 +200,8 @@ def remove_left_over(folder):
             _remove(below)
 
 
-def _first_version_home(controller, groups, mount, name, problems):
+def _first_version_home(controller: str, groups: dict[str, str], mount: Path, name: str,
+                        problems: list[str]) -> _Home | None:
     for row, path in groups.items():
         if controller not in row.split(","):
             continue
@@ -212,7 +217,7 @@ def _first_version_home(controller, groups, mount, name, problems):
     return None
 
 
-def _second_version_home(own, mount, name, problems):
+def _second_version_home(own: Path, mount: Path, name: str, problems: list[Any]) -> _Home | None:
     """In this process's group, if nobody else is in it; else in one above it that hands controllers on."""
     try:
         alone = (own / "cgroup.procs").read_text(encoding="ascii").split() == [str(os.getpid())]
@@ -236,7 +241,7 @@ def _second_version_home(own, mount, name, problems):
     return None
 
 
-def _hand_on(folder):
+def _hand_on(folder: Path) -> tuple[str, ...]:
     """Let a group's children have its controllers; returns those that they have."""
     for controller in CONTROLLERS:
         with contextlib.suppress(OSError):
@@ -244,7 +249,7 @@ def _hand_on(folder):
     return tuple(name for name in CONTROLLERS if name in _words(folder / "cgroup.subtree_control"))
 
 
-def _weigh(home, labs, problems):
+def _weigh(home: _Home, labs: int, problems: list[Any]) -> None:
     """The class weighs as much as its labs do together, and the front door DOOR_WEIGHT labs."""
     if "cpu" not in home.controllers:
         return
@@ -259,7 +264,7 @@ def _weigh(home, labs, problems):
         problems.append("%s: %s" % (home.folder, error.strerror))
 
 
-def _limits(home, memory_bytes, tasks):
+def _limits(home: _Home, memory_bytes: int, tasks: int) -> Iterator[tuple[str, int]]:
     if "memory" in home.controllers:
         if home.version == 1:
             yield from (("memory.limit_in_bytes", memory_bytes), ("memory.memsw.limit_in_bytes", memory_bytes),
@@ -270,20 +275,20 @@ def _limits(home, memory_bytes, tasks):
         yield "pids.max", tasks
 
 
-def _leave(home):
+def _leave(home: _Home) -> None:
     """Back to the group above, so that the front door's can be removed."""
     with contextlib.suppress(OSError):
         if str(os.getpid()) in _words(home.folder / _DOOR / "cgroup.procs"):
             _write(home.folder.parent / "cgroup.procs", os.getpid())
 
 
-def _remove(folder):
+def _remove(folder: Path) -> None:
     deadline = time.monotonic() + REMOVAL_S
     while not _removed(folder) and time.monotonic() < deadline:
         time.sleep(0.05)
 
 
-def _removed(folder):
+def _removed(folder: Path) -> bool:
     try:
         folder.rmdir()
     except FileNotFoundError:
@@ -293,18 +298,18 @@ def _removed(folder):
     return True
 
 
-def _rows(path):
+def _rows(path: Path) -> list[tuple[str, str, str]]:
     with contextlib.suppress(OSError):
         return [line.partition(" ") for line in path.read_text(encoding="ascii").splitlines()]
     return []
 
 
-def _words(path):
+def _words(path: Path) -> list[str]:
     with contextlib.suppress(OSError):
         return path.read_text(encoding="ascii").split()
     return []
 
 
-def _write(path, value):
+def _write(path: Path, value: Any) -> None:
     with open(path, "r+", encoding="ascii") as stream:
         stream.write(str(value))

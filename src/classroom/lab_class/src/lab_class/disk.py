@@ -4,9 +4,16 @@
 A program fills gigabytes in seconds, so the free space of the disk is asked for several times a second, which costs
 nothing, and the labs' files are measured whenever it falls. Free of ROS; Linux only.
 """
+from __future__ import annotations
+
 import os
 import stat
 import subprocess
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 # Of a file or folder without content, on ext4.
 _INODE_BYTES = 256
@@ -27,11 +34,11 @@ ENTRIES = 200_000
 class _Limit:
     """Of one quantity of each lab. A lab that was ended for what stays may have it at its next start."""
 
-    def __init__(self, most):
+    def __init__(self, most: int) -> None:
         self.most = most
         self._allowed = {}
 
-    def is_exceeded(self, name, used, stays):
+    def is_exceeded(self, name: str, used: int, stays: int) -> bool:
         """used: what the lab has; stays: the part of it that does not go with its processes."""
         if used <= self.most:
             self._allowed.pop(name, None)
@@ -45,14 +52,14 @@ class Quota:
     """The limits of each lab's files. ``limit_bytes``; ``folder``: one on the disk of the labs' files [Path];
     ``entries``: of files and folders."""
 
-    def __init__(self, limit_bytes, folder, entries=ENTRIES):
+    def __init__(self, limit_bytes: int, folder: Path, entries: int = ENTRIES) -> None:
         self._bytes, self._entries, self._folder = _Limit(limit_bytes), _Limit(entries), folder
         #: What the files of each lab that was measured occupy {name: bytes}.
         self.used = {}
         self._written = {}
         self._free, self._due, self._took = None, 0.0, 0.0
 
-    def is_due(self, now):
+    def is_due(self, now: float) -> bool:
         """Whether the files are to be measured: their time has come, or the disk has filled since."""
         if now >= self._due or self._free is None:
             return True
@@ -61,16 +68,16 @@ class Quota:
             before - free > limit.most * _STEP
             for before, free, limit in zip(self._free, self._space(), (self._bytes, self._entries), strict=True))
 
-    def looked(self, start, now):
+    def looked(self, start: float, now: float) -> None:
         """The files of all labs have been measured, from the time ``start`` to ``now`` [s]."""
         self._due, self._took = now + PERIOD_S, now - start
         self._free = self._space()
 
-    def _space(self):
+    def _space(self) -> tuple[int, int]:
         found = os.statvfs(self._folder)
         return found.f_bavail * found.f_frsize, found.f_favail
 
-    def measured(self, name, folder, pids):
+    def measured(self, name: str, folder: Path, pids: Any) -> str:
         """Measure one lab; why it is to end, or "".
 
         folder: of its files; pids: its processes. Its files are those in the folder, and those that its processes hold
@@ -94,24 +101,24 @@ class Quota:
                 free / 2**30, written / 2**30)
         return ""
 
-    def ended(self, name):
+    def ended(self, name: str) -> None:
         """Its processes have ended; its files stay."""
         self._written.pop(name, None)
 
 
-def room(folder):
+def room(folder: Path) -> int:
     """Free space of a folder's disk for this user [bytes]."""
     found = os.statvfs(folder)
     return found.f_bavail * found.f_frsize
 
 
-def entries_left(folder):
+def entries_left(folder: Path) -> int | None:
     """How many files and folders a folder's disk has room for; None where it has no fixed number."""
     found = os.statvfs(folder)
     return found.f_favail if found.f_files else None
 
 
-def nameless_bytes(pids, device):
+def nameless_bytes(pids: Sequence[int] | set[Any], device: int) -> int:
     """Space of removed files that are still open in one of these processes, on a disk (st_dev) [bytes]."""
     found = {}
     for pid in pids:
@@ -130,7 +137,7 @@ def nameless_bytes(pids, device):
     return sum(found.values())
 
 
-def written_bytes(pids):
+def written_bytes(pids: set[Any] | tuple[Any, ...]) -> int:
     """Bytes that these processes, and children of theirs that have ended, have written to disks (proc_pid_io(5))."""
     total = 0
     for pid in pids:
@@ -143,7 +150,7 @@ def written_bytes(pids):
     return total
 
 
-def occupied(folder):
+def occupied(folder: Path) -> tuple[int, int]:
     """(bytes, number) of the files and folders below a folder, empty ones too; links are followed nowhere.
 
     A folder that its student has locked is unlocked. Raises OSError if it cannot be found out.
@@ -152,7 +159,7 @@ def occupied(folder):
     return _total("--block-size=1", folder) + _INODE_BYTES * entries, entries
 
 
-def _total(unit, folder):
+def _total(unit: str, folder: Path) -> int:
     done = _summary(unit, folder)
     if _LOCKED in done.stderr:
         _unlock(folder)
@@ -167,18 +174,18 @@ def _total(unit, folder):
     return total
 
 
-def _summary(unit, folder):
+def _summary(unit: str, folder: Path) -> subprocess.CompletedProcess:
     # du goes into folders of any depth; os.walk ends at the longest path, or with the deepest recursion.
     return subprocess.run(["du", "--summarize", "--one-file-system", unit, "--", str(folder)], capture_output=True,
                           check=False, env={**os.environ, "LC_ALL": "C"})
 
 
-def _unlock(folder):
+def _unlock(folder: Path) -> None:
     # It follows no link that it meets on its way.
     subprocess.run(["chmod", "--recursive", "--silent", "u+rwX", "--", str(folder)], check=False)
 
 
-def remove(folder):
+def remove(folder: Path) -> None:
     """Remove a folder that a student could write to and lock, of any depth."""
     for _ in range(2):
         subprocess.run(["rm", "--recursive", "--force", "--one-file-system", "--", str(folder)],

@@ -3,10 +3,13 @@
 
 It checks who asks before it wakes a lab or passes anything on.
 """
+from __future__ import annotations
+
 import hmac
 import html
 import json
 import re
+from typing import TYPE_CHECKING
 
 from tornado import web
 
@@ -14,6 +17,15 @@ from lab_class.labs import MAX_FAILURES, ClassError, Kind, Role, State, may
 from lab_class.store import StoreError
 from web_bridge import http_text
 from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tornado.httputil import HTTPHeaders
+
+    from lab_class.labs import Lab
+    from lab_class.store import ClassRecord
+    from lab_class.supervisor import Supervisor
 
 #: The cookie that opens one lab, for its path alone.
 COOKIE = "lab_token"
@@ -31,7 +43,7 @@ _WAITING = """<!DOCTYPE html>
 """
 
 
-def same(token, known):
+def same(token: str, known: str) -> bool:
     """Compare two tokens in a time that does not tell where they differ."""
     return hmac.compare_digest(token.encode("utf-8", "surrogateescape"), known.encode())
 
@@ -39,11 +51,11 @@ def same(token, known):
 class Door:
     """State that the handlers share. ``record``: store.ClassRecord; ``supervisor``: supervisor.Supervisor."""
 
-    def __init__(self, record, supervisor):
+    def __init__(self, record: ClassRecord, supervisor: Supervisor) -> None:
         self.record, self.supervisor = record, supervisor
         self.full_names = {student.name: student.full_name for student in record.students}
 
-    def role(self, name, tokens):
+    def role(self, name: str, tokens: list[str]) -> Role | None:
         """The Role that one of the tokens gives for the lab of this name; None."""
         known = self.record.tokens.get(name)
         if known is None:
@@ -53,10 +65,10 @@ class Door:
                 return role
         return None
 
-    def is_instructor(self, token):
+    def is_instructor(self, token: str) -> bool:
         return same(token, self.record.instructor)
 
-    def words_of(self, lab):
+    def words_of(self, lab: Lab) -> str:
         """The text for the student of a lab that does not run."""
         if lab.state is State.WAITING and lab.reason:
             return "The lab is going to start. It waits: %s." % lab.reason
@@ -72,20 +84,20 @@ class Door:
 
 
 class _Handler(PlainHandler):
-    def initialize(self, door):
+    def initialize(self, door: Door) -> None:
         self.door = door
 
 
 class Start(_Handler):
     """The address without a name."""
 
-    def get(self):
+    def get(self) -> None:
         options = self.door.record.options
         self.refuse(404, "Your lab has an address of this form, with your name and your token: %s/NAME/?token=..."
                     % (options.address or "http://" + self.request.host))
 
 
-def is_poll(method, uri):
+def is_poll(method: str, uri: str) -> bool:
     """Does an open JupyterLab ask this by itself? uri: path and query below the lab. It wakes no lab."""
     path, _, query = uri.partition("?")
     name = path.removeprefix("/notebook/api/")
@@ -96,7 +108,7 @@ def is_poll(method, uri):
                                and "type=notebook" not in query)
 
 
-def kind_of(is_upgrade, uri):
+def kind_of(is_upgrade: bool, uri: str) -> Kind:
     """The labs.Kind of a connection; uri: path and query below the lab. A page of the lab has one WebSocket /lab."""
     if not is_upgrade:
         return Kind.ANSWER
@@ -108,11 +120,11 @@ class Passed(PassingHandler):
 
     SERVER, OWN_COOKIE = "the lab", COOKIE
 
-    def initialize(self, door):
+    def initialize(self, door: Door) -> None:
         super().initialize()
         self.door = door
 
-    async def prepare(self):
+    async def prepare(self) -> None:
         self._name = self.path_args[0]
         self._prefix = "%s/%s" % (self.door.record.options.prefix, self._name)
         path, _, query = self.request.uri.partition("?")
@@ -139,7 +151,7 @@ class Passed(PassingHandler):
         else:
             await self.pass_to(self.door.supervisor.socket_of(self._name), below)
 
-    def _lets_in(self):
+    def _lets_in(self) -> bool:
         """Whether this request may go on; else it is refused."""
         token, cookie = self.get_query_argument("token", ""), self.get_cookie(COOKIE, "")
         self._role = self.door.role(self._name, [token] if token else [cookie])
@@ -153,26 +165,26 @@ class Passed(PassingHandler):
             return True
         return False
 
-    def answer_headers(self, headers):
+    def answer_headers(self, headers: HTTPHeaders) -> list[tuple[str, str]]:
         return http_text.passed_on(headers, self._prefix, own_cookie=COOKIE)
 
-    def entered(self):
+    def entered(self) -> None:
         # A lab that is served must not be paused.
         if not self._is_poll:
             self.door.supervisor.serving(self._name, self._kind, 1)
 
-    def left(self):
+    def left(self) -> None:
         if not self._is_poll:
             self.door.supervisor.serving(self._name, self._kind, -1)
 
-    def may_pass(self, chunk):
+    def may_pass(self, chunk: bytes) -> bool:
         if not http_text.is_heartbeat(chunk):
             self.door.supervisor.request(self._name)
             return True
         # A paused lab would find old heartbeats when it wakes, and take them for a page that is there.
         return self.door.supervisor.is_awake(self._name)
 
-    def _say_wait(self, lab):
+    def _say_wait(self, lab: Lab) -> None:
         words = self.door.words_of(lab)
         if "text/html" not in self.request.headers.get("Accept", ""):
             self.set_header("Retry-After", str(_AGAIN_S))
@@ -187,11 +199,11 @@ class _ForInstructor(_Handler):
     """Needs the instructor's token in a header, which no page of a lab can send; ``trusted``: at the control socket,
     which belongs to the owner of the class alone."""
 
-    def initialize(self, door, trusted=False):
+    def initialize(self, door: Door, trusted: bool = False) -> None:
         super().initialize(door)
         self._trusted = trusted
 
-    def prepare(self):
+    def prepare(self) -> None:
         scheme, _, token = self.request.headers.get("Authorization", "").partition(" ")
         if not self._trusted and not (scheme == "Bearer" and self.door.is_instructor(token)):
             self.refuse(403, "this needs the instructor's token")
@@ -202,7 +214,7 @@ class _ForInstructor(_Handler):
 class Overview(_ForInstructor):
     """All labs, as JSON."""
 
-    def get(self):
+    def get(self) -> None:
         self.set_header("Content-Type", "application/json")
         # What comes out of labs was checked where it came in; no browser reads Python's NaN.
         self.finish(json.dumps(self.door.supervisor.overview(), allow_nan=False))
@@ -211,7 +223,7 @@ class Overview(_ForInstructor):
 class Change(_ForInstructor):
     """POST /instructor/labs/NAME/VERB: start, stop or pause one lab."""
 
-    def post(self, name, verb):
+    def post(self, name: str, verb: str) -> None:
         try:
             self.door.supervisor.change(name, verb)
         except ClassError as error:
@@ -223,7 +235,7 @@ class Change(_ForInstructor):
 class Renew(_ForInstructor):
     """POST /renew/NAME: new tokens for a student or the instructor; at the control socket alone."""
 
-    def post(self, name):
+    def post(self, name: str) -> None:
         try:
             self.door.supervisor.renew(name)
         except (ClassError, StoreError) as error:
@@ -235,7 +247,7 @@ class Renew(_ForInstructor):
 class Down(_ForInstructor):
     """Ends the class; at the control socket alone."""
 
-    def post(self):
+    def post(self) -> None:
         self.door.supervisor.end()
         self.set_status(204)
 
@@ -243,11 +255,11 @@ class Down(_ForInstructor):
 class InstructorPage(_Handler):
     """The page has no secret; the labs that it shows need the token."""
 
-    def initialize(self, door, page):
+    def initialize(self, door: Door, page: Path) -> None:
         super().initialize(door)
         self._page = page
 
-    def get(self, name=""):
+    def get(self, name: str = "") -> None:
         kinds = {"": ("instructor.html", "text/html"), "instructor.js": ("instructor.js", "text/javascript"),
                  "instructor.css": ("instructor.css", "text/css")}
         if name not in kinds:
@@ -259,7 +271,7 @@ class InstructorPage(_Handler):
         self.finish((self._page / file).read_text(encoding="utf-8"))
 
 
-def application(door, page):
+def application(door: Door, page: Path) -> web.Application:
     """The front door; ``page``: folder of the instructor's page [Path]."""
     prefix = re.escape(door.record.options.prefix)
     return web.Application([
@@ -270,7 +282,7 @@ def application(door, page):
         (prefix + r"/([a-z0-9-]+)(?:/.*)?", Passed, {"door": door})], log_function=lambda handler: None)
 
 
-def control(door):
+def control(door: Door):
     """The same for the commands of the class's owner, at the control socket."""
     owner = {"door": door, "trusted": True}
     return web.Application([(r"/labs", Overview, owner), (r"/labs/([a-z0-9-]+)/([a-z]+)", Change, owner),

@@ -2,6 +2,8 @@
 """The first program of a lab, behind its walls: starts master, simulator and page, and forwards the front door's
 connections to the page. Ends with any of them, and with the supervisor. No ROS here.
 """
+from __future__ import annotations
+
 import argparse
 import asyncio
 import contextlib
@@ -12,6 +14,7 @@ import socket
 import subprocess
 import sys
 import time
+from typing import Any
 
 from processes.family import children_of, direct_children
 
@@ -22,7 +25,7 @@ _LOOK_S = 0.1
 _SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 
 
-def main():
+def main() -> int:
     """Returns the exit code; the last line of the output says what ended."""
     parser = argparse.ArgumentParser(prog="lab_class.inside")
     for name in ("listener", "master", "page"):
@@ -42,7 +45,7 @@ def main():
     return 1
 
 
-async def _run(options):
+async def _run(options: argparse.Namespace) -> str:
     """The lab, until a part of it or the supervisor ends; returns which, as a text."""
     lab = await asyncio.create_subprocess_exec("roslaunch", "-p", str(options.master), *options.launch,
                                                stdin=subprocess.DEVNULL)
@@ -59,7 +62,7 @@ async def _run(options):
         return "%s has ended (%s)" % (ends[first], first.result())
 
 
-async def _page(options):
+async def _page(options: argparse.Namespace):
     """The page, once there is a master."""
     while True:
         with contextlib.suppress(OSError):
@@ -72,7 +75,7 @@ async def _page(options):
     return await page.wait()
 
 
-async def _input_end():
+async def _input_end() -> str:
     """Until the standard input ends, which the supervisor holds open."""
     reader = asyncio.StreamReader()
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
@@ -81,7 +84,7 @@ async def _input_end():
     return "end of input"
 
 
-async def forward(streams, port):
+async def forward(streams: Any, port: int) -> None:
     """One connection of the front door, (reader, writer), to a port of this lab; closed where nothing listens."""
     reader, writer = streams
     try:
@@ -95,7 +98,7 @@ async def forward(streams, port):
         writer.close()
 
 
-async def _copy(reader, writer):
+async def _copy(reader: Any, writer: Any) -> None:
     with contextlib.suppress(OSError):
         while chunk := await reader.read(_CHUNK):
             writer.write(chunk)
@@ -105,7 +108,7 @@ async def _copy(reader, writer):
         writer.write_eof()
 
 
-def end_children():
+def end_children() -> None:
     """End all descendants of this process: first as Ctrl-C does, then for good."""
     for pid in direct_children(os.getpid()):
         with contextlib.suppress(ProcessLookupError):

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The processes of one lab, seen from outside of its walls: started, paused, woken, measured, ended."""
+from __future__ import annotations
+
 import contextlib
 import os
 import signal
 import subprocess
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from processes.family import children_of, is_running
 
@@ -21,7 +25,8 @@ class LabProcess:
     """Runs from the constructor on. The supervisor is its parent, and must start it in its main thread: bubblewrap ends
     with the thread that has started it."""
 
-    def __init__(self, command, environment, descriptors, output, groups=()):
+    def __init__(self, command: list[str], environment: dict[str, str], descriptors: Sequence[int], output: Path,
+                 groups: Sequence[str] = ()) -> None:
         """output: file of all that it writes [Path]; groups: files cgroup.procs that it enters. Raises OSError."""
         enter = ["sh", "-c", 'while [ "$1" != -- ]; do echo 0 >"$1"; shift; done; shift; exec "$@"', "lab",
                  *map(str, groups), "--", "nice", "-n", str(0 if groups else NICENESS), *command]
@@ -31,18 +36,18 @@ class LabProcess:
                                              cwd="/")
 
     @property
-    def pid(self):
+    def pid(self) -> int:
         return self._process.pid
 
     @property
-    def has_ended(self):
+    def has_ended(self) -> bool:
         return self._process.poll() is not None
 
-    def family(self):
+    def family(self) -> set[Any] | set[int]:
         """The process ids of the lab; orphans stay below it."""
         return set() if self.has_ended else children_of([self.pid])
 
-    def pause(self):
+    def pause(self) -> None:
         """Stop all processes where they are; they use no processor until `wake`.
 
         The first one goes on: it waits, and without walls it ends the others where the supervisor is killed meanwhile.
@@ -58,19 +63,19 @@ class LabProcess:
                     os.kill(pid, signal.SIGSTOP)
             stopped |= new
 
-    def wake(self):
+    def wake(self) -> None:
         """Let all processes go on."""
         for pid in self.family():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGCONT)
 
-    def ask_to_end(self):
+    def ask_to_end(self) -> None:
         """Its first program ends the others and itself."""
         self.wake()
         with contextlib.suppress(OSError):
             self._process.stdin.close()
 
-    def kill(self):
+    def kill(self) -> None:
         """End all of its processes for good, and wait for that."""
         for _ in range(_ROUNDS):
             family = {pid for pid in self.family() if is_running(pid)}
@@ -84,14 +89,14 @@ class LabProcess:
             self._process.stdin.close()
         self._process.wait()
 
-    def memory_bytes(self, files_bytes=0):
+    def memory_bytes(self, files_bytes: int = 0) -> int:
         """Memory of all processes, shared pages divided among their users; files_bytes: of files in memory, which
         processes may have mapped."""
         shares = [_share_of_memory(pid) for pid in self.family()]
         return sum(own for own, _ in shares) + max(files_bytes, sum(shared for _, shared in shares))
 
 
-def _share_of_memory(pid):
+def _share_of_memory(pid: int):
     """(own, of files in memory) [bytes]."""
     with contextlib.suppress(OSError, KeyError):
         rows = dict(line.split(":") for line in

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The labs of a class: their states, and what to do next. Time comes in as an argument; no ROS, no processes."""
+from __future__ import annotations
+
 import enum
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 #: A lab that has not answered after this time has failed [s].
 START_LIMIT_S = 180.0
@@ -73,19 +77,19 @@ class Lab:
     settled: bool = False
 
     @property
-    def is_starting(self):
+    def is_starting(self) -> bool:
         """Whether it takes the place of one of those that start at a time."""
         return self.state is State.STARTING or (self.state is State.RUNNING and not self.settled)
 
     @property
-    def has_processes(self):
+    def has_processes(self) -> bool:
         return self.state in (State.STARTING, State.RUNNING, State.PAUSED)
 
 
 class Labs:
     """All labs of a class. Methods return the actions to take now: a list of (Action, name)."""
 
-    def __init__(self, names, at_once, idle_s, keep_running=False):
+    def __init__(self, names: list[str], at_once: int, idle_s: float | None, keep_running: bool = False) -> None:
         """names: in the order of the roster; at_once: labs that may start at a time; idle_s: a lab without a client for
         so long is paused [s], or None; keep_running: else a lab that had no client yet is paused when it has settled,
         unless idle_s is None."""
@@ -94,22 +98,22 @@ class Labs:
         self._waits_paused = idle_s is not None and not keep_running
         self._handed_over = -HAND_OVER_S
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Lab]:
         return iter(self._labs.values())
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Lab:
         if name not in self._labs:
             raise ClassError("there is no lab %s; there are: %s" % (name, ", ".join(self._labs)))
         return self._labs[name]
 
-    def __contains__(self, name):
+    def __contains__(self, name: str) -> bool:
         return name in self._labs
 
-    def place_in_line(self, name):
+    def place_in_line(self, name: str) -> int:
         """How many labs start before this one, which is waiting."""
         return [lab.name for lab in self._line()].index(name)
 
-    def start(self, name, now):
+    def start(self, name: str, now: float) -> list[Any]:
         """The instructor, or the beginning of the class, wants this lab."""
         lab = self[name]
         if lab.state is State.PAUSED:
@@ -119,14 +123,14 @@ class Labs:
             self._enter_line(lab, now)
         return []
 
-    def stop(self, name, now):
+    def stop(self, name: str, now: float) -> list[tuple[Action, str]]:
         """The instructor ends this lab."""
         lab = self[name]
         had_processes = lab.has_processes
         self._set(lab, State.STOPPED, now)
         return [(Action.END, name)] if had_processes else []
 
-    def pause(self, name, now):
+    def pause(self, name: str, now: float) -> list[tuple[Action, str]]:
         """Raises ClassError unless the lab is running."""
         lab = self[name]
         if lab.state is State.PAUSED:
@@ -138,7 +142,7 @@ class Labs:
         self._set(lab, State.PAUSED, now)
         return [(Action.PAUSE, name)]
 
-    def request(self, name, now):
+    def request(self, name: str, now: float) -> list[tuple[Action, str]]:
         """A client with a token asks this lab for something."""
         lab = self[name]
         lab.used = now
@@ -150,7 +154,7 @@ class Labs:
         lab.visited = True
         return []
 
-    def serving(self, name, kind, by, now):
+    def serving(self, name: str, kind: Kind, by: int, now: float) -> None:
         """The number of connections of one Kind changes ``by`` 1 or -1. An open page alone keeps no lab awake."""
         lab = self[name]
         if kind is Kind.ANSWER:
@@ -160,14 +164,14 @@ class Labs:
             lab.sockets += by
             lab.pages += by * (kind is Kind.PAGE)
 
-    def answered(self, name, now):
+    def answered(self, name: str, now: float) -> None:
         """A lab that was starting answers requests."""
         lab = self[name]
         if lab.state is State.STARTING:
             self._set(lab, State.RUNNING, now)
             lab.used = now
 
-    def has_settled(self, name, now):
+    def has_settled(self, name: str, now: float) -> list[tuple[Action, str]]:
         """A lab that answers has finished starting: it waits for its first client, paused."""
         lab = self[name]
         if not lab.is_starting:
@@ -175,18 +179,18 @@ class Labs:
         lab.settled = True
         return self.pause(name, now) if self._waits_paused and not (lab.visited or lab.busy or lab.sockets) else []
 
-    def ended(self, name, reason, now):
+    def ended(self, name: str, reason: str, now: float) -> list[tuple[Action, str]]:
         """The processes of a lab have ended by themselves; those of a stopped lab are expected to."""
         lab = self[name]
         return self._fail(lab, reason, now) if lab.has_processes else []
 
-    def exceeded(self, name, reason, now):
+    def exceeded(self, name: str, reason: str, now: float) -> list[tuple[Action, str]]:
         """A lab is over one of its limits: it is ended at once, and the instructor decides."""
         self._fail(self[name], reason, now)
         self[name].failures = MAX_FAILURES
         return [(Action.KILL, name)]
 
-    def due(self, now, shortage=""):
+    def due(self, now: float, shortage: str = "") -> list[tuple[Action, str]]:
         """Whatever time brings: the next starts, labs to be paused, starts that take too long.
 
         shortage: why no further lab should start beside those that have started, or "".
@@ -209,7 +213,7 @@ class Labs:
             actions.append((Action.START, lab.name))
         return actions
 
-    def _hand_over(self, now):
+    def _hand_over(self, now: float) -> list[tuple[Action, str]]:
         """A paused lab that nobody has visited ends, and waits, where another one has a visitor and may not start."""
         unused = [lab for lab in self if lab.state is State.PAUSED and not lab.visited]
         if not unused or not any(lab.asked for lab in self._line()) or now - self._handed_over < HAND_OVER_S:
@@ -218,26 +222,26 @@ class Labs:
         self._enter_line(unused[-1], now)
         return [(Action.END, unused[-1].name)]
 
-    def _line(self):
+    def _line(self) -> list[Lab]:
         """Waiting labs: those with a waiting client first, then in the order of the roster."""
         return sorted((lab for lab in self if lab.state is State.WAITING), key=lambda lab: not lab.asked)
 
-    def _enter_line(self, lab, now):
+    def _enter_line(self, lab: Lab, now: float) -> None:
         lab.visited = lab.settled = False
         self._set(lab, State.WAITING, now)
 
-    def _wake(self, lab, now):
+    def _wake(self, lab: Lab, now: float) -> list[tuple[Action, str]]:
         self._set(lab, State.RUNNING, now)
         lab.used = now
         return [(Action.WAKE, lab.name)]
 
-    def _fail(self, lab, reason, now):
+    def _fail(self, lab: Lab, reason: str, now: float) -> list[tuple[Action, str]]:
         lab.failures = 1 if lab.state is State.RUNNING and now - lab.since > STEADY_S else lab.failures + 1
         self._set(lab, State.FAILED, now, reason)
         return [(Action.END, lab.name)]
 
     @staticmethod
-    def _set(lab, state, now, reason=""):
+    def _set(lab: Lab, state: State, now: float, reason: str = "") -> None:
         lab.state, lab.since, lab.reason, lab.asked = state, now, reason, False
 
 
@@ -245,6 +249,6 @@ class Labs:
 RIGHTS = {Role.INSTRUCTOR: ("see", "change"), Role.STUDENT: ("use", "watch"), Role.VIEWER: ("watch",)}
 
 
-def may(role, right):
+def may(role: Role | None, right: str) -> bool:
     """Whether a role (None: no valid token) has a right."""
     return right in RIGHTS.get(role, ())

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command that starts one lab: in a sandbox with a separate network, or, without walls, on free ports."""
+from __future__ import annotations
+
 import contextlib
 import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from lab_class.store import HOME
 from lab_web.tokens import TOKEN, VIEW_TOKEN
@@ -12,6 +15,9 @@ from processes import isolation, ports, system_calls
 from rf_checks import hidden
 from rf_checks.handout import STUBBED, emptied_notebook, stub
 from world_picture.results import READY, cache_folder, ready_for
+
+if TYPE_CHECKING:
+    from lab_class.store import Options, Tokens
 
 #: Ports inside of a lab's separate network, as on any lab's machine.
 MASTER_PORT, PAGE_PORT = 11311, 8090
@@ -34,7 +40,8 @@ class Place:
     walls: bool
 
 
-def prepared(place, options, tokens, listener, refused):
+def prepared(place: Place, options: Options, tokens: Tokens, listener: int,
+             refused: tuple[list[Any], tuple[Any, ...]]) -> tuple[list[str], dict[str, str], tuple[int]]:
     """(command, environment, descriptors to inherit) of one lab.
 
     options, tokens: store.Options, store.Tokens; listener: descriptor of the socket that the front door connects to;
@@ -69,7 +76,7 @@ def prepared(place, options, tokens, listener, refused):
     return [*enter, *limits, *command], environment, (listener, *descriptors)
 
 
-def _without_solutions(environment, folder):
+def _without_solutions(environment: os._Environ, folder: Path) -> list[tuple[Path, Path, bool]]:
     """The labs' notebooks without solutions, and what stands for nodes that solve an exercise, as binds in their place.
 
     folder: of the copies, which exists."""
@@ -92,11 +99,11 @@ def _without_solutions(environment, folder):
     return binds
 
 
-def _found(root, patterns):
+def _found(root: Path, patterns: tuple[str, str, str]) -> list[Path]:
     return sorted(path for pattern in patterns for path in root.glob(pattern))
 
 
-def limited(file_bytes, tasks):
+def limited(file_bytes: int, tasks: int | None) -> list[str]:
     """The command prefix that limits the size of each file, and the number of processes and threads.
 
     ``tasks`` only in a sandbox (None: no limit): in its user namespace Linux counts them by themselves, since 5.14;
@@ -106,6 +113,6 @@ def limited(file_bytes, tasks):
     return ["prlimit", "--core=0", "--fsize=%d" % file_bytes, *number, "--"]
 
 
-def refused(walls):
+def refused(walls: Any):
     """The filter of system calls for one start; a context manager for `prepared`."""
     return system_calls.refused() if walls else contextlib.nullcontext(([], ()))

@@ -2,7 +2,10 @@
 """When a lab has finished starting: its page answers long before its simulator has loaded the robot. `Settling` takes
 time and measurements as arguments; `demand_s` reads them from /proc.
 """
+from __future__ import annotations
+
 import contextlib
+from collections.abc import Iterable
 from pathlib import Path
 
 #: A lab has settled when, for QUIET_S [s], no process of it has started or ended, and its threads have asked for less
@@ -15,12 +18,12 @@ LIMIT_S = 40.0
 class Settling:
     """One lab, from the moment at which its page answers."""
 
-    def __init__(self, now):
+    def __init__(self, now: float) -> None:
         """now: a clock [s]."""
         self._begun = now
         self._since, self._processes, self._demand_s = None, frozenset(), 0.0
 
-    def look(self, processes, demand_s, is_simulating, now):
+    def look(self, processes: Iterable[int], demand_s: float, is_simulating: bool, now: float) -> bool:
         """Has it settled? processes: their ids; demand_s: by `demand_s`, since their start [s]; is_simulating: its
         simulator has reported a real-time factor; now: the clock [s]."""
         if now - self._begun >= LIMIT_S:
@@ -35,7 +38,7 @@ class Settling:
         return False
 
 
-def demand_s(processes, proc=Path("/proc")):
+def demand_s(processes: list[int], proc: Path = Path("/proc")) -> float:
     """Time that all threads of these processes have run or waited for a processor, since their start [s].
 
     The waiting makes it independent of other programs' load. Source: https://docs.kernel.org/scheduler/sched-stats.html

@@ -3,14 +3,18 @@
 
 Students' files and tokens survive restarts of the host; the rest is of one run.
 """
+from __future__ import annotations
+
 import contextlib
 import fcntl
 import json
 import os
 import secrets
 import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from lab_class.disk import remove
@@ -50,7 +54,7 @@ class Options:
     address: str = ""
 
     @property
-    def prefix(self):
+    def prefix(self) -> str:
         """The common prefix of all addresses' paths: the path of ``address``, mostly ""."""
         return urlsplit(self.address).path
 
@@ -73,13 +77,13 @@ class ClassRecord:
     instructor: str
 
     @staticmethod
-    def made(options, students, earlier=None):
+    def made(options: Options, students: Sequence[Student], earlier: ClassRecord | None = None) -> ClassRecord:
         """A record for these students; those of an ``earlier`` one keep their tokens."""
         known = earlier.tokens if earlier else {}
         tokens = {student.name: known.get(student.name) or Tokens(_token(), _token()) for student in students}
         return ClassRecord(options, tuple(students), tokens, earlier.instructor if earlier else _token())
 
-    def renewed(self, name):
+    def renewed(self, name: str) -> ClassRecord:
         """This record with new tokens for one student, or for INSTRUCTOR. Raises ClassError."""
         if name == INSTRUCTOR:
             return replace(self, instructor=_token())
@@ -88,11 +92,11 @@ class ClassRecord:
         return replace(self, tokens={**self.tokens, name: Tokens(_token(), _token())})
 
 
-def _token():
+def _token() -> str:
     return secrets.token_urlsafe(18)
 
 
-def default_folder():
+def default_folder() -> str:
     """Where a class is kept: $XDG_STATE_HOME/baxter_labs, by default ~/.local/state/baxter_labs."""
     base = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
     return os.path.join(base, "baxter_labs")
@@ -101,7 +105,7 @@ def default_folder():
 class Store:
     """The folder of a class; readable by its owner alone."""
 
-    def __init__(self, folder):
+    def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder).absolute()
 
     def command(self, words: str) -> str:
@@ -109,7 +113,7 @@ class Store:
         is_usual = self.folder == Path(default_folder()).absolute()
         return "./baxter.sh labs %s%s" % ("" if is_usual else "--folder %s " % shlex.quote(str(self.folder)), words)
 
-    def make(self):
+    def make(self) -> None:
         """Make the folder. Raises StoreError."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -118,7 +122,7 @@ class Store:
             raise StoreError("%s cannot be the folder of the class: %s" % (self.folder, error.strerror)) from error
 
     @contextlib.contextmanager
-    def locked(self):
+    def locked(self) -> Iterator[None]:
         """Held by the one supervisor of this folder. Raises StoreError where another one runs."""
         with open(self.folder / _LOCK, "w", encoding="ascii") as stream:
             try:
@@ -128,7 +132,7 @@ class Store:
                                  % (self.folder, self.command("down"))) from None
             yield
 
-    def read(self):
+    def read(self) -> ClassRecord | None:
         """The ClassRecord, or None where there is none. Raises StoreError for a broken file."""
         try:
             data = (self.folder / _CLASS).read_bytes()
@@ -145,13 +149,13 @@ class Store:
             raise StoreError("%s is not the record of a class (%s: %s); remove it to begin again, which gives the "
                              "students new addresses" % (self.folder / _CLASS, type(error).__name__, error)) from error
 
-    def write(self, record):
+    def write(self, record: ClassRecord) -> None:
         """Keep a ClassRecord. Raises StoreError."""
         self._write(_CLASS, {"options": asdict(record.options), "students": [list(row) for row in record.students],
                              "tokens": {name: [pair.act, pair.view] for name, pair in record.tokens.items()},
                              "instructor": record.instructor})
 
-    def running(self):
+    def running(self) -> dict[str, Any]:
         """The content that the supervisor wrote by `write_running`, or {}; also where a host that lost power has kept
         only a part of it."""
         try:
@@ -160,11 +164,11 @@ class Store:
             return {}
         return found if isinstance(found, dict) else {}
 
-    def write_running(self, values):
+    def write_running(self, values: dict[str, Any]) -> None:
         """Keep what other commands need to know of the supervisor. Raises StoreError."""
         self._write(_RUNNING, values)
 
-    def _write(self, name, values):
+    def _write(self, name: str, values: dict[str, Any]) -> None:
         # Whole or not at all, also where the host loses power.
         temporary = self.folder / (name + _NEW)
         try:
@@ -179,13 +183,13 @@ class Store:
                 temporary.unlink()
             raise StoreError("%s cannot be written: %s" % (self.folder / name, error.strerror or error)) from error
 
-    def lab(self, name):
+    def lab(self, name: str) -> Path:
         """The folder of one lab; made where it is missing."""
         folder = self.folder / "labs" / name
         (folder / HOME).mkdir(parents=True, exist_ok=True)
         return folder
 
-    def remove_run(self):
+    def remove_run(self) -> None:
         """Remove what one run leaves; the students' files, the roster and the tokens stay."""
         for name in (_RUNNING, _LOCK, _CLASS + _NEW, _RUNNING + _NEW):
             (self.folder / name).unlink(missing_ok=True)

@@ -2,6 +2,8 @@
 """The process of a class: starts, pauses, wakes and ends the labs, and keeps the front door. An ordinary user's
 program; no ROS here.
 """
+from __future__ import annotations
+
 import argparse
 import asyncio
 import contextlib
@@ -13,7 +15,9 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from tornado import netutil
 from tornado.httpserver import HTTPServer
@@ -30,6 +34,10 @@ from lab_class.verdicts import Verdicts
 from processes.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
+if TYPE_CHECKING:
+    from lab_class.labs import Kind, Lab
+    from lab_class.store import ClassRecord
+
 _TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S = 0.2, 0.5, 2.0, 5.0
 _PROBE = b"GET /?token=%s HTTP/1.0\r\nHost: localhost\r\n\r\n"
 _PROBE_S = 5.0
@@ -42,7 +50,8 @@ _LAST_BYTES = 4000
 class Supervisor:
     """One class. ``now``: a clock [s]."""
 
-    def __init__(self, store, record, libraries, page, now=time.monotonic):
+    def __init__(self, store: Store, record: ClassRecord, libraries: Path, page: Path,
+                 now: Callable[[], float] = time.monotonic) -> None:
         """store, record: store.Store, store.ClassRecord; libraries: folder of the page's libraries, page: of the
         instructor's page [Path]."""
         self._store, self._record, self._libraries, self._now = store, record, libraries, now
@@ -62,30 +71,30 @@ class Supervisor:
 
     # For the front door.
 
-    def socket_of(self, name):
+    def socket_of(self, name: str) -> Path:
         """The socket on which a lab answers [Path]."""
         return self._runtime / name
 
-    def request(self, name):
+    def request(self, name: str) -> Lab:
         """A client asks this lab for something: wake it. Returns its labs.Lab."""
         self._do(self.labs.request(name, self._now()))
         return self.labs[name]
 
-    def is_awake(self, name):
+    def is_awake(self, name: str) -> bool:
         return self.labs[name].state is State.RUNNING
 
-    def serving(self, name, kind, by):
+    def serving(self, name: str, kind: Kind, by: int) -> None:
         """The number of a lab's connections of one labs.Kind changes ``by`` 1 or -1."""
         self.labs.serving(name, kind, by, self._now())
 
-    def change(self, name, verb):
+    def change(self, name: str, verb: str) -> None:
         """Start, stop or pause one lab. Raises ClassError."""
         verbs = {"start": self.labs.start, "stop": self.labs.stop, "pause": self.labs.pause}
         if verb not in verbs:
             raise ClassError("%s is nothing that can be done with a lab; expected %s" % (verb, ", ".join(verbs)))
         self._do(verbs[verb](name, self._now()))
 
-    def renew(self, name):
+    def renew(self, name: str) -> None:
         """New tokens for a student, or for the instructor: the old ones open nothing any more.
 
         What they have opened in a lab ends, since the lab starts again. Raises ClassError, StoreError.
@@ -97,7 +106,7 @@ class Supervisor:
             self._do(self.labs.stop(name, self._now()))
             self._do(self.labs.start(name, self._now()))
 
-    def overview(self):
+    def overview(self) -> dict[str, Any]:
         """The class as plain data, with the addresses' tokens: for the instructor alone."""
         now = self._now()
         labs = []
@@ -113,13 +122,13 @@ class Supervisor:
                 "verdicts": self._verdicts[lab.name].known})
         return {"labs": labs, "idle_s": self._record.options.idle_s, "limits": str(self._class_groups)}
 
-    def end(self):
+    def end(self) -> None:
         """End the class; `run` returns when all is gone."""
         self._end.set()
 
     # The class.
 
-    async def run(self):
+    async def run(self) -> None:
         """Until `end`, or a signal. Raises StoreError where the port is taken."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -163,7 +172,7 @@ class Supervisor:
                                    "runtime": str(self._runtime), "groups": self._class_groups.folders})
         return [server, control]
 
-    def _listen(self, name):
+    def _listen(self, name: str) -> None:
         # The supervisor opens it and the lab inherits it, so no lab can put anything else into its place.
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(self.socket_of(name)))
@@ -171,7 +180,7 @@ class Supervisor:
         self._listeners[name] = listener
 
     @staticmethod
-    async def _every(period_s, function):
+    async def _every(period_s: float, function: Callable[[], Any]) -> None:
         while True:
             try:
                 await function()
@@ -180,7 +189,7 @@ class Supervisor:
                 traceback.print_exc()
             await asyncio.sleep(period_s)
 
-    async def _tick(self):
+    async def _tick(self) -> None:
         for name, process in list(self._processes.items()):
             # A task of this lab that runs is ending these processes, or is about to start others.
             if process.has_ended and (name not in self._tasks or self._tasks[name].done()):
@@ -192,7 +201,7 @@ class Supervisor:
                                 sum(lab.is_starting for lab in self.labs))
         self._do(self.labs.due(self._now(), short))
 
-    def _do(self, actions):
+    def _do(self, actions: Any) -> None:
         for action, name in actions:
             process = self._processes.get(name)
             if action is Action.START:
@@ -207,18 +216,18 @@ class Supervisor:
             elif process is not None:
                 process.pause() if action is Action.PAUSE else process.wake()
 
-    def _go(self, name, coroutine):
+    def _go(self, name: str, coroutine: Any) -> None:
         """Run one after the other for each lab: a start waits for the end before it."""
         before = self._tasks.get(name)
 
-        async def next_one():
+        async def next_one() -> None:
             if before is not None:
                 await asyncio.wait([before])
             await coroutine
 
         self._tasks[name] = asyncio.ensure_future(next_one())
 
-    async def _start(self, name):
+    async def _start(self, name: str) -> None:
         if self.labs[name].state is not State.STARTING:
             return
         try:
@@ -237,7 +246,7 @@ class Supervisor:
             return
         asyncio.ensure_future(self._await_answer(name, self._processes[name]))
 
-    async def _await_answer(self, name, process):
+    async def _await_answer(self, name: str, process: Any) -> None:
         while self._processes.get(name) is process and self.labs[name].state is State.STARTING:
             if await self._answers(name):
                 self.labs.answered(name, self._now())
@@ -246,7 +255,7 @@ class Supervisor:
                 return
             await asyncio.sleep(_TICK_S)
 
-    async def _await_settled(self, name, process):
+    async def _await_settled(self, name: str, process: Any) -> None:
         settling = Settling(self._now())
         while self._processes.get(name) is process and self.labs[name].is_starting:
             family = process.family()
@@ -258,7 +267,7 @@ class Supervisor:
         if self._processes.get(name) is process:
             self._groups[name].share_processors(1.0)
 
-    async def _answers(self, name):
+    async def _answers(self, name: str) -> bool:
         with contextlib.suppress(OSError, TimeoutError):
             async with asyncio.timeout(_PROBE_S):
                 reader, writer = await asyncio.open_unix_connection(str(self.socket_of(name)))
@@ -269,7 +278,7 @@ class Supervisor:
                     writer.close()
         return False
 
-    async def _finish(self, name, at_once=False):
+    async def _finish(self, name: str, at_once: bool = False) -> None:
         process = self._processes.get(name)
         if process is None:
             return
@@ -287,7 +296,7 @@ class Supervisor:
         await asyncio.get_running_loop().run_in_executor(None, self._groups.pop(name).remove)
         await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
-    async def _end_all(self):
+    async def _end_all(self) -> None:
         for lab in self.labs:
             self._do(self.labs.stop(lab.name, self._now()))
         if self._tasks:
@@ -298,7 +307,7 @@ class Supervisor:
         for listener in self._listeners.values():
             listener.close()
 
-    def _last_words(self, name):
+    def _last_words(self, name: str):
         """The last line of a lab's output, which inside.py writes."""
         with contextlib.suppress(OSError):
             lines = [line for line in _end_of(self._store.lab(name) / "output.txt").splitlines() if line.strip()]
@@ -306,7 +315,7 @@ class Supervisor:
                 return lines[-1].removeprefix("the lab ended: ")[:300]
         return "its processes ended"
 
-    async def _look_at_memory(self):
+    async def _look_at_memory(self) -> None:
         most = self._record.options.memory_bytes
         for name, process in list(self._processes.items()):
             group = self._groups.get(name)
@@ -322,28 +331,28 @@ class Supervisor:
             if used > most or group.has_run_out():
                 self._exceed_memory(name)
 
-    def _without_group(self, name, process):
+    def _without_group(self, name: str, process: LabProcess) -> tuple[int, str]:
         """Usage that no control group counts: (memory [bytes], why the lab is to end for something else or "")."""
         return (process.memory_bytes(self._scratch.bytes(name, process.family)),
                 too_many_sockets(process.family()))
 
-    def _exceed_memory(self, name):
+    def _exceed_memory(self, name: str) -> None:
         self._exceed(name, "it used all of its memory, %.1f GB" % (self._record.options.memory_bytes / 2**30))
 
-    def _exceed(self, name, why):
+    def _exceed(self, name: str, why: str) -> None:
         if why and self.labs[name].has_processes:
             self._do(self.labs.exceeded(name, why, self._now()))
 
-    async def _look_at_scratch(self):
+    async def _look_at_scratch(self) -> None:
         for name, process in list(self._processes.items()):
             if self.labs[name].state is not State.PAUSED:
                 self._exceed(name, self._scratch.exceeded(name, process.family))
 
-    async def _look_at_verdicts(self):
+    async def _look_at_verdicts(self) -> None:
         for name in self._processes:
             self._verdicts[name].look()
 
-    async def _look_at_disk(self):
+    async def _look_at_disk(self) -> None:
         start = self._now()
         if not self._quota.is_due(start):
             return
@@ -358,7 +367,7 @@ class Supervisor:
         self._quota.looked(start, self._now())
 
 
-def _end_of(path):
+def _end_of(path: Path) -> str:
     """The last text of a file, which may be large."""
     with open(path, "rb") as stream:
         stream.seek(0, os.SEEK_END)
@@ -366,7 +375,7 @@ def _end_of(path):
         return stream.read(_LAST_BYTES).decode(errors="replace")
 
 
-def main():
+def main() -> int:
     """Run the class of a folder until it is ended; returns the exit code."""
     parser = argparse.ArgumentParser(prog="lab_class.supervisor")
     parser.add_argument("folder")
@@ -390,7 +399,7 @@ def main():
     return 0
 
 
-async def _run(store, record, options):
+async def _run(store: Store, record: ClassRecord, options: argparse.Namespace) -> None:
     await Supervisor(store, record, options.libraries, options.page).run()
 
 

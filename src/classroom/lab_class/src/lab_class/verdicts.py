@@ -4,12 +4,18 @@
 A check runs in the student's lab and writes its result there, so nothing here is proof, and nothing there is trusted:
 the file may be a link, a pipe, or of any size.
 """
+from __future__ import annotations
+
 import contextlib
 import json
 import os
 import stat
+from typing import TYPE_CHECKING, Any
 
 from lab_web.exercises import shown_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: The result's file below a student's home (lab_web.page_files, where ROS_HOME is ~/.ros).
 RESULT = (".ros", "lab_page", "exercise.json")
@@ -24,13 +30,13 @@ POINTS = 100.0
 class Verdicts:
     """Those of one student. ``folder``: of the lab, which the student does not see [Path]; ``home``: the student's."""
 
-    def __init__(self, folder, home):
+    def __init__(self, folder: Path, home: Path) -> None:
         self._file, self._home = folder / _KEPT, home
         self._seen = None
         #: {exercise: {"points": or None where it was not graded, "passed"}}, the last one of each.
         self.known = self._kept()
 
-    def look(self):
+    def look(self) -> None:
         """Read a result that has come since the last call."""
         with contextlib.suppress(OSError, ValueError, RecursionError):
             version, text = _read(self._home, self._seen)
@@ -46,7 +52,7 @@ class Verdicts:
             draft.write_text(json.dumps(self.known), encoding="utf-8")
             draft.replace(self._file)
 
-    def _kept(self):
+    def _kept(self) -> dict[str, dict[str, Any]]:
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
             kept = json.loads(self._file.read_text(encoding="utf-8"))
             return {name: {"points": _points(one["points"]), "passed": bool(one["passed"])}
@@ -54,14 +60,14 @@ class Verdicts:
         return {}
 
 
-def _points(value):
+def _points(value: Any) -> float | None:
     """Points as a check gives them, or None for what is not graded. Raises ValueError, TypeError."""
     if value is not None and not 0.0 <= value <= POINTS:
         raise ValueError("%r are no points of a check" % value)
     return value
 
 
-def _read(home, seen):
+def _read(home: Path, seen: tuple[int, int, int] | None) -> tuple[tuple[int, int, int], str | None]:
     """(version, text) of the result's file; the text is None where the version is the one that was seen.
 
     No link is followed. Raises OSError, ValueError.

@@ -6,10 +6,13 @@ made equal. Of each WINDOW of consecutive hashes the smallest is kept (winnowing
 SIGMOD 2003), so any common passage of SPAN + WINDOW - 1 tokens is found with a fraction of the hashes. Code that was
 handed out, and code that a large part of the class shares, counts for nobody.
 """
+from __future__ import annotations
+
 import re
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 from rf_checks import similarity
 
@@ -37,14 +40,14 @@ class Pair:
     is_same: bool = False
 
 
-def winnow(hashes, window=WINDOW):
+def winnow(hashes: tuple[Any, ...], window: int = WINDOW) -> frozenset[Any]:
     """The set of the smallest hash of each `window` consecutive ones. hashes: sequence in the program's order."""
     if len(hashes) < window:
         return frozenset(hashes)
     return frozenset(min(hashes[k:k + window]) for k in range(len(hashes) - window + 1))
 
 
-def fingerprints(text):
+def fingerprints(text: str) -> frozenset[Any]:
     """The winnowed hashes of a program. What Python cannot read, such as Python 2, is compared by its plain tokens."""
     found = similarity.spans(text)
     if not found:
@@ -52,7 +55,7 @@ def fingerprints(text):
     return winnow(found)
 
 
-def pairs(texts, handed_out):
+def pairs(texts: dict[str, list[str]], handed_out: list[str]) -> list[Any]:
     """Pairs that share much, the most alike first.
 
     texts: {entry: [text of each program]}. handed_out: texts that all students have.
@@ -79,7 +82,7 @@ def pairs(texts, handed_out):
     return sorted(found, key=lambda pair: (-pair.is_same, -max(pair.of_first, pair.of_second), pair.first, pair.second))
 
 
-def _same(texts, known, found):
+def _same(texts: dict[str, list[str]], known: frozenset[bytes], found: set[Any]):
     """Pairs whose files are the same, where the fingerprints did not tell: many equal ones, or short ones.
 
     A program without own code, such as a skeleton, is nobody's.

@@ -3,6 +3,8 @@
 
 Only programs and notebooks are read; other files, such as a report or a film, are skipped by their names.
 """
+from __future__ import annotations
+
 import bz2
 import gzip
 import io
@@ -11,9 +13,14 @@ import posixpath
 import tarfile
 import zipfile
 import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from rf_checks.submission import LARGEST_BYTES
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: Endings of archives that are read, and of those that are named as archives of another kind.
 SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tbz")
@@ -55,35 +62,35 @@ class BadArchive(Exception):
     """An archive that is not read; the text says why."""
 
 
-def is_archive(name):
+def is_archive(name: str) -> bool:
     return name.lower().endswith(SUFFIXES)
 
 
-def is_other_archive(name):
+def is_other_archive(name: str) -> bool:
     return name.lower().endswith(OTHER_SUFFIXES) and not is_archive(name)
 
 
-def stem(name):
+def stem(name: str) -> str:
     """The name of an archive without its ending."""
     ending = max((suffix for suffix in SUFFIXES + OTHER_SUFFIXES if name.lower().endswith(suffix)), key=len, default="")
     return name[:len(name) - len(ending)] if ending else name
 
 
-def is_litter(name):
+def is_litter(name: str) -> bool:
     """Whether a path belongs to what systems and editors add by themselves."""
     parts = name.split("/")
     return any(part in ("__MACOSX", "__pycache__", ".ipynb_checkpoints", ".git") or part.startswith("._")
                for part in parts) or parts[-1] in (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
-def most_bytes(name):
+def most_bytes(name: str) -> int:
     """How large a file of this name may be. Notebooks hold pictures, which are not judged."""
     if is_archive(name):
         return MAX_ARCHIVE_BYTES
     return MAX_TAKEN_BYTES if name.lower().endswith(".ipynb") else LARGEST_BYTES
 
 
-def safe_name(name):
+def safe_name(name: str) -> str:
     """The normal form of a path in an archive. Raises BadArchive if it leads out of the archive's folder."""
     plain = name.replace("\\", "/")
     if plain.startswith("/") or ":" in plain.partition("/")[0] or ".." in plain.split("/") or "\0" in plain:
@@ -91,7 +98,8 @@ def safe_name(name):
     return posixpath.normpath(plain)
 
 
-def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
+def read(source: Path, name: str, is_wanted: Callable[..., Any], bounds: Bounds = OF_A_STUDENT,
+         refused: dict[str, Any] | None = None) -> tuple[dict[str, bytes], list[str]]:
     """{path in the archive: bytes} of the wanted files, and the list of the other files' paths.
 
     source: path, or bytes. name: its name, which tells the kind. is_wanted: function of a path. bounds:
@@ -107,7 +115,8 @@ def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
         raise BadArchive("is damaged and cannot be unpacked: %s" % (str(error) or type(error).__name__)) from error
 
 
-def _take(entries, is_wanted, bounds, refused):
+def _take(entries: Iterator[Any], is_wanted: Callable[[Any], bool], bounds: Bounds,
+          refused: dict[str, Any] | None) -> tuple[dict[str, bytes], list[str]]:
     taken, others, seen, size = {}, [], set(), 0
     for count, (name, problem, read_it) in enumerate(entries, 1):
         if count > bounds.entries:
@@ -142,7 +151,7 @@ def _take(entries, is_wanted, bounds, refused):
     return taken, others
 
 
-def _is_in_a_folder(name):
+def _is_in_a_folder(name: str) -> bool:
     """Whether a path begins with the name of a folder in the archive."""
     top, slash, _ = name.replace("\\", "/").partition("/")
     return bool(slash) and top not in ("", ".", "..") and not set(top) & set(":\0")
@@ -152,20 +161,20 @@ class _ListLimited:
     """A file of which no more than the list of `entries` files is read at once, until `most` is None: zipfile reads the
     whole list before it gives the first one, and needs a kilobyte of memory for each."""
 
-    def __init__(self, stream, entries):
+    def __init__(self, stream: BinaryIO, entries: int) -> None:
         self._stream, self._entries = stream, entries
         self.most = _LISTED_BYTES * entries
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> str | Callable[..., Any]:
         return getattr(self._stream, name)
 
-    def read(self, size=-1):
+    def read(self, size: int = -1) -> bytes:
         if self.most is not None and size > self.most:
             raise BadArchive("holds more than %d files, or names of unusual length" % self._entries)
         return self._stream.read(size)
 
 
-def _zip_entries(stream, bounds):
+def _zip_entries(stream: BinaryIO, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
     limited = _ListLimited(stream, bounds.entries)
     with zipfile.ZipFile(limited) as archive:
         limited.most = None
@@ -185,12 +194,12 @@ def _zip_entries(stream, bounds):
             yield path, problem, lambda info=info, path=path: _zip_content(archive, info, most_bytes(path) + 1)
 
 
-def _zip_content(archive, info, most):
+def _zip_content(archive: zipfile.ZipFile, info: zipfile.ZipInfo, most: int) -> bytes:
     with archive.open(info) as file:
         return file.read(most)
 
 
-def _zip_name(info):
+def _zip_name(info: zipfile.ZipInfo) -> str:
     """Names without the mark for UTF-8 are often UTF-8 all the same; zipfile has read them as code page 437."""
     if info.flag_bits & _UTF8_FLAG:
         return info.filename
@@ -203,13 +212,13 @@ def _zip_name(info):
 class _Limited(io.RawIOBase):
     """A stream that ends with BadArchive after `most` bytes."""
 
-    def __init__(self, stream, most):
+    def __init__(self, stream: BinaryIO, most: int) -> None:
         self._stream, self._left, self._most = stream, most, most
 
-    def readable(self):
+    def readable(self) -> bool:
         return True
 
-    def read(self, size=-1):
+    def read(self, size: int = -1) -> bytes:
         data = self._stream.read(min(size, 1 << 20) if size >= 0 else 1 << 20)
         self._left -= len(data)
         if self._left < 0:
@@ -221,14 +230,14 @@ class _TarInfo(tarfile.TarInfo):
     """An entry of a tar file; refuses descriptions that would fill the memory."""
 
     @classmethod
-    def frombuf(cls, buf, encoding, errors):
+    def frombuf(cls, buf: bytes, encoding: str, errors: str) -> tarfile.TarInfo:
         info = super().frombuf(buf, encoding, errors)
         if info.type in _DESCRIPTIONS and info.size > _MAX_DESCRIPTION_BYTES:
             raise BadArchive("holds a file name or attributes of %d bytes" % info.size)
         return info
 
 
-def _tar_entries(stream, name, bounds):
+def _tar_entries(stream: Any, name: str, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
     if name.endswith((".gz", ".tgz")):
         stream = gzip.GzipFile(fileobj=stream)
     elif name.endswith((".bz2", ".tbz2", ".tbz")):

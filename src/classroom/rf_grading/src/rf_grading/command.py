@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line of `./baxter.sh grade`."""
+from __future__ import annotations
+
 import argparse
 import contextlib
 import json
@@ -9,6 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from command_line.options import MAX_SEED, MAX_WORKERS, counted, number, seconds
 from command_line.user_files import read_file
@@ -27,6 +30,9 @@ from rf_grading import alike, archives, formats, keys, pages, plan, programs, re
 from rf_grading.ledger import Ledger, LedgerError
 from rf_grading.submissions import BadFolder, read_class
 
+if TYPE_CHECKING:
+    from lab_batch.job import Outcome
+
 GRADED, NOT_ALL_GRADED, WRONG_WORDS, FAILED, STOPPED = 0, 1, 2, 3, 130
 #: Memory of a judge with its lab, beside its program's limit [bytes].
 LAB_BYTES = 1 << 30
@@ -40,7 +46,7 @@ _TABLES = {"results.json": formats.as_json, "results.csv": formats.as_csv, "resu
 _JOB = "rf_grading.job:Grade"
 
 
-def _parser():
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="./baxter.sh grade", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Judge the submissions of a class, several at a time, each in a separate lab and sandbox.\n"
@@ -73,27 +79,27 @@ def _parser():
     return parser
 
 
-def _fail(sentence):
+def _fail(sentence: Any) -> None:
     print("grade: %s" % sentence, file=sys.stderr)
 
 
-def workers_for(processors, free_bytes):
+def workers_for(processors: int, free_bytes: int) -> int:
     """How many judges run at a time."""
     return max(1, min(processors, free_bytes // (MEMORY_BYTES + LAB_BYTES)))
 
 
-def _free_bytes():
+def _free_bytes() -> int:
     for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
         if line.startswith("MemAvailable:"):
             return int(line.split()[1]) << 10
     return MEMORY_BYTES + LAB_BYTES
 
 
-def _workspace():
+def _workspace() -> Path:
     return Path(os.environ.get("LAB_ROOT") or Path(__file__).resolve().parents[5])
 
 
-def _places(options):
+def _places(options: argparse.Namespace) -> tuple[Path, Path]:
     """(folder, out) of the options, resolved. Raises BadFolder where one lies in the other or around the workspace."""
     folder = options.folder.resolve()
     name = folder.name if folder.is_dir() else archives.stem(folder.name)
@@ -112,12 +118,12 @@ def _places(options):
 class _Grading:
     """One start of the command."""
 
-    def __init__(self, options, folder, out):
+    def __init__(self, options: argparse.Namespace, folder: Path, out: Path) -> None:
         self._options, self._folder, self._out = options, folder, out
         self._began = time.monotonic()
         self._failures = {}
 
-    def run(self):
+    def run(self) -> int:
         """Returns the exit status. Raises BadFolder, UnknownExercise, LedgerError, JobError, OSError."""
         options = self._options
         exercises = programs.exercises_of(options.lab, options.exercises)
@@ -159,7 +165,7 @@ class _Grading:
                                             tuple(pairs)), entries)
         return self._conclude(rows)
 
-    def _judge(self, todo, ledger, entries, work):
+    def _judge(self, todo: list[plan.Task], ledger: Ledger, entries: list[plan.Entry], work: Path) -> None:
         if not todo:
             return
         owners = {}
@@ -188,7 +194,7 @@ class _Grading:
                 print(formats.one_line("%d of %d: %s, %s: %s" % (
                     count, len(todo), ", ".join(owners[task.key]), task.exercise.name, said)), flush=True)
 
-    def _take(self, task, outcome, ledger):
+    def _take(self, task: plan.Task, outcome: Outcome, ledger: Ledger) -> str:
         """Keep what a worker has found; returns a sentence."""
         if not outcome.is_done:
             self._failures[task.key] = "the check itself failed, which is not the program's fault: %s" % outcome.error
@@ -201,7 +207,7 @@ class _Grading:
         ledger.add(task.key, verdict)
         return "%g points%s" % (round(verdict["points"], 1), "; " + verdict["hint"] if verdict["hint"] else "")
 
-    def _write(self, found, entries):
+    def _write(self, found: results.Results, entries: list[plan.Entry]) -> tuple[results.Row, ...]:
         """Write all reports; returns the Rows that they show."""
         out = self._out
         found = replace(found, rows=tuple(self._reported(found, row) for row in found.rows))
@@ -220,7 +226,7 @@ class _Grading:
         write_report(out / "index.html", pages.overview(found, time.monotonic() - self._began, _page_of))
         return found.rows
 
-    def _reported(self, found, row):
+    def _reported(self, found: results.Results, row: results.Row) -> results.Row:
         """A row whose reports can be written: this one, or one that says why it cannot."""
         try:
             single = replace(found, rows=(row,), alike=())
@@ -234,16 +240,16 @@ class _Grading:
             return replace(row, cells={name: results.Cell(results.NOT_GRADED, None, sentence) for name in row.cells})
         return row
 
-    def _motions_of(self, row):
+    def _motions_of(self, row: results.Row) -> dict[str, list[dict[str, list[Any]]]]:
         return {cell.key: self._motions(cell.key) for cell in row.cells.values() if cell.key}
 
-    def _motions(self, key):
+    def _motions(self, key: str) -> list[dict[str, list[Any]]]:
         try:
             return json.loads((self._out / "motions" / (key + ".json")).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return []
 
-    def _conclude(self, rows):
+    def _conclude(self, rows: tuple[results.Row, ...]) -> int:
         missing = [row for row in rows if row.status == results.NOT_GRADED]
         for row in missing:
             print(formats.one_line("%s: %s" % (row.submission.entry, "; ".join(row.sentences))))
@@ -253,15 +259,15 @@ class _Grading:
         return NOT_ALL_GRADED if missing else GRADED
 
 
-def _page_of(row):
+def _page_of(row: results.Row) -> str:
     return "feedback/%s/feedback.html" % row.submission.entry
 
 
-def _stop(*_):
+def _stop(*_: object) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     """Returns the exit status."""
     parser = _parser()
     options = parser.parse_args(argv)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A run of the robot as a moving picture in SVG, which any browser plays without scripts. Free of ROS."""
+from __future__ import annotations
+
 import html
+from typing import Any
 
 #: View -> (its title, coordinates of a point that go right and up on the page, with their signs).
 VIEWS = {"from above": ((1, -1), (0, 1)), "from the front": ((1, 1), (2, 1))}
@@ -12,7 +15,7 @@ _SHORTEST_S = 1.0
 _MARGIN, _TITLE = 8, 18
 
 
-def of_run(motion):
+def of_run(motion: dict[str, list[Any]]) -> str:
     """The SVG text of motion.of_run()'s data; "" for a run without records."""
     if not motion:
         return ""
@@ -28,19 +31,19 @@ def of_run(motion):
                html.escape("both arms during the run of %.1f s" % motion["times"][-1]), "".join(parts)))
 
 
-def _height(title):
+def _height(title: str) -> int:
     return round((_UP[title][1] - _UP[title][0]) * _PIXELS_PER_MM)
 
 
-def _view(title, motion, lasts):
+def _view(title: str, motion: dict[str, list[Any]], lasts: float) -> str:
     """Both arms in one view: at the start in grey, moving, and the hands' paths."""
     (right, right_sign), (up, up_sign) = VIEWS[title]
 
-    def place(point):
+    def place(point: list[int]) -> tuple[int, int]:
         return (round((right_sign * point[right] - _RIGHT[0]) * _PIXELS_PER_MM),
                 round((_UP[title][1] - up_sign * point[up]) * _PIXELS_PER_MM) + _TITLE)
 
-    def line(points):
+    def line(points: list[list[int]]) -> str:
         return " ".join("%d,%d" % place(point) for point in points)
 
     width = round((_RIGHT[1] - _RIGHT[0]) * _PIXELS_PER_MM)

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results in the forms that other programs read: CSV, JUnit, nbgrader's export of grades, Gradescope. Free of ROS."""
+from __future__ import annotations
+
 import csv
 import io
 import json
 import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from rf_grading.results import GRADED, NOT_GRADED, POINTS, as_data, held_back
+
+if TYPE_CHECKING:
+    from rf_grading.results import Results, Row
 
 #: The columns that nbgrader's own export of grades has.
 NBGRADER_COLUMNS = ("assignment", "duedate", "timestamp", "student_id", "last_name", "first_name", "email", "raw_score",
@@ -16,25 +23,25 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def plain(text):
+def plain(text: str) -> str:
     """A text without characters that files in UTF-8 and XML cannot hold; each becomes a question mark."""
     return _NO_XML.sub("?", str(text))
 
 
-def one_line(text):
+def one_line(text: str) -> str:
     """As :func:`plain`, for a terminal: a name with a line's end does not pretend to be another line."""
     return " ".join(plain(text).split())
 
 
-def _points(value):
+def _points(value: float | None) -> str:
     return "" if value is None else "%g" % round(value, 2)
 
 
-def as_json(results):
+def as_json(results: Results) -> str:
     return json.dumps(as_data(results), indent=1) + "\n"
 
 
-def _table(header, rows):
+def _table(header: Sequence[str], rows: Iterable[Any]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(header)
@@ -44,7 +51,7 @@ def _table(header, rows):
     return stream.getvalue()
 
 
-def _is_number(text):
+def _is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
@@ -52,7 +59,7 @@ def _is_number(text):
     return True
 
 
-def as_csv(results):
+def as_csv(results: Results) -> str:
     """A line for each student: points in each exercise, their sum, the reasons for lost points, notes."""
     names = [exercise.name for exercise in results.exercises]
     return _table(["entry", "student", "name", "email", "status", *names, "points", "of", "reasons", "notes"], (
@@ -61,9 +68,9 @@ def as_csv(results):
          " / ".join(row.sentences), " / ".join("%s: %s" % one for one in row.notes)] for row in results.rows))
 
 
-def as_nbgrader(results):
+def as_nbgrader(results: Results) -> str:
     """The form of `nbgrader export`: a line for each student. A student without grade has an empty score."""
-    def line(row):
+    def line(row: Row) -> list[str]:
         first, _, last = row.submission.name.rpartition(" ")
         score = _points(row.points)
         return [results.assignment, "", "", row.submission.student, last, first, row.submission.email, score, "0",
@@ -72,7 +79,7 @@ def as_nbgrader(results):
     return _table(NBGRADER_COLUMNS, map(line, results.rows))
 
 
-def as_junit(results):
+def as_junit(results: Results) -> str:
     """A suite for each exercise, a case for each student."""
     top = ElementTree.Element("testsuites", name=plain(results.assignment))
     for exercise in results.exercises:
@@ -95,14 +102,14 @@ def as_junit(results):
     return ElementTree.tostring(top, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _criteria(run):
+def _criteria(run: dict[str, Any]) -> str:
     lines = ["%s: %g of %g (%s)" % (one["name"], round(one["points"], 2), round(one["of"], 2), one["found"])
              for one in run["criteria"]]
     said = held_back(run)
     return "\n".join([*lines, "%g points%s" % (round(run["points"], 1), said)] if said else lines)
 
 
-def hundredths(points, total):
+def hundredths(points: list[float], total: float) -> list[tuple[int, int]]:
     """[(score, most)] of each run in hundredths of a point, which add up to ``total`` and to POINTS exactly.
 
     points: of each run, 0 to POINTS; total: their mean. The hundredths that are left when POINTS are shared equally go
@@ -127,7 +134,7 @@ def hundredths(points, total):
     return list(zip(scores, most, strict=True))
 
 
-def as_gradescope(row):
+def as_gradescope(row: Row) -> str:
     """One student's results.json: a test for each run, with the points that count.
 
     Has no notes for the instructor: students read it. One that is not graded has no score anywhere: else Gradescope

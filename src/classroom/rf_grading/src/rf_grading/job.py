@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The job of each worker: one judge, which has a separate lab for each program."""
+from __future__ import annotations
+
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from lab_batch import Job
 from processes import isolation
 from rf_grading import motion
+
+if TYPE_CHECKING:
+    from rf_checks.judge import Judge
 
 #: Bytes of a program's output and of its errors that the feedback shows: the end of each.
 SHOWN = 3000
@@ -14,13 +21,14 @@ SHOWN = 3000
 class Grade(Job):
     """Episode k judges the k-th task of a list; its result is {"verdict": ..., "motions": one for each run}."""
 
-    def __init__(self, tasks="", wall_limit=900.0, trusted=False, hidden=()):
+    def __init__(self, tasks: str = "", wall_limit: float = 900.0, trusted: bool = False,
+                 hidden: Sequence[str] = ()) -> None:
         """tasks: a JSON file, list of {"lab", "exercise", "program", "seed", "profile", "serial"}. wall_limit: of a
         check [s]. trusted: judge without sandboxes where the machine allows none. hidden: folders that no program may
         see."""
         self._tasks, self._wall_limit, self._trusted, self._hidden = tasks, wall_limit, trusted, tuple(hidden)
 
-    def start(self):
+    def start(self) -> None:
         isolation.try_to_enter_network()
         # Not before: the kernel lets only a process without further threads enter a user namespace.
         from rf_checks.exercises import EXERCISES
@@ -33,7 +41,7 @@ class Grade(Job):
         # Tells now, not at the first task, that this machine allows no sandbox.
         self._judge_of("sim", 0)
 
-    def _judge_of(self, profile, serial):
+    def _judge_of(self, profile: str, serial: int) -> Judge:
         from rf_checks.lab import WhichRobot
 
         if (profile, serial) not in self._judges:
@@ -41,7 +49,7 @@ class Grade(Job):
                 self._wall_limit, self._trusted, WhichRobot(profile, serial), self._hidden)
         return self._judges[profile, serial]
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         from rf_checks import report
 
         task = self._tasks[seed]
@@ -59,10 +67,10 @@ class Grade(Job):
         return {"verdict": verdict, "motions": [
             motion.of_run(one.trace.recording, judge.robot) if one.trace else {} for one in result.runs]}
 
-    def end(self):
+    def end(self) -> None:
         for judge in self._judges.values():
             judge.close()
 
 
-def _end(text):
+def _end(text: str):
     return text if len(text) <= SHOWN else "...\n" + text[-SHOWN:]

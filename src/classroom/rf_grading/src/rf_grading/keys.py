@@ -4,15 +4,21 @@
 A verdict is used again as long as its key is the same: the program with the modules that it imports, the exercise, the
 seed, the robot, and the product's version.
 """
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 import platform
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from rf_checks import handout
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
 
 _JUDGE = "rf_checks"
 #: Libraries that change what a simulation computes.
@@ -21,7 +27,7 @@ _PAGES = (".md", ".rst", ".pyc", ".ipynb", ".png", ".jpg")
 _NO_PART = frozenset(("test", "tests", "__pycache__", "node_modules", "docs"))
 
 
-def packages_of(workspace):
+def packages_of(workspace: Path) -> dict[str, tuple[Path, set[str]]]:
     """{package name: (its folder, names that its package.xml depends on)} below the workspace's src."""
     found = {}
     for folder, below, names in os.walk(Path(workspace) / "src", followlinks=False):
@@ -37,7 +43,7 @@ def packages_of(workspace):
     return found
 
 
-def judges_packages(workspace):
+def judges_packages(workspace: Path) -> list[Path]:
     """Folders of the packages that a verdict depends on: the judge's, and those that it needs, sorted by name."""
     known, found, to_do = packages_of(workspace), {}, [_JUDGE]
     while to_do:
@@ -48,7 +54,7 @@ def judges_packages(workspace):
     return [found[name] for name in sorted(found)]
 
 
-def product_version(workspace):
+def product_version(workspace: Path) -> str:
     """16 hexadecimal digits: the same for the same judge, simulator and libraries, in a students' copy, too."""
     workspace = Path(workspace).resolve()
     digest = hashlib.sha256()
@@ -63,7 +69,7 @@ def product_version(workspace):
     return digest.hexdigest()[:16]
 
 
-def _files(folder):
+def _files(folder: Path) -> list[Path]:
     found = []
     for place, below, names in os.walk(folder):
         below[:] = [name for name in below if name not in _NO_PART and not name.startswith(".")]
@@ -71,7 +77,7 @@ def _files(folder):
     return sorted(found)
 
 
-def _machine():
+def _machine() -> dict[str, str | None]:
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for name in _LIBRARIES:
         try:
@@ -81,7 +87,7 @@ def _machine():
     return found
 
 
-def key(version, exercise, conditions, name, files):
+def key(version: str, exercise: Exercise, conditions: dict[str, Any], name: str, files: dict[str, bytes]) -> str:
     """The key of one verdict, 32 hexadecimal digits.
 
     exercise: an Exercise. conditions: {"seed", "profile", "serial"}. name: of the program. files: {path: bytes} of the

@@ -3,10 +3,13 @@
 
 A line counts when it is whole: what a crash has cut off is dropped, and judged again.
 """
+from __future__ import annotations
+
 import fcntl
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 
 class LedgerError(Exception):
@@ -16,7 +19,7 @@ class LedgerError(Exception):
 class Ledger:
     """verdicts: {key: verdict}, the newest of each key. A context manager. Raises LedgerError, OSError."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         self._path = Path(path)
         flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC
         self._stream = os.fdopen(os.open(self._path, flags, 0o644), "r+b")
@@ -32,13 +35,13 @@ class Ledger:
             self._stream.close()
             raise
 
-    def __enter__(self):
+    def __enter__(self) -> Ledger:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: Any) -> None:
         self._stream.close()
 
-    def _read(self):
+    def _read(self) -> dict[str, dict[str, Any]]:
         data = self._stream.read()
         whole = data.rfind(b"\n") + 1
         found = {}
@@ -53,7 +56,7 @@ class Ledger:
             self._stream.truncate(whole)
         return found
 
-    def add(self, key, verdict):
+    def add(self, key: str, verdict: dict[str, Any]) -> None:
         """Write one verdict (a dict that JSON can hold), and keep it."""
         line = json.dumps({"key": key, "verdict": verdict}, allow_nan=False).encode() + b"\n"
         self._stream.write(line)

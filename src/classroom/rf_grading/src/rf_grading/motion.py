@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's motion in a run, small enough for a page: points of both arms over time. Free of ROS."""
+from __future__ import annotations
+
+from typing import Any
+
 from baxter_model import SIDES
 
 #: Links of an arm that are drawn, from shoulder to hand.
@@ -8,7 +12,7 @@ LINKS = ("upper_shoulder", "upper_elbow", "upper_forearm", "wrist", "gripper")
 MAX_FRAMES = 60
 
 
-def of_run(recording, robot):
+def of_run(recording: Any, robot: Any) -> dict[Any, Any] | dict[str, list[Any]]:
     """{"times": [s, ...], "left": frames, "right": frames} of a rf_checks Recording; {} for one without records.
 
     A frame is [[x, y, z] of each of LINKS], in `base`, in whole mm. robot: a rf_checks Robot.

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pages in HTML: one for each student, one for the instructor. Free of ROS, without scripts and outside references."""
+from __future__ import annotations
+
 import html
 import os
 import shlex
 import statistics
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from command_line.options import counted
 from rf_grading import drawing
 from rf_grading.formats import plain
 from rf_grading.results import GRADED, NOT_GRADED, POINTS, held_back
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
+    from rf_grading.results import Cell, Results, Row
 
 _STYLE = """
 :root { color-scheme: light dark; --text: #1c1f22; --page: #fff; --small: #5b6167; --line: #e3e6e8; --box: #f2f3f4;
@@ -40,32 +48,32 @@ _PAGE = """<!doctype html>
 """
 
 
-def _text(value):
+def _text(value: str) -> str:
     return html.escape(plain(value))
 
 
-def _page(title, parts):
+def _page(title: str, parts: list[str]) -> str:
     return _PAGE % {"title": _text(title), "style": _STYLE, "body": "\n".join(parts)}
 
 
-def _points(value):
+def _points(value: float | None) -> str:
     return "not graded" if value is None else "%g" % round(value, 1)
 
 
-def _class_of(cell):
+def _class_of(cell: Cell) -> str:
     if cell.status == NOT_GRADED:
         return "open"
     return "passed" if cell.has_passed else "failed"
 
 
-def link_to(path):
+def link_to(path: str) -> str:
     """The address of a file below the page's folder. path: text as from os.listdir."""
     return "/".join(quote(os.fsencode(part)) for part in path.split("/"))
 
 
 # -- a student's page
 
-def feedback(results, row, motions):
+def feedback(results: Results, row: Row, motions: dict[str, list[dict[str, list[Any]]]]) -> str:
     """The page of one student; it has nothing of other students, and no notes for the instructor.
 
     motions: {key: [motion of each run]}.
@@ -81,7 +89,8 @@ def feedback(results, row, motions):
     return _page("%s: %s" % (results.assignment, who), parts)
 
 
-def _exercise(results, exercise, cell, motions):
+def _exercise(results: Results, exercise: Exercise, cell: Cell,
+              motions: dict[str, list[dict[str, list[Any]]]]) -> Iterator[str]:
     yield "<h2>%s: %s</h2>" % (_text(exercise.name), _text(exercise.title))
     yield '<p><b class="%s">%s of %g points</b></p>' % (_class_of(cell), _points(cell.points), POINTS)
     if cell.sentence:
@@ -106,7 +115,7 @@ def _exercise(results, exercise, cell, motions):
     yield "<pre>%s</pre>" % _text(_command(results, exercise, cell))
 
 
-def _criteria(run):
+def _criteria(run: dict[str, Any]) -> str:
     rows = "".join('<tr><td>%s</td><td class="n">%g</td><td class="n">%g</td><td>%s</td></tr>' % (
         _text(one["name"]), round(one["points"], 1), round(one["of"], 1), _text(one["found"]))
         for one in run["criteria"])
@@ -118,7 +127,7 @@ def _criteria(run):
             "<p>%g points for this run%s.</p>%s" % (rows, round(run["points"], 1), _text(held_back(run)), end))
 
 
-def _command(results, exercise, cell):
+def _command(results: Results, exercise: Exercise, cell: Cell) -> str:
     words = ["./baxter.sh", "check", exercise.lab, exercise.name, cell.program]
     for name, usual in (("seed", 0), ("profile", "sim"), ("serial", 0)):
         if results.conditions[name] != usual:
@@ -128,7 +137,7 @@ def _command(results, exercise, cell):
 
 # -- the instructor's page
 
-def overview(results, seconds, feedback_of):
+def overview(results: Results, seconds: float | None, feedback_of: Callable[..., Any]) -> str:
     """The instructor's page. seconds: how long this start took, or None. feedback_of: function of a Row, the path of
     the student's page."""
     graded = [row.points for row in results.rows if row.points is not None]
@@ -157,7 +166,7 @@ def overview(results, seconds, feedback_of):
     return _page("%s: the class" % results.assignment, parts)
 
 
-def _histogram(points, most):
+def _histogram(points: list[float], most: float) -> str:
     counts = [0] * 10
     for value in points:
         counts[min(9, int(10 * value / most))] += 1
@@ -167,7 +176,7 @@ def _histogram(points, most):
     return "<table>%s</table>" % rows
 
 
-def _submissions(results, feedback_of):
+def _submissions(results: Results, feedback_of: Callable[[Any], Any]) -> str:
     head = "".join('<th class="n">%s</th>' % _text(exercise.name) for exercise in results.exercises)
     # Folders and files without a learning system's names have none.
     named = any(row.submission.name for row in results.rows)
@@ -184,7 +193,7 @@ def _submissions(results, feedback_of):
             % ("<th>name</th>" if named else "", head, "".join(lines)))
 
 
-def _faults(results):
+def _faults(results: Results) -> str:
     found = {}
     for row in results.rows:
         for name, cell in row.cells.items():
@@ -200,7 +209,7 @@ def _faults(results):
                 for (name, what), sentences in sorted(found.items(), key=lambda one: (-len(one[1]), one[0]))))
 
 
-def _alike(results, feedback_of):
+def _alike(results: Results, feedback_of: Callable[[Any], Any]) -> Iterator[str]:
     if not results.alike:
         yield "<p>None share half of their own code.</p>"
         return

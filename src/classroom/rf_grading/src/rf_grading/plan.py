@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The tasks of a grading: one for each program of each submission, its files laid out in a folder. Free of ROS."""
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rf_checks import submission as files_of_programs
 from rf_grading import keys, programs, reading
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
+    from rf_grading.submissions import Submission
 
 
 @dataclass(frozen=True)
@@ -12,7 +19,7 @@ class Task:
     """One verdict to be found. program: path of the laid-out program."""
 
     key: str
-    exercise: object
+    exercise: Exercise
     program: str
 
 
@@ -24,7 +31,7 @@ class Entry:
     text} of its programs.
     """
 
-    submission: object
+    submission: Submission
     keys: dict = field(default_factory=dict)
     problems: dict = field(default_factory=dict)
     paths: dict = field(default_factory=dict)
@@ -32,7 +39,8 @@ class Entry:
     texts: dict = field(default_factory=dict)
 
 
-def make(submissions, exercises, version, conditions, folder, only_used=False):
+def make(submissions: list[Submission], exercises: list[Exercise], version: str, conditions: dict[str, Any],
+         folder: Path, only_used: bool = False) -> tuple[list[Exercise], list[Entry], dict[str, Task]]:
     """(exercises, entries, {key: Task}) for Submissions.
 
     conditions: {"seed", "profile", ...} of every verdict. folder: an empty one for the programs. only_used: leave out
@@ -71,7 +79,7 @@ def make(submissions, exercises, version, conditions, folder, only_used=False):
     return exercises, entries, tasks
 
 
-def _assigned(one, exercises):
+def _assigned(one: Submission, exercises: list[Exercise]) -> dict[Exercise, programs.NoProgram | programs.Program]:
     """{exercise: Program, or NoProgram} of a Submission; {}, and it is refused, where its programs cannot be read."""
     if not one.files:
         return {}
@@ -86,7 +94,7 @@ def _assigned(one, exercises):
         return {}
 
 
-def _lay_out(files, folder):
+def _lay_out(files: dict[str, bytes], folder: Path) -> Path:
     for path, content in files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +102,7 @@ def _lay_out(files, folder):
     return folder
 
 
-def _shorter(error, folder, number):
+def _shorter(error: Exception, folder: Path, number: int) -> str:
     if isinstance(error, OSError | files_of_programs.BadSubmission):
         text = "%s" % (getattr(error, "strerror", None) or error)
     else:

@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which file of a submission is the program for which exercise; programs out of notebooks. Free of ROS."""
+from __future__ import annotations
+
 import ast
 import json
 import posixpath
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from command_line.options import did_you_mean
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.submission import LARGEST_BYTES, decoded, imported
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
 
 _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
 #: Lines of cells that are for the notebook alone.
@@ -35,7 +42,7 @@ class Program:
     note: str = ""
 
 
-def exercises_of(lab="", names=()):
+def exercises_of(lab: str = "", names: Sequence[str] = ()) -> list[Exercise]:
     """The Exercises of a lab ("": of all) with these names (none: all). Raises UnknownExercise."""
     known = [exercise for exercise in EXERCISES if lab in ("", exercise.lab)]
     if not known:
@@ -48,7 +55,7 @@ def exercises_of(lab="", names=()):
     return [exercise for exercise in known if not names or exercise.name in names]
 
 
-def with_notebooks_as_programs(files):
+def with_notebooks_as_programs(files: dict[str, bytes]) -> tuple[dict[str, bytes], dict[str, str]]:
     """(files, notes): notebooks as programs beside them, and {path: note} of these programs.
 
     A notebook that cannot be read is left out, and its path has a sentence among the notes.
@@ -76,7 +83,7 @@ def with_notebooks_as_programs(files):
     return found, notes
 
 
-def program_of_notebook(content):
+def program_of_notebook(content: bytes) -> str:
     """The code cells of a notebook (bytes) as one program; its own commands (%magic, !shell) become comments.
 
     Raises TooLarge; ValueError, KeyError, TypeError, AttributeError for anything that is no notebook.
@@ -89,7 +96,7 @@ def program_of_notebook(content):
     return "\n\n".join(_plain(text) for text in texts) + "\n"
 
 
-def _plain(text):
+def _plain(text: str) -> str:
     """A cell without the notebook's own commands. In a cell that is Python, a line like %d in a text stays."""
     try:
         ast.parse(text)
@@ -101,7 +108,7 @@ def _plain(text):
     return _OF_NOTEBOOKS.sub(r"\1pass  # \2", text)
 
 
-def assign(files, exercises):
+def assign(files: dict[str, bytes], exercises: list[Exercise]) -> dict[Exercise, NoProgram | Program]:
     """{exercise: Program, or NoProgram with the reason} of a submission's files, for a list of Exercises."""
     files, notes = with_notebooks_as_programs(files)
     modules = _modules(files)
@@ -119,7 +126,8 @@ def assign(files, exercises):
             for exercise, paths in found.items()}
 
 
-def _one_of(paths, exercise, files, notes, reasons):
+def _one_of(paths: list[str], exercise: Exercise, files: dict[str, bytes], notes: dict[str, Any],
+            reasons: list[Any]) -> NoProgram | Program:
     if len(paths) > 1 and len({files[path] for path in paths}) > 1:
         return NoProgram("%d different files are for %s: %s; send one" % (
             len(paths), exercise.name, ", ".join(sorted(paths))))
@@ -129,7 +137,7 @@ def _one_of(paths, exercise, files, notes, reasons):
     return Program(path, files, notes.get(path, ""))
 
 
-def _exercise_of(path, content, exercises, alone):
+def _exercise_of(path: str, content: bytes, exercises: list[Exercise], alone: bool) -> tuple[Exercise | None, str]:
     """(the Exercise that a file is for, or None; the exercise that it names itself, or "")."""
     text = decoded(content)
     mark = _MARK.search(text)
@@ -156,7 +164,7 @@ def _exercise_of(path, content, exercises, alone):
     return (exercises[0], "") if len(exercises) == 1 and _OF_PROGRAMS.search(text) else (None, "")
 
 
-def _modules(files):
+def _modules(files: dict[str, bytes]) -> set[str]:
     """Paths of files that another file beside them imports."""
     found = set()
     for path, content in files.items():

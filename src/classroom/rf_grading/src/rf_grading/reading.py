@@ -5,16 +5,22 @@ Python's own parser takes minutes, gigabytes, or ends the process, for some text
 one string with a hundred thousand replacement fields; so do readers of archives. The process that grades a class must
 survive them all.
 """
+from __future__ import annotations
+
 import ctypes
 import os
 import pickle
 import resource
 import signal
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from rf_checks import diagnosis, similarity
 from rf_checks.submission import decoded
 from rf_grading import alike, programs
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
 
 #: Processor time for all programs of a submission [s]; a megabyte of ordinary code takes half of it.
 CPU_S = 30
@@ -30,7 +36,8 @@ class NotRead(Exception):
     """A submission needs more than it may have, or ends the process that reads it; the text says which."""
 
 
-def limited(function: Callable, *arguments, cpu_s: int = CPU_S, memory_bytes: int = MEMORY_BYTES):
+def limited(function: Callable, *arguments: Any, cpu_s: int = CPU_S,
+            memory_bytes: int = MEMORY_BYTES) -> Any:
     """``function(*arguments)`` in a separate process: returns its result, or raises its exception; both are pickled.
 
     Raises NotRead.
@@ -61,7 +68,7 @@ def limited(function: Callable, *arguments, cpu_s: int = CPU_S, memory_bytes: in
     raise NotRead("it ends the process that reads it; an expression in it may be nested too deeply for Python")
 
 
-def _work(answer_end, function, arguments, cpu_s, memory_bytes):
+def _work(answer_end: Any, function: Callable, arguments: Any, cpu_s: int, memory_bytes: int) -> None:
     """The separate process: answer, and end."""
     status = _FAILED
     try:
@@ -89,7 +96,7 @@ def _work(answer_end, function, arguments, cpu_s, memory_bytes):
         os._exit(status)
 
 
-def _memory(name):
+def _memory(name: str):
     """One of the amounts in /proc/self/status [bytes]."""
     with open("/proc/self/status", encoding="ascii", errors="replace") as file:
         return next(int(line.split()[1]) << 10 for line in file if line.startswith(name + ":"))
@@ -111,7 +118,7 @@ def unforeseen(error: Exception) -> str:
     return "%s: %s" % (type(error).__name__, error) if str(error) else type(error).__name__
 
 
-def _read_all(files, exercises):
+def _read_all(files: dict[str, bytes], exercises: list[Exercise]) -> None:
     """Do all that reads the programs of a submission."""
     programs.assign(files, exercises)
     for name, content in programs.with_notebooks_as_programs(files)[0].items():

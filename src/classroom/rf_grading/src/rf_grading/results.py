@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The results of a class as plain data: from submissions and verdicts to one table. Free of ROS."""
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
+    from rf_grading.plan import Entry
+    from rf_grading.submissions import Submission
 
 #: The points of one exercise.
 POINTS = 100.0
@@ -24,11 +32,11 @@ class Cell:
     verdict: dict | None = None
 
     @property
-    def has_passed(self):
+    def has_passed(self) -> bool:
         return bool(self.verdict and self.verdict["passed"])
 
 
-def held_back(run):
+def held_back(run: dict[str, Any]) -> str:
     """The words behind the points of a verdict's run whose fault costs more than its criteria, or ""."""
     total = sum(one["points"] for one in run["criteria"])
     return ", and not %g, because of the fault" % round(total, 1) if total - run["points"] > 0.05 else ""
@@ -38,27 +46,27 @@ def held_back(run):
 class Row:
     """One student: a Submission, and {exercise's name: Cell}."""
 
-    submission: object
+    submission: Submission
     cells: dict
 
     @property
-    def points(self):
+    def points(self) -> float | None:
         """The sum over the exercises; None where one is not graded."""
         found = [cell.points for cell in self.cells.values()]
         return None if None in found else sum(found)
 
     @property
-    def status(self):
+    def status(self) -> str:
         statuses = [cell.status for cell in self.cells.values()]
         return next((one for one in (NOT_GRADED, GRADED) if one in statuses), NO_PROGRAM)
 
     @property
-    def sentences(self):
+    def sentences(self) -> list[str]:
         """The reasons for lost points, each once."""
         return list(dict.fromkeys(cell.sentence for cell in self.cells.values() if cell.sentence))
 
     @property
-    def notes(self):
+    def notes(self) -> list[Any]:
         """[(exercise's name, note for the instructor)]."""
         return [(name, note) for name, cell in self.cells.items()
                 for note in (*([cell.note] if cell.note else ()), *(cell.verdict or {}).get("notes", ()))]
@@ -78,17 +86,18 @@ class Results:
     alike: tuple = ()
 
     @property
-    def most_points(self):
+    def most_points(self) -> float:
         return POINTS * len(self.exercises)
 
 
-def rows_of(entries, exercises, verdicts, failures):
+def rows_of(entries: list[Entry], exercises: list[Exercise], verdicts: dict[str, dict[str, Any]],
+            failures: dict[str, str]) -> tuple[Row, ...]:
     """Rows of plan.Entries. verdicts: {key: verdict}; failures: {key: why there is none}."""
     return tuple(Row(entry.submission, {one.name: _cell(entry, one.name, verdicts, failures) for one in exercises})
                  for entry in entries)
 
 
-def _cell(entry, name, verdicts, failures):
+def _cell(entry: Entry, name: str, verdicts: dict[str, dict[str, Any]], failures: dict[str, str]) -> Cell:
     if name in entry.problems:
         return Cell(NO_PROGRAM, 0.0, entry.problems[name])
     key, path, note = entry.keys[name], entry.paths[name], entry.notes[name]
@@ -98,7 +107,7 @@ def _cell(entry, name, verdicts, failures):
     return Cell(GRADED, verdict["points"], verdict["hint"] or "", path, note, key, verdict)
 
 
-def as_data(results):
+def as_data(results: Results) -> dict[str, Any]:
     """The results as {name: value that JSON can hold}."""
     return {
         "assignment": results.assignment, "version": results.version, **results.conditions,

@@ -4,9 +4,12 @@
 A folder, or an archive of it, with for each student a folder, an archive, or files: as Moodle, nbgrader and Gradescope
 write them, or by hand. Nothing in it is trusted: no link is followed, and what cannot be read becomes a sentence.
 """
+from __future__ import annotations
+
 import os
 import re
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,15 +52,16 @@ class Submission:
     others: list = field(default_factory=list)
     problem: str = ""
 
-    def refuse(self, sentence):
+    def refuse(self, sentence: str) -> None:
         self.problem, self.files = self.problem or sentence, {}
 
 
-def is_program(name):
+def is_program(name: str) -> bool:
     return name.lower().endswith(PROGRAMS)
 
 
-def read_class(path, exercise_names=(), assignment=""):
+def read_class(path: Path, exercise_names: Sequence[str] = (),
+               assignment: str = "") -> tuple[list[Submission], list[str]]:
     """(submissions sorted by entry, names at the top that belong to no student) of a folder or an archive (path).
 
     exercise_names: endings of files that are no part of a student's name, as in li_wave.py. assignment: nbgrader's;
@@ -79,7 +83,8 @@ def read_class(path, exercise_names=(), assignment=""):
     return sorted(collected.values(), key=lambda one: one.entry), left_out
 
 
-def _sort_in(top, name, collected, left_out, exercise_names):
+def _sort_in(top: _Folder | _Archive, name: str, collected: dict[str, Submission], left_out: list[str],
+             exercise_names: Sequence[str]) -> None:
     """Add what an entry at the top holds to the student's Submission; make it where it is new."""
     moodle = _MOODLE.fullmatch(name)
     is_folder = top.is_folder(name)
@@ -132,13 +137,13 @@ def _sort_in(top, name, collected, left_out, exercise_names):
         one.files.update(files)
 
 
-def _shortened(entry):
+def _shortened(entry: str) -> str:
     """A name that a folder can have, also with a number behind it."""
     return os.fsencode(entry)[:_MAX_NAME_BYTES].decode(errors="ignore") if (
         len(os.fsencode(entry)) > _MAX_NAME_BYTES) else entry
 
 
-def _without_exercise(stem, exercise_names):
+def _without_exercise(stem: str, exercise_names: Sequence[str]) -> str:
     for name in sorted(exercise_names, key=len, reverse=True):
         found = re.fullmatch(r"(.+?)[\s_.-]+%s" % re.escape(name), stem, re.IGNORECASE)
         if found:
@@ -146,7 +151,7 @@ def _without_exercise(stem, exercise_names):
     return stem
 
 
-def _unpacked(files, others):
+def _unpacked(files: dict[str, bytes], others: list[str]) -> tuple[dict[str, bytes], list[str]]:
     """(files, others) with what the archives among the files hold in their places. Raises BadSubmission."""
     found, others = {}, list(others)
     for path, content in files.items():
@@ -164,14 +169,14 @@ def _unpacked(files, others):
     return found, others
 
 
-def _limit(files):
+def _limit(files: dict[str, bytes]) -> None:
     """Raises BadSubmission where {path: bytes} of programs are too many or too large."""
     if len(files) > archives.MAX_FILES or sum(map(len, files.values())) > archives.MAX_TAKEN_BYTES:
         raise files_of_programs.BadSubmission("the submission holds more than %d programs, or %d MiB of them" % (
             archives.MAX_FILES, archives.MAX_TAKEN_BYTES >> 20))
 
 
-def _finish(one, assignment):
+def _finish(one: Submission, assignment: str) -> None:
     """Keep what belongs to the assignment, and refuse a submission without programs."""
     if assignment:
         one.files = {path: content for path, content in one.files.items() if path.startswith(assignment + "/")}
@@ -187,7 +192,7 @@ def _finish(one, assignment):
         one.refuse("the submission is empty")
 
 
-def _name_by_gradescope(top, collected):
+def _name_by_gradescope(top: _Folder | _Archive, collected: dict[str, Submission]) -> None:
     """Names and numbers from Gradescope's list, where there is one."""
     try:
         listed = yaml.safe_load(top.text(_GRADESCOPE) or "") or {}
@@ -206,25 +211,25 @@ def _name_by_gradescope(top, collected):
 class _Folder:
     """A folder of submissions on disk."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         self._path = path
 
-    def names(self):
+    def names(self) -> list[str]:
         return sorted(os.listdir(self._path))
 
-    def is_folder(self, name):
+    def is_folder(self, name: str) -> bool:
         return stat.S_ISDIR((self._path / name).lstat().st_mode)
 
-    def is_link(self, name):
+    def is_link(self, name: str) -> bool:
         return (self._path / name).is_symlink()
 
-    def text(self, name):
+    def text(self, name: str) -> str:
         path = self._path / name
         if path.is_symlink() or not path.is_file() or path.stat().st_size > _MAX_METADATA_BYTES:
             return ""
         return path.read_text(encoding="utf-8", errors="replace")
 
-    def read(self, name):
+    def read(self, name: str) -> tuple[dict[str, bytes], list[str]]:
         """(files, others) below an entry. Raises BadArchive, BadSubmission, OSError."""
         path = self._path / name
         if archives.is_archive(name) and path.is_file() and not path.is_symlink():
@@ -234,11 +239,11 @@ class _Folder:
         return _walk(path)
 
 
-def _walk(top):
+def _walk(top: Path) -> tuple[dict[str, bytes], list[str]]:
     """(files, others) of a folder on disk; a link in it is refused."""
     files, packed, others = {}, {}, []
 
-    def give_up(error):
+    def give_up(error: BaseException):
         raise error
 
     for folder, below, names in os.walk(top, onerror=give_up):
@@ -269,7 +274,7 @@ def _walk(top):
     return {**files, **packed}, others
 
 
-def _content(path, relative):
+def _content(path: Path, relative: str) -> bytes:
     if archives.is_archive(path.name):
         if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > archives.MAX_ARCHIVE_BYTES:
             raise files_of_programs.BadSubmission("%s is no archive of at most %d MiB" % (
@@ -285,8 +290,8 @@ def _content(path, relative):
 class _Archive:
     """An archive of a whole class, as platforms export it."""
 
-    def __init__(self, path):
-        def is_wanted(name):
+    def __init__(self, path: Path) -> None:
+        def is_wanted(name: str) -> bool:
             return is_program(name) or archives.is_archive(name) or name.rpartition("/")[2] == _GRADESCOPE
 
         refused = {}
@@ -307,22 +312,22 @@ class _Archive:
         self._others = [name[len(around):] for name in others]
         self._refused = {name[len(around):]: sentence for name, sentence in refused.items()}
 
-    def names(self):
+    def names(self) -> list[str]:
         return sorted({name.partition("/")[0] for name in self._paths()})
 
-    def is_folder(self, name):
+    def is_folder(self, name: str) -> bool:
         return any(path.startswith(name + "/") for path in self._paths())
 
-    def _paths(self):
+    def _paths(self) -> tuple[str, ...]:
         return (*self._found, *self._others, *self._refused)
 
-    def is_link(self, name):
+    def is_link(self, name: str) -> bool:
         return False
 
-    def text(self, name):
+    def text(self, name: str) -> str:
         return self._found.get(name, b"").decode("utf-8", "replace")
 
-    def read(self, name):
+    def read(self, name: str) -> tuple[dict[str, bytes], list[str]]:
         for path, sentence in self._refused.items():
             if path == name or path.startswith(name + "/"):
                 raise files_of_programs.BadSubmission("the submission " + sentence)
