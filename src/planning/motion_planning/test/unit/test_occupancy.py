@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_planning.exact import ExactChecker
-from motion_planning.occupancy import Mask, OccupancyMap, View
+from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import AttachedBody, Scene, WorldObject
 from motion_planning.spheres.cover import CoverError
@@ -178,3 +178,39 @@ def test_a_whole_picture_is_entered_in_moderate_time(empty, record_property):
     record_property("seconds", min(took))
     print("%d points, %d cells: %.0f ms" % (np.isfinite(points[:, 0]).sum(), len(occupancy), 1e3 * min(took)))
     assert len(occupancy) > 1000
+
+
+# -- without a memory -----------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("frame", [np.eye(4), rigid(axis_rotation(np.array([0.6, 0.0, 0.8]), 0.7), (0.2, 0.1, -0.4))])
+def test_a_cloud_alone_fills_the_same_cubes_as_the_first_one_of_a_map(empty, frame):
+    remembering, alone = OccupancyMap(SIDE), CloudMap(SIDE)
+    one = view([CAN, BACK], frame, max_range=3.2)
+    remembering.see(one, empty)
+    changed, _ = alone.see(one, empty)
+    assert changed and len(alone) > 100 and np.array_equal(cubes(alone), cubes(remembering))
+    assert not alone.see(one, empty)[0]
+
+
+def test_the_next_cloud_of_a_source_takes_the_place_of_its_last_one(empty):
+    alone = CloudMap(SIDE)
+    alone.see(view([CAN]), empty, "one")
+    alone.see(view([BACK]), empty, "other")
+    assert (cubes(alone)[:, 0] < 1.0).any() and (cubes(alone)[:, 0] > 1.5).any()
+    alone.see(view([BACK]), empty, "one")
+    assert (cubes(alone)[:, 0] > 1.5).all()
+    assert alone.see(view([]), empty, "one")[0] and alone.see(view([]), empty, "other")[0] and alone.octree() is None
+    alone.see(view([CAN]), empty, "one")
+    alone.clear()
+    assert not len(alone) and alone.see(view([CAN]), empty, "one")[0]
+
+
+def test_a_cloud_alone_does_not_show_the_robot(probot, meshes):
+    scene = Scene(probot)
+    mask = Mask(scene, sphere_model_of(ExactChecker(probot, meshes)), padding=0.02)
+    points = np.concatenate([probot.frames(scene.state.q)[:, :3, 3], [[0.5, 0.5, 0.5]]])
+    alone = CloudMap(0.05)
+    _, outside = alone.see(View(points, np.eye(4), np.eye(4), 5.0), mask)
+    assert outside[-1] and len(alone) < len(points) and not outside.all()
+    _, outside = alone.see(View(np.array([[0.0, 0.0, 9.0], [np.nan] * 3]), np.eye(4), np.eye(4), 5.0), mask)
+    assert outside.tolist() == [True, False] and not len(alone)

@@ -62,6 +62,42 @@ def sees(points, transforms, mask, sizes, bins, codes, outside):
 
 
 @compiled
+def fills(points, transforms, mask, sizes, table, codes, outside):
+    """Find the cells of ``points`` (n, 3), as ``sees`` does, but each once and without looking at rays.
+
+    table (2**m,) of -1, for more codes than there are points near enough: where cells are looked up. outside (n,): as
+    of ``sees``, but true for points that are too far to be entered. Returns the number of codes.
+    """
+    to_mask, to_map = transforms
+    side, most = sizes
+    count, last, square = 0, table.shape[0] - 1, most * most
+    for i in range(points.shape[0]):
+        x, y, z = float(points[i, 0]), float(points[i, 1]), float(points[i, 2])
+        distance = x * x + y * y + z * z
+        outside[i] = distance > _NEAREST * _NEAREST and distance < math.inf
+        if not (outside[i] and distance <= square):
+            continue
+        a, b, c = _moved(to_map, x, y, z)
+        a, b, c = math.floor(a / side) + MIDDLE, math.floor(b / side) + MIDDLE, math.floor(c / side) + MIDDLE
+        if min(a, b, c) < 0 or max(a, b, c) >= 2 * MIDDLE:
+            continue
+        code = int(a) | int(b) << 16 | int(c) << 32
+        # Multiplication mixes the bits of neighbours (Knuth, The Art of Computer Programming 3, section 6.4).
+        place = (code * -7046029254386353131 >> 20) & last
+        while table[place] != -1 and table[place] != code:
+            place = (place + 1) & last
+        if table[place] == code:
+            continue  # where one point of a cell is an obstacle, all are
+        a, b, c = _moved(to_mask, x, y, z)
+        outside[i] = not inside(mask, a, b, c)
+        if outside[i]:
+            table[place] = code
+            codes[count] = code
+            count += 1
+    return count
+
+
+@compiled
 def misses(codes, transforms, mask, side, bins, missed, masked):
     """Fill ``missed`` (n,): a ray passed through the cell, and ``masked`` (n,): its middle is in the mask.
 
@@ -146,3 +182,4 @@ def warm_up():
     bins, codes, outside = np.full((HIGH, AROUND), np.inf, np.float32), np.zeros(1, np.int64), np.zeros(1, np.bool_)
     sees(np.ones((1, 3), np.float32), (still, still), mask, (0.1, 5.0), bins, codes, outside)
     misses(codes, (still, still), mask, 0.1, bins, outside, outside.copy())
+    fills(np.ones((1, 3), np.float32), (still, still), mask, (0.1, 5.0), np.full(2, -1, np.int64), codes, outside)

@@ -45,8 +45,8 @@ class OccupancyMap:
         """Remove all cells."""
         self._codes, self._odds = np.empty(0, np.int64), np.empty(0)
 
-    def see(self, view, mask):
-        """Enter a :class:`View`; points in the :class:`Mask` clear cells as rays, but are not obstacles.
+    def see(self, view, mask, source=""):
+        """Enter a :class:`View` of any source; points in the :class:`Mask` clear cells as rays, but are not obstacles.
 
         Returns (whether the cells have changed, (n,) bool: points outside of the mask).
         """
@@ -54,11 +54,11 @@ class OccupancyMap:
         bins = np.full((kernels.HIGH, kernels.AROUND), np.inf, np.float32)
         codes, outside = np.empty(len(points), np.int64), np.empty(len(points), np.bool_)
         in_map = inverse(view.map) @ view.sensor
-        count = kernels.sees(points, (_parts(view.sensor), _parts(in_map)), mask.arrays,
+        count = kernels.sees(points, (parts(view.sensor), parts(in_map)), mask.arrays,
                              (self.resolution, float(view.max_range)), bins, codes, outside)
         hit = np.unique(codes[:count])
         missed, masked = np.empty(len(self._codes), np.bool_), np.empty(len(self._codes), np.bool_)
-        kernels.misses(self._codes, (_parts(view.map), _parts(inverse(in_map))), mask.arrays, self.resolution, bins,
+        kernels.misses(self._codes, (parts(view.map), parts(inverse(in_map))), mask.arrays, self.resolution, bins,
                        missed, masked)
         return self._enter(hit, missed, masked), outside
 
@@ -109,5 +109,6 @@ class OccupancyMap:
         return changed
 
 
-def _parts(pose):
+def parts(pose):
+    """A pose (4, 4) as ``kernels`` take it: (rotation (3, 3), translation (3,))."""
     return np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3])

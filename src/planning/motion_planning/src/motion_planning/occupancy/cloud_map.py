@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The points of a cloud as obstacles, without a memory of what was seen before."""
+import numpy as np
+
+from motion_planning.occupancy import kernels
+from motion_planning.occupancy.occupancy_map import OccupancyMap, parts
+
+# Room in the table of cells for each point: it must not be full.
+_ROOM = 2
+
+
+class CloudMap(OccupancyMap):
+    """Cubes around the points that each source sees now: the next view of a source replaces its cubes. What is hidden
+    from the camera for a moment is no obstacle then. Not thread-safe."""
+
+    def clear(self):
+        """Remove all cells."""
+        super().clear()
+        self._of_sources = {}
+
+    def see(self, view, mask, source=""):
+        """Put a View in the place of the one that the ``source`` had before; points in the Mask are not obstacles.
+
+        Returns (whether the cells have changed, (n,) bool: points outside of the mask, or too far).
+        """
+        points = np.ascontiguousarray(view.points, dtype=np.float32)
+        codes, outside = np.empty(len(points), np.int64), np.empty(len(points), np.bool_)
+        table = np.full(1 << max(4, (_ROOM * len(points)).bit_length()), -1, np.int64)
+        in_map = np.linalg.solve(view.map, view.sensor)
+        count = kernels.fills(points, (parts(view.sensor), parts(in_map)), mask.arrays,
+                              (self.resolution, float(view.max_range)), table, codes, outside)
+        found = np.sort(codes[:count])
+        changed = not np.array_equal(found, self._of_sources.get(source))
+        self._of_sources[source] = found
+        if changed:
+            self._codes = np.unique(np.concatenate([*self._of_sources.values()]))
+            self._odds = np.zeros(len(self._codes))
+        return changed, outside
+
+    def take(self, octree):
+        """As OccupancyMap's, until the next view."""
+        super().take(octree)
+        self._of_sources = {}
