@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the planning scene up to date with the topics and services that change it, and publishes its changes."""
 import contextlib
+import functools
 import math
 import threading
 import time
@@ -91,7 +92,8 @@ class SceneMonitor:
 
     def octomap(self):
         """The OctomapWithPose that the scene's octomap came with, or None."""
-        return self._octomap
+        octomap = self._octomap
+        return octomap() if callable(octomap) else octomap
 
     def apply(self, message, request):
         """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
@@ -105,7 +107,10 @@ class SceneMonitor:
 
     def set_octomap(self, octree, pose):
         """Put an Octree, or None, at ``pose`` (4, 4) in the place of the scene's octomap."""
-        message = None if octree is None else octomap_message(octree, pose, self.model.frame, rospy.Time.now())
+        stamp = rospy.Time.now()
+        # Many maps come between two that anybody asks for.
+        message = None if octree is None else functools.cache(lambda: octomap_message(octree, pose, self.model.frame,
+                                                                                      stamp))
         self._change(lambda scene: (scene.with_octomap(octree, pose), []), "octomap", message)
 
     def on_clear_octomap(self, clear):
@@ -305,7 +310,7 @@ class SceneMonitor:
     def _publish_change(self, published):
         scene, stamp = self.scene(), self.state_stamp()
         if published is None:
-            self._publisher.publish(scene_message(scene, octomap=self._octomap, stamp=stamp))
+            self._publisher.publish(scene_message(scene, octomap=self.octomap(), stamp=stamp))
             return scene
         if np.array_equal(scene.state.q, published.state.q) and scene.state.attached is published.state.attached and \
                 np.array_equal(scene.state.base, published.state.base) or not self.publishes_states and \
@@ -315,5 +320,5 @@ class SceneMonitor:
             getattr(scene, name) is getattr(published, name)
             for name in ("objects", "allowed", "colours", "octomap", "transforms", "link_padding", "link_scale"))
         if not unchanged:
-            self._publisher.publish(scene_diff(published, scene, stamp, self._octomap))
+            self._publisher.publish(scene_diff(published, scene, stamp, self.octomap()))
         return scene

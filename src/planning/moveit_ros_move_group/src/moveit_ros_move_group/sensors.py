@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 from motion_planning.errors import PlanningError
-from motion_planning.occupancy import Mask, OccupancyMap, View
+from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
 from urdf_model import read_file
@@ -29,12 +29,14 @@ _STATES = 300
 _LONGEST_FILE = 1 << 26
 # Polling period of a worker that waits for a cloud [s].
 _LOOK_UP_S = 0.2
+#: Kind of sensors whose clouds are obstacles as they are, each until the next one comes.
+CLOUDS_ALONE = "PointCloudObstacles"
 
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """One sensor. kind: "PointCloudOctomapUpdater" or "DepthImageOctomapUpdater"; ranges and padding [m]; rate [Hz], 0
-    for every cloud; filtered: topic for the cloud without the robot, "" for none."""
+    """One sensor. kind: "PointCloudOctomapUpdater", "DepthImageOctomapUpdater" or CLOUDS_ALONE; ranges and padding [m];
+    rate [Hz], 0 for every cloud; filtered: topic for the cloud without the robot, "" for none."""
 
     kind: str
     topic: str
@@ -54,12 +56,13 @@ def read_settings(entries):
     for number, entry in enumerate(entries if isinstance(entries, list) else ()):
         entry = entry if isinstance(entry, dict) else {}
         kind = str(entry.get("sensor_plugin", "")).rpartition("/")[2]
-        topic = entry.get({"PointCloudOctomapUpdater": "point_cloud_topic",
+        topic = entry.get({"PointCloudOctomapUpdater": "point_cloud_topic", CLOUDS_ALONE: "point_cloud_topic",
                            "DepthImageOctomapUpdater": "image_topic"}.get(kind))
         if not topic:
             complaints.append("sensor %d, '%s', is left out: expected sensor_plugin occupancy_map_monitor/"
-                              "PointCloudOctomapUpdater with point_cloud_topic, or .../DepthImageOctomapUpdater with "
-                              "image_topic" % (number + 1, entry.get("sensor_plugin", "")))
+                              "PointCloudOctomapUpdater with point_cloud_topic, .../DepthImageOctomapUpdater with "
+                              "image_topic, or .../PointCloudObstacles with point_cloud_topic"
+                              % (number + 1, entry.get("sensor_plugin", "")))
             continue
 
         def number_of(key, usual, entry=entry):
@@ -118,7 +121,7 @@ class Sensors:
             return
         self._frame = str(rospy.get_param("~octomap_frame", "")).lstrip("/") or monitor.model.frame
         try:
-            self._map = OccupancyMap(float(rospy.get_param("~octomap_resolution", _RESOLUTION_M)))
+            self._map = self._kind_of_map(settings)(float(rospy.get_param("~octomap_resolution", _RESOLUTION_M)))
             self._max_range = float(rospy.get_param("~max_range", _MAX_RANGE_M))
         except (TypeError, ValueError) as error:
             rospy.logerr("no octomap is kept: octomap_resolution and max_range have to be numbers above 0: %s", error)
@@ -140,13 +143,22 @@ class Sensors:
         mask = Mask(scene, self._spheres, settings.padding, settings.scale)
         with self._lock:
             view = View(points, sensor, frame, min(settings.max_range, self._max_range))
-            changed, outside = self._map.see(view, mask)
+            changed, outside = self._map.see(view, mask, settings.topic)
             # A client's planning scene may have removed the octomap.
             if changed or self._octree is not _shape_of(self._monitor.scene().octomap):
                 self._octree = self._map.octree()
                 self._monitor.set_octomap(self._octree, frame)
                 self._show(header.stamp)
         return outside
+
+    @staticmethod
+    def _kind_of_map(settings):
+        alone = [one.topic for one in settings if one.kind == CLOUDS_ALONE]
+        if alone and len(alone) < len(settings):
+            rospy.logwarn("sensors: %s enter the octomap as the others do, since only one map is kept; %s counts where "
+                          "all sensors are of that kind", ", ".join(alone), CLOUDS_ALONE)
+            return OccupancyMap
+        return CloudMap if alone else OccupancyMap
 
     def _pose(self, name, scene, stamp):
         """The pose (4, 4) of a frame in the planning frame. Raises PlanningError."""

@@ -143,6 +143,24 @@ def node(monkeypatch):
     return node
 
 
+@pytest.mark.parametrize(("kinds", "stays"), [
+    (["PointCloudObstacles"], False), (["PointCloudObstacles", "PointCloudOctomapUpdater"], True)])
+def test_a_cloud_alone_is_an_obstacle_until_the_next_one(monkeypatch, kinds, stays):
+    sensors = [{**CLOUD, "sensor_plugin": "occupancy_map_monitor/" + kind} for kind in kinds]
+    node = Node(monkeypatch, {"robot_description": URDF, "robot_description_semantic": SRDF, "~": {
+        "sensors": sensors, "octomap_resolution": 0.05, "octomap_frame": "base", "max_range": 2.0}})
+    node.ask("joint_states", JointState(header=Header(stamp=rospy.Time(10)), name=["turn"], position=[0.0]))
+    node.ask("/eye/points", cloud([(1.0, 0.0, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)) == 1, lambda: "one cube; there are %d" % len(octomap_of(node)))
+    # Another direction, so that no ray clears the first one.
+    node.ask("/eye/points", cloud([(0.0, 1.0, 0.5)]))
+    wait_for(lambda: (abs(octomap_of(node)[:, 1]) > 0.5).any(), "the second cube")
+    assert (octomap_of(node)[:, 0] > 0.5).any() == stays
+    assert any("only one map is kept" in line for line in node.logged) == stays
+    message = node.context.monitor.octomap()
+    assert len(octree_of(message.octomap).boxes) == 1 + stays
+
+
 def octomap_of(node):
     octomap = node.context.monitor.scene().octomap
     return np.empty((0, 3)) if octomap is None else octomap.shapes[0][0].boxes[:, :3]
