@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(**generate_distutils_setup(packages=["demonstrations"], package_dir={"": "src"},
+                                 package_data={"demonstrations": ["requirements-*.txt"]}))

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Demonstrations of tasks for learning: experts, recording, files."""

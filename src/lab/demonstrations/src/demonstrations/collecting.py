@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Many demonstrations of an expert: in worker processes, with the same result for any number of them."""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lab_batch import Job, Spec
+from lab_batch.processes import Limits, map_seeds
+
+from .environment import core_of, expert_of, record, schema_of
+from .frames import DemonstrationError, Episode
+from .writing import SetWriter
+
+#: An episode of an expert takes less than this [s of wall time].
+_EPISODE_S = 300.0
+
+
+class Demonstrate(Job):
+    """An episode of the expert of a task, for lab_batch. noise: as for `record`."""
+
+    def __init__(self, task: str = "Reach", noise: float = 0.0, control_freq: int = 20):
+        self._task, self._noise, self._rate = task, noise, control_freq
+
+    def start(self) -> None:
+        """Make the world."""
+        self._core = core_of(self._task, control_freq=self._rate)
+        self._expert = expert_of(self._core)
+
+    def run(self, seed: int) -> dict:
+        """{task, success, columns} of the episode of a seed."""
+        episode = record(self._core, self._expert, seed, self._noise)
+        return {"task": episode.task, "success": episode.success,
+                "columns": {key: values.tolist() for key, values in episode.columns.items()}}
+
+    def end(self) -> None:
+        """End the world."""
+        self._core.close()
+
+
+class Collected(NamedTuple):
+    """kept, failed: numbers of episodes of the expert; frames: of those that were kept."""
+
+    kept: int
+    failed: int
+    frames: int
+
+
+def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1, rate_hz: int = 20,
+            say: Callable[[str], None] = lambda text: None) -> Collected:
+    """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. Raises
+    DemonstrationError, JobError."""
+    seeds = list(seeds)
+    core = core_of(task, control_freq=rate_hz)
+    try:
+        expert_of(core)
+        schema = schema_of(core, noise > 0.0)
+    finally:
+        core.close()
+    kept = failed = frames = 0
+    waiting: dict[int, dict | None] = {}
+    limits = Limits(min(workers, max(len(seeds), 1)), _EPISODE_S, None)
+    with SetWriter(folder, schema) as writer:
+        order = iter(seeds)
+        following = next(order, None)
+        spec = Spec("%s:%s" % (__name__, Demonstrate.__name__),
+                    {"task": task, "noise": noise, "control_freq": rate_hz})
+        for outcome in map_seeds(spec, seeds, limits):
+            if outcome.error:
+                say("seed %d: %s" % (outcome.seed, outcome.error))
+            waiting[outcome.seed] = outcome.result if outcome.is_done else None
+            while following in waiting:
+                result = waiting.pop(following)
+                if result is None or not result["success"]:
+                    failed += 1
+                else:
+                    writer.add(_episode(result, schema, following))
+                    kept, frames = kept + 1, frames + len(result["columns"]["action"])
+                say("%d of %d demonstrations of %s" % (kept + failed, len(seeds), task))
+                following = next(order, None)
+    if not kept:
+        raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
+    return Collected(kept, failed, frames)
+
+
+def _episode(result, schema, seed):
+    columns = {key: np.array(values, dtype=schema.features[key].dtype) for key, values in result["columns"].items()}
+    return Episode(result["task"], columns, result["success"], seed)

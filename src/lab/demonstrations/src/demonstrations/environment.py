@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Demonstrations in the environments of gym_baxter: recorded of an expert, and replayed. In lock-step, bit for bit."""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gym_baxter.core import CAMERAS, Choices, Core
+from gym_baxter.names import action_names, robot_names
+from gym_baxter.tasks import TASKS
+
+from .experts import CONTROL, EXPERTS, Expert
+from .frames import (
+    ACTION,
+    DONE,
+    ENVIRONMENT,
+    EXPERT_ACTION,
+    PICTURES,
+    REWARD,
+    STATE,
+    SUCCESS,
+    DemonstrationError,
+    Episode,
+    Feature,
+    Schema,
+    numbers,
+    picture,
+)
+
+#: Disturbances of actions: their size at most, as shares of a full shift or joint, and of a full turn; how much of it
+#: is left in the next; for so many actions they come or stay away.
+_NOISE, _TURN_NOISE, _LASTING, _STRETCH = 0.08, 0.02, 0.9, 10
+#: Experts need much less; more is a try that failed.
+MAX_STEPS = 200
+_ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
+
+
+def core_of(task: str, control: str = CONTROL, cameras: tuple[str, ...] = (), size: int = 84, **choices: Any) -> Core:
+    """An environment to record in; cameras: of gym_baxter, none by default. Raises DemonstrationError."""
+    if task not in TASKS:
+        raise DemonstrationError("there is no task %r; choices are %s" % (task, ", ".join(TASKS)))
+    if unknown := set(cameras) - set(CAMERAS):
+        raise DemonstrationError("there is no camera %s; choices are %s" % (", ".join(unknown), ", ".join(CAMERAS)))
+    return Core(task, Choices(control, obs_type="pixels_agent_pos" if cameras else "state", cameras=cameras, size=size,
+                              **choices))
+
+
+def schema_of(core: Core, with_expert: bool = False) -> Schema:
+    """The frames of an environment; with_expert: the expert's own action is beside the executed one."""
+    choices, task = core.choices, core.task
+    observed = task.OBSERVED or tuple(("thing.%d" % n, "") for n in range(len(task.observed())))
+    action = numbers(action_names(choices.control, core.sides))
+    features: dict[str, Feature] = {ACTION: action, STATE: numbers(robot_names(core.sides)),
+                                    ENVIRONMENT: numbers(observed)}
+    if with_expert:
+        features[EXPERT_ACTION] = action
+    if choices.obs_type != "state":
+        features |= {PICTURES + camera: picture(choices.size, choices.size) for camera in choices.cameras}
+    features |= {key: Feature(dtype, (1,)) for key, dtype in _ONE.items()}
+    about = {"task": task.NAME, "control": choices.control, "robosuite_order": choices.robosuite_order}
+    return Schema(choices.control_freq, features, about=about)
+
+
+def observed(core: Core) -> dict[str, np.ndarray]:
+    """A frame's entries before its action."""
+    frame = {STATE: core.agent_pos(), ENVIRONMENT: core.task.observed()}
+    if core.choices.obs_type != "state":
+        frame |= {PICTURES + camera: pixels for camera, pixels in core.observation()["pixels"].items()}
+    return frame
+
+
+class Disturbance:
+    """Adds to the motions of actions, not to grippers, what an expert has to correct: smooth, in half of the time,
+    and of another size in each episode, at most `level`, 0 to 1."""
+
+    def __init__(self, core: Core, seed: int, level: float):
+        self._random = np.random.default_rng((seed, 1))
+        names = [name for name, _ in action_names(core.choices.control, core.sides)]
+        sizes = [0.0 if "gripper" in name else _TURN_NOISE if name[-2:] in ("rx", "ry", "rz") else _NOISE
+                 for name in names]
+        self._sizes = level * self._random.uniform() * np.array(sizes)
+        self._now, self._count, self._is_on = np.zeros(len(names)), 0, False
+
+    def on(self, action: np.ndarray) -> np.ndarray:
+        """The disturbed action."""
+        if self._count % _STRETCH == 0:
+            self._is_on = bool(self._random.uniform() < 0.5)
+        self._count += 1
+        fresh = self._random.standard_normal(len(self._now)) * self._sizes * np.sqrt(1.0 - _LASTING**2)
+        self._now = _LASTING * self._now + fresh
+        return action + self._now if self._is_on else action
+
+
+def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any = None) -> Episode:
+    """One episode of an expert. noise: 0 to 1, of `Disturbance`; then `expert.action` has what the expert wanted.
+    sink: gets each frame as well, `SetWriter.frame` for pictures."""
+    core.reset(np.random.default_rng(seed))
+    expert.begin()
+    disturbance = Disturbance(core, seed, noise)
+    rows: dict[str, list] = {}
+    stepped = None
+    for _ in range(min(core.steps, MAX_STEPS)):
+        wanted = np.clip(expert.act(), -1.0, 1.0)
+        action = np.clip(disturbance.on(wanted), -1.0, 1.0).astype(np.float32) if noise else wanted.astype(np.float32)
+        frame = {ACTION: action, **observed(core)}
+        if noise:
+            frame[EXPERT_ACTION] = wanted.astype(np.float32)
+        stepped = core.step(action)
+        frame |= {REWARD: [stepped.reward], DONE: [stepped.succeeded], SUCCESS: [stepped.succeeded]}
+        if sink is not None:
+            sink(frame)
+        for key, value in frame.items():
+            if not key.startswith(PICTURES):
+                rows.setdefault(key, []).append(value)
+        if stepped.succeeded:
+            break
+    dtypes = {REWARD: np.float32, DONE: bool, SUCCESS: bool}
+    columns = {key: np.array(values, dtype=dtypes.get(key, np.float32)) for key, values in rows.items()}
+    return Episode(core.task.SENTENCE or core.task.NAME, columns, bool(stepped is not None and stepped.succeeded), seed)
+
+
+def expert_of(core: Core) -> Expert:
+    """Raises DemonstrationError where the task has none."""
+    name = core.task.NAME
+    if name not in EXPERTS:
+        raise DemonstrationError("there is no expert for %s; there are for %s" % (name, ", ".join(EXPERTS)))
+    return EXPERTS[name](core)
+
+
+def core_for(schema: Schema) -> Core:
+    """The environment that a set was recorded in. Raises DemonstrationError where it was none."""
+    about = schema.about
+    if about.get("task") not in TASKS or "control" not in about:
+        raise DemonstrationError("the set was not recorded in an environment of gym_baxter, but of %s"
+                                 % (about.get("task") or "a task without a name"))
+    return core_of(about["task"], about["control"], control_freq=schema.rate_hz,
+                   robosuite_order=bool(about.get("robosuite_order")))
+
+
+def replay(core: Core, episode: Episode) -> dict[str, float]:
+    """Do an episode's actions again from its start; returns {key: greatest difference} of what is observed, 0 where all
+    is equal to the last bit. Raises DemonstrationError for an episode without a seed."""
+    if episode.seed is None:
+        raise DemonstrationError("the episode has no seed, so its start is not known")
+    core.reset(np.random.default_rng(episode.seed))
+    off = dict.fromkeys((STATE, ENVIRONMENT), 0.0)
+    for row, action in enumerate(episode.columns[ACTION]):
+        for key, value in ((STATE, core.agent_pos()), (ENVIRONMENT, core.task.observed())):
+            difference = np.abs(value.astype(np.float32) - episode.columns[key][row])
+            off[key] = max(off[key], float(difference.max(initial=0.0)))
+        core.step(action)
+    return off

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Experts: programs that do the tasks of gym_baxter, action by action, with knowledge of the whole state.
+
+An expert is a feedback law. Its hands move towards places that follow from the present state, so it recovers from
+disturbances, and what it does can be learned from observations. Hands are steered by osc_pose; places are in `base`.
+"""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_lab import Arm
+from baxter_model import SIDES
+from gym_baxter.controls import OSC_POSITION_M, OSC_ROTATION_RAD
+from gym_baxter.core import Core
+
+#: The control that experts steer by.
+CONTROL = "osc_pose"
+OPEN, CLOSED = -1.0, 1.0
+#: Share of the remaining way of one action; drives follow with some lag, and more overshoots.
+_GAIN = 0.35
+#: Most of one action [m], [rad].
+_SPEED_M, _SPEED_RAD = 0.018, 0.08
+#: A hand is at its place when it is so near [m], [rad].
+_NEAR_M, _NEAR_RAD = 0.008, 0.06
+#: Hands come down, and carry, at this height above the place [m], and from this distance beside it they sink.
+_ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 3.0
+#: Above this height over its place a thing is carried freely [m].
+_FREE_M = 0.05
+
+
+class Hand(NamedTuple):
+    """Where a hand should go: place (3,) [m], rotation (3, 3), its gripper -1 (opens) to 1 (closes); share of the
+    full speed."""
+
+    place: np.ndarray
+    rotation: np.ndarray
+    grip: float
+    speed: float = 1.0
+
+
+def down(yaw: float) -> np.ndarray:
+    """(3, 3) of a hand that points straight down; its fingers close along (sin yaw, -cos yaw)."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return np.array([[cosine, sine, 0.0], [sine, -cosine, 0.0], [0.0, 0.0, -1.0]])
+
+
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
+    """(3,) axis times angle [rad] of a rotation (3, 3), angle at most pi."""
+    axis = 0.5 * np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0],
+                           rotation[1, 0] - rotation[0, 1]])
+    sine = float(np.linalg.norm(axis))
+    angle = math.atan2(sine, 0.5 * (float(np.trace(rotation)) - 1.0))
+    if sine > 1e-6:
+        return axis * (angle / sine)
+    if angle < 1.0:
+        return axis
+    # Half a turn: the axis is the greatest column of (R + 1) / 2.
+    both = 0.5 * (rotation + np.eye(3))
+    column = both[:, int(np.argmax(np.diag(both)))]
+    return angle * column / np.linalg.norm(column)
+
+
+def _clipped(vector, most):
+    length = float(np.linalg.norm(vector))
+    return vector if length <= most else vector * (most / length)
+
+
+def _funnel(beside):
+    """Height above a place [m] of a hand that is so far beside it [m]: down at the place, up elsewhere."""
+    return min(max(_SLOPE * (beside - _BESIDE_M), 0.0), _ABOVE_M)
+
+
+def _nearest(yaw, to, period):
+    """The angle nearest to `to` that differs from `yaw` by multiples of `period`."""
+    return yaw - period * round((yaw - to) / period)
+
+
+def _yaw(pose):
+    return math.atan2(pose[1, 0], pose[0, 0])
+
+
+class Expert:
+    """Base of all experts. core: of the task, by CONTROL. `act` returns the action for the present state."""
+
+    TASK = ""
+
+    def __init__(self, core: Core):
+        if core.choices.control != CONTROL:
+            raise ValueError("experts steer by control %r; found %r" % (CONTROL, core.choices.control))
+        self.core, self.task, self.arms = core, core.task, core.lab.robot.arms
+
+    def begin(self) -> None:
+        """An episode begins; `act` follows."""
+        self._rest = {side: arm.pose for side, arm in self.arms.items()}
+
+    def act(self) -> np.ndarray:
+        """(14,) the action for the present state."""
+        hands = self.hands()
+        return np.concatenate([self._action(self.arms[side], hands.get(side) or self._at_rest(side))
+                               for side in self.core.sides])
+
+    def hands(self) -> dict[str, Hand]:
+        """{side: where it should go now}; a hand without a place stays."""
+        raise NotImplementedError
+
+    def _at_rest(self, side):
+        return Hand(self._rest[side][:3, 3], self._rest[side][:3, :3], OPEN)
+
+    @staticmethod
+    def _action(arm: Arm, hand: Hand):
+        pose = arm.pose
+        shift = _clipped(_GAIN * (hand.place - pose[:3, 3]), hand.speed * _SPEED_M)
+        turn = _clipped(_GAIN * rotation_vector(hand.rotation @ pose[:3, :3].T), hand.speed * _SPEED_RAD)
+        return np.array([*(shift / OSC_POSITION_M), *(turn / OSC_ROTATION_RAD), hand.grip])
+
+    def _is_at(self, side, place, rotation):
+        pose = self.arms[side].pose
+        return bool(np.linalg.norm(place - pose[:3, 3]) < _NEAR_M
+                    and np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)) < _NEAR_RAD)
+
+    def _approach(self, side, place, rotation):
+        """A hand that comes to its place along its own axis, and closes there."""
+        pose, axis = self.arms[side].pose, rotation[:, 2]
+        off = pose[:3, 3] - place
+        beside = float(np.linalg.norm(off - axis * (axis @ off)))
+        beside += 0.05 * float(np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)))
+        return Hand(place - axis * _funnel(beside), rotation, CLOSED if self._is_at(side, place, rotation) else OPEN)
+
+
+class ReachExpert(Expert):
+    """The hand goes to the point."""
+
+    TASK = "Reach"
+
+    def hands(self):
+        """The left hand at the goal."""
+        return {"left": Hand(self.task.goal, self._rest["left"][:3, :3], OPEN)}
+
+
+class PickPlaceExpert(Expert):
+    """Down onto the block, and over the mark."""
+
+    TASK = "PickPlace"
+
+    def hands(self):
+        """The left hand at the block, or with it at the mark."""
+        block, goal = self.task.block.pose, self.task.goal
+        rotation = down(_nearest(_yaw(block), math.pi, math.pi / 2.0))
+        place, hand = block[:3, 3], self.arms["left"].pose[:3, 3]
+        left = float(np.linalg.norm(goal[:2] - place[:2]))
+        holds = self.arms["left"].gripper.holds
+        if left < (_BESIDE_M if holds else self.task.WITHIN_M) and place[2] - goal[2] < 0.008:
+            return {"left": Hand(hand, self.arms["left"].pose[:3, :3], OPEN)}  # it stands there
+        if not holds:
+            return {"left": self._approach("left", place, rotation)}
+        # What it holds hangs as it was taken.
+        height, wanted = place[2] - goal[2], _funnel(left)
+        to = hand + (goal - place) + (0.0, 0.0, wanted)
+        if height < min(_FREE_M, 0.8 * wanted):
+            to[:2] = hand[:2]  # first up
+        return {"left": Hand(to, rotation, CLOSED)}
+
+
+class TwoArmLiftExpert(Expert):
+    """Each hand at its handle, then both up."""
+
+    TASK = "TwoArmLift"
+    _HIGH_M = 0.16
+
+    def hands(self):
+        """Both hands."""
+        handles, pose = self.task._handles(), self.task.pot.pose
+        rotation = down(_nearest(_yaw(pose), 0.0, math.pi))
+        holding = [self.arms[side].gripper.holds for side in SIDES]
+        found = {side: self._approach(side, place, rotation) for side, place in handles.items()}
+        if all(holding):
+            raised = self._HIGH_M - self.task._lift()
+            return {side: Hand(self.arms[side].pose[:3, 3] + (0.0, 0.0, raised), rotation, CLOSED, 0.5)
+                    for side in SIDES}
+        return {side: hand._replace(grip=CLOSED) if holds else hand
+                for (side, hand), holds in zip(found.items(), holding, strict=True)}
+
+
+class TwoArmHandoverExpert(Expert):
+    """The right hand brings the hammer in front of the robot, the left one takes it there."""
+
+    TASK = "TwoArmHandover"
+    #: Along the hammer: where the right hand takes it, and the left one [m].
+    _RIGHT_M, _LEFT_M = 0.05, -0.07
+    #: Where the right hand holds it for the left one, and how far hands lean outwards then.
+    _MEETING, _TILT_RAD = np.array((0.62, -0.02, 0.10)), math.radians(45.0)
+    _WAITING_M = 0.12
+
+    def hands(self):
+        """Both hands."""
+        hammer = self.task.hammer.pose
+        holding = {side: self.arms[side].gripper.holds for side in SIDES}
+        # The hammer's axis, or its reverse, as the hands' first axis: they have it towards the robot.
+        axis = hammer[:3, 0] if hammer[0, 0] < 0.0 else -hammer[:3, 0]
+        grasp = {side: hammer[:3, 3] + along * hammer[:3, 0]
+                 for side, along in zip(SIDES, (self._LEFT_M, self._RIGHT_M), strict=True)}
+        waiting = self._MEETING + (0.0, self._WAITING_M, self._WAITING_M)
+        found = {"left": Hand(waiting, self._leaning("left", np.array((-1.0, 0.0, 0.0))), OPEN)}
+        if holding["left"]:
+            return {"left": Hand(self.arms["left"].pose[:3, 3], self.arms["left"].pose[:3, :3], CLOSED),
+                    "right": Hand(self.arms["right"].pose[:3, 3], self.arms["right"].pose[:3, :3], OPEN)}
+        if not holding["right"]:
+            yaw = math.atan2(axis[1], axis[0])
+            return {**found, "right": self._approach("right", grasp["right"], down(yaw))}
+        hand = self.arms["right"].pose[:3, 3]
+        rotation = self._leaning("right", np.array((-1.0, 0.0, 0.0)))
+        if not self.task._lifted() and hand[1] < self._MEETING[1] - 0.1:
+            return {**found, "right": Hand(hand + (0.0, 0.0, 0.1), down(math.atan2(axis[1], axis[0])), CLOSED)}
+        found["right"] = Hand(self._MEETING, rotation, CLOSED)
+        if self._is_at("right", self._MEETING, rotation):
+            found["left"] = self._approach("left", grasp["left"], self._leaning("left", axis))
+        return found
+
+    def _leaning(self, side, axis):
+        """(3, 3) of a hand with its first axis along `axis` (3,), which points to the other side and down."""
+        sign = 1.0 if side == "right" else -1.0
+        pointing = np.array((0.0, sign * math.sin(self._TILT_RAD), -math.cos(self._TILT_RAD)))
+        pointing -= axis * (axis @ pointing)
+        pointing /= np.linalg.norm(pointing)
+        return np.column_stack([axis, np.cross(pointing, axis), pointing])
+
+
+EXPERTS: dict[str, type[Expert]] = {expert.TASK: expert for expert in (
+    ReachExpert, PickPlaceExpert, TwoArmLiftExpert, TwoArmHandoverExpert)}

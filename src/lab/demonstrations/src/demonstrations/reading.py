@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads LeRobot data sets, format v3.0, and finds what is broken in them. By pyarrow and PyAV."""
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import layout
+from .films import frame_count, frames_of
+from .frames import DemonstrationError, Episode
+from .needed import need
+
+
+def _read_table(path: Path, columns: list[str] | None = None) -> Any:
+    parquet = need("pyarrow", "parquet")
+    try:
+        return parquet.ParquetFile(path).read(columns=columns)
+    except FileNotFoundError:
+        raise DemonstrationError("%s is missing" % path) from None
+    except (OSError, ValueError) as error:  # pyarrow's own errors derive from these
+        raise DemonstrationError("%s cannot be read: %s" % (path, error)) from error
+
+
+def read_tasks(folder: Path) -> list[str]:
+    """The tasks in the order of their index. Raises DemonstrationError."""
+    table = _read_table(folder / layout.TASKS)
+    try:
+        rows = sorted(zip(table["task_index"].to_pylist(), table["task"].to_pylist(), strict=True))
+    except KeyError as error:
+        raise DemonstrationError("%s has no column %s" % (folder / layout.TASKS, error)) from None
+    return [task for _, task in rows]
+
+
+class DataSet:
+    """A set in a folder. Attributes: `folder`, `schema`, `tasks`. len() is the number of its episodes. Raises
+    DemonstrationError, which names the file, also from its methods."""
+
+    _NEEDED = ("episode_index", "tasks", "length", "data/chunk_index", "data/file_index", "dataset_from_index")
+
+    def __init__(self, folder: Path):
+        self.folder = Path(folder)
+        self.schema, self._info = layout.schema_of(self.folder)
+        self.tasks = read_tasks(self.folder)
+        self._rows = self._episode_rows()
+        self._outcomes = _outcomes(self.folder)
+        self._data: tuple[tuple[int, int], Any] | None = None
+
+    def __len__(self) -> int:
+        return int(self._info["total_episodes"])
+
+    def _episode_rows(self):
+        rows = {}
+        for path in sorted((self.folder / "meta/episodes").glob("chunk-*/file-*.parquet")):
+            if len(rows) >= len(self):
+                break
+            try:
+                table = _read_table(path)
+            except DemonstrationError:
+                continue  # its episodes are told as missing
+            names = [name for name in table.column_names if not name.startswith("stats/")]
+            if missing := [name for name in self._NEEDED if name not in names]:
+                raise DemonstrationError("%s has no column %s" % (path, ", ".join(missing)))
+            rows.update({row["episode_index"]: row for row in table.select(names).to_pylist()})
+        return rows
+
+    def _row(self, number):
+        if not 0 <= number < len(self):
+            raise DemonstrationError("%s has the episodes 0 to %d, not %d" % (self.folder, len(self) - 1, number))
+        if number not in self._rows:
+            raise DemonstrationError("%s: no readable file in meta/episodes has episode %d" % (self.folder, number))
+        return self._rows[number]
+
+    def episode(self, number: int) -> Episode:
+        """The numbers of an episode."""
+        row = self._row(number)
+        place = row["data/chunk_index"], row["data/file_index"]
+        path = self.folder / (layout.DATA % place)
+        if self._data is None or self._data[0] != place:
+            self._data = place, _read_table(path)
+        table = self._data[1]
+        try:
+            mine = np.flatnonzero(table["episode_index"].to_numpy() == number)
+            if len(mine) != row["length"]:
+                raise DemonstrationError("%s has %d frames of episode %d, which has %d" % (
+                    path, len(mine), number, row["length"]))
+            part = table.slice(mine[0], len(mine))
+            columns = {key: _column(part[key], feature) for key, feature in self.schema.features.items()
+                       if not feature.is_picture}
+        except (KeyError, ValueError) as error:
+            raise DemonstrationError("%s is not as in its description: %s" % (path, error)) from error
+        outcome = self._outcomes.get(number, {})
+        return Episode(row["tasks"][0], columns, bool(outcome.get("success", True)), outcome.get("seed"))
+
+    def pictures(self, number: int, camera: str) -> Iterator[np.ndarray]:
+        """The pictures of an episode, (height, width, 3) uint8. camera: key of the feature."""
+        row, path = self._row(number), self._film(number, camera)
+        first = round(row.get("videos/%s/from_timestamp" % camera, 0.0) * self.schema.rate_hz)
+        for index, pixels in enumerate(frames_of(path)):
+            if first <= index < first + row["length"]:
+                yield pixels
+
+    def _film(self, number, camera):
+        row = self._row(number)
+        try:
+            return self.folder / (layout.FILM % (camera, row["videos/%s/chunk_index" % camera],
+                                                 row["videos/%s/file_index" % camera]))
+        except KeyError as error:
+            raise DemonstrationError("%s has no film of %s: no column %s" % (self.folder, camera, error)) from None
+
+    def check(self, number: int) -> None:
+        """Read an episode, and look whether its films have enough frames. Raises DemonstrationError."""
+        self.episode(number)
+        for camera in self.schema.cameras:
+            row, path = self._row(number), self._film(number, camera)
+            end = round(row["videos/%s/to_timestamp" % camera] * self.schema.rate_hz)
+            if frame_count(path) < end:
+                raise DemonstrationError("%s has %d frames; episode %d ends at frame %d" % (
+                    path, frame_count(path), number, end))
+
+
+def _column(values, feature):
+    array = values.combine_chunks()
+    flat = array.flatten() if feature.shape[0] > 1 else array
+    return flat.to_numpy(zero_copy_only=False).reshape(-1, *feature.shape).astype(feature.dtype, copy=False)
+
+
+def _outcomes(folder):
+    """{episode: its line}; lines that are cut off have none."""
+    path, found = folder / layout.OUTCOMES, {}
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else ():
+        try:
+            outcome = json.loads(line)
+            found[outcome["episode"]] = outcome
+        except (ValueError, KeyError, TypeError):
+            continue
+    return found
+
+
+@dataclass
+class Survey:
+    """good: numbers of whole episodes; broken: {number: why}; strays: files of no episode."""
+
+    good: list[int] = field(default_factory=list)
+    broken: dict[int, str] = field(default_factory=dict)
+    strays: list[str] = field(default_factory=list)
+
+
+def survey(folder: Path) -> Survey:
+    """Read a whole set. Raises DemonstrationError where not even its description can be read."""
+    found, data = Survey(), DataSet(folder)
+    for number in range(len(data)):
+        try:
+            data.check(number)
+            found.good.append(number)
+        except DemonstrationError as error:
+            found.broken[number] = str(error)
+    listed = {path for row in data._rows.values() for path in _files_of(data, row)}
+    for pattern in ("data/*/*", "videos/*/*/*", "meta/**/*" + layout.PART, layout.DRAFTS + "/*"):
+        found.strays += sorted(str(path.relative_to(folder)) for path in Path(folder).glob(pattern)
+                               if str(path.relative_to(folder)) not in listed)
+    return found
+
+
+def _files_of(data, row):
+    yield layout.DATA % (row["data/chunk_index"], row["data/file_index"])
+    for camera in data.schema.cameras:
+        yield layout.FILM % (camera, row.get("videos/%s/chunk_index" % camera, 0),
+                             row.get("videos/%s/file_index" % camera, 0))
+
+
+def repair(folder: Path, into: Path) -> Survey:
+    """Copy the whole episodes of a set into a new one; returns what was found. Raises DemonstrationError."""
+    from .writing import SetWriter
+
+    found, data = survey(folder), DataSet(folder)
+    with SetWriter(into, data.schema) as writer:
+        for number in found.good:
+            copy(data, number, writer)
+    return found
+
+
+def copy(data: DataSet, number: int, writer: Any) -> None:
+    """Append an episode of a set to another, a `SetWriter`. Raises DemonstrationError."""
+    episode = data.episode(number)
+    films = {camera: data.pictures(number, camera) for camera in data.schema.cameras}
+    for row in range(len(episode)):
+        writer.frame({**{key: values[row] for key, values in episode.columns.items()},
+                      **{camera: next(film) for camera, film in films.items()}})
+    writer.keep(episode.task, episode.success, episode.seed)

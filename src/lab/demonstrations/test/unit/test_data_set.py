@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""LeRobot data sets: what is written, what is read back, and what is left of a broken one."""
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from demonstrations import layout, robomimic, statistics
+from demonstrations.films import frames_of
+from demonstrations.frames import (
+    ACTION,
+    ENVIRONMENT,
+    PICTURES,
+    STATE,
+    DemonstrationError,
+    Episode,
+    Feature,
+    Schema,
+    numbers,
+    picture,
+)
+from demonstrations.needed import need
+from demonstrations.reading import DataSet, repair, survey
+from demonstrations.writing import SetWriter
+
+CAMERA = PICTURES + "head"
+ABOUT = {"task": "Reach", "control": "osc_pose"}
+SCHEMA = Schema(20, {ACTION: numbers([("a", ""), ("b", "")]), STATE: numbers([("s", "rad")]),
+                     ENVIRONMENT: numbers([("x", "m"), ("y", "m"), ("z", "m")]), "next.done": Feature("bool", (1,))},
+                about=ABOUT)
+FILMED = Schema(10, {ACTION: numbers([("a", "")]), CAMERA: picture(32, 48)}, about=ABOUT)
+
+
+def episode(length, seed=0, task="Reach it."):
+    random = np.random.default_rng(seed)
+    columns = {key: random.standard_normal((length, *feature.shape)).astype(feature.dtype)
+               for key, feature in SCHEMA.features.items()}
+    return Episode(task, columns, True, seed)
+
+
+def filled(folder, lengths=(5, 3, 7)):
+    with SetWriter(folder, SCHEMA) as writer:
+        for seed, length in enumerate(lengths):
+            writer.add(episode(length, seed, "Reach it." if seed % 2 == 0 else "Reach it again."))
+    return folder
+
+
+def grey(level):
+    return np.full((32, 48, 3), level, np.uint8)
+
+
+def test_what_is_written_is_read_back_to_the_last_bit(tmp_path):
+    data = DataSet(filled(tmp_path / "set"))
+    assert len(data) == 3 and data.tasks == ["Reach it.", "Reach it again."] and data.schema == SCHEMA
+    for seed, length in enumerate((5, 3, 7)):
+        found, wanted = data.episode(seed), episode(length, seed)
+        assert found.seed == seed and found.success and found.task == data.tasks[seed % 2]
+        for key, values in wanted.columns.items():
+            np.testing.assert_array_equal(found.columns[key], values)
+            assert found.columns[key].dtype == values.dtype
+
+
+def test_files_are_those_of_the_format(tmp_path):
+    """By the format's published description: names, types, order of columns, indices."""
+    parquet, arrow = need("pyarrow", "parquet"), need("pyarrow")
+    folder = filled(tmp_path / "set")
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert info["codebase_version"] == "v3.0" and info["fps"] == 20 and info["splits"] == {"train": "0:3"}
+    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, 15, 2)
+    assert info["features"]["timestamp"] == {"dtype": "float32", "shape": [1], "names": None}
+    assert info["features"][ACTION] == {"dtype": "float32", "shape": [2], "names": ["a", "b"]}
+    assert (folder / info["data_path"].format(chunk_index=0, file_index=2)).is_file() and info["video_path"] is None
+    file = parquet.ParquetFile(folder / "data/chunk-000/file-002.parquet")
+    table = file.read()
+    assert file.num_row_groups == 1
+    assert table.column_names == [*SCHEMA.features, "timestamp", "frame_index", "episode_index", "index", "task_index"]
+    assert table.schema.field(ACTION).type == arrow.list_(arrow.float32(), 2)
+    assert table.schema.field(STATE).type == arrow.float32() and table.schema.field("next.done").type == arrow.bool_()
+    assert table["index"].to_pylist() == list(range(8, 15)) and table["frame_index"].to_pylist() == list(range(7))
+    np.testing.assert_array_equal(table["timestamp"], np.arange(7, dtype="float64").astype("float32") / np.float32(20))
+    row = parquet.read_table(folder / "meta/episodes/chunk-000/file-001.parquet").to_pylist()[0]
+    assert (row["dataset_from_index"], row["dataset_to_index"], row["length"]) == (5, 8, 3)
+    assert row["tasks"] == ["Reach it again."] and row["stats/%s/count" % ACTION] == [3]
+    assert len(row["stats/%s/q99" % ENVIRONMENT]) == 3 and row["meta/episodes/file_index"] == 1
+    tasks = parquet.read_table(folder / "meta/tasks.parquet")
+    assert json.loads(tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
+    stats = json.loads((folder / "meta/stats.json").read_text())
+    assert stats["index"]["count"] == [15] and stats["index"]["max"] == [14]
+
+
+def test_statistics_of_all_are_those_of_the_parts_joined():
+    values = np.random.default_rng(0).normal(3.0, 2.0, (50, 4))
+    parts = statistics.joined([statistics.of_numbers(values[:10]), statistics.of_numbers(values[10:])])
+    whole = statistics.of_numbers(values)
+    for name in ("min", "max", "mean", "std", "count"):
+        np.testing.assert_allclose(parts[name], whole[name])
+
+
+def test_pictures_come_back_and_have_statistics(tmp_path):
+    with SetWriter(tmp_path, FILMED) as writer:
+        for _ in range(2):
+            for level in range(6):
+                writer.frame({ACTION: [level], CAMERA: grey(40 * level)})
+            writer.keep("Look.", True)
+    data = DataSet(tmp_path)
+    for level, pixels in enumerate(data.pictures(1, CAMERA)):
+        assert abs(float(pixels.mean()) - 40 * level) < 4.0
+    assert level == 5 and survey(tmp_path).good == [0, 1]
+    stats = json.loads((tmp_path / "meta/stats.json").read_text())[CAMERA]
+    np.testing.assert_allclose(stats["mean"], np.full((3, 1, 1), 100.0 / 255.0))
+    assert stats["count"] == [12] and stats["max"] == np.full((3, 1, 1), 200.0 / 255.0).tolist()
+    av = need("av")
+    with av.open(str(tmp_path / "videos" / CAMERA / "chunk-000/file-001.mp4")) as film:
+        stream = film.streams.video[0]
+        times = [frame.time for frame in film.decode(stream)]
+        np.testing.assert_allclose(times, np.arange(6) / 10.0, atol=1e-6)
+        assert stream.codec_context.name == "h264" and stream.average_rate == 10
+
+
+def test_a_set_is_continued(tmp_path):
+    filled(tmp_path, (5, 3))
+    with SetWriter(tmp_path, SCHEMA) as writer:
+        assert writer.add(episode(4, 9)) == 2
+    assert [len(DataSet(tmp_path).episode(number)) for number in range(3)] == [5, 3, 4]
+    assert json.loads((tmp_path / "meta/stats.json").read_text())["index"]["count"] == [12]
+
+
+def test_other_frames_and_other_folders_are_refused(tmp_path):
+    filled(tmp_path / "set")
+    with pytest.raises(DemonstrationError, match="other frames"):
+        SetWriter(tmp_path / "set", FILMED)
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes/a.txt").write_text("mine")
+    with pytest.raises(DemonstrationError, match="something else"):
+        SetWriter(tmp_path / "notes", SCHEMA)
+    with pytest.raises(DemonstrationError, match="there is no .*info.json"):
+        DataSet(tmp_path / "notes")
+
+
+@pytest.mark.parametrize(("change", "text"), [
+    ({STATE: [np.nan]}, "finite"), ({STATE: [1.0, 2.0]}, r"\(1,\)"), ({"other": 1}, "exactly"),
+    ({STATE: "x"}, "array")])
+def test_a_bad_frame_is_refused_and_the_episode_goes_on(tmp_path, change, text):
+    good = {key: values[0] for key, values in episode(1).columns.items()}
+    with SetWriter(tmp_path, SCHEMA) as writer:
+        writer.frame(good)
+        with pytest.raises(DemonstrationError, match=text):
+            writer.frame({**good, **change})
+        writer.frame(good)
+        writer.keep("Reach it.", True)
+    assert len(DataSet(tmp_path).episode(0)) == 2
+
+
+@pytest.mark.parametrize(("key", "feature"), [
+    ("image", numbers([("a", "")])), (CAMERA, Feature("video", (31, 48, 3))), ("a/b", numbers([("a", "")])),
+    ("x", Feature("complex64", (1,)))])
+def test_features_that_readers_refuse_are_refused(key, feature):
+    with pytest.raises(DemonstrationError, match="a/b|even|pictures|numbers"):
+        Schema(20, {ACTION: numbers([("a", "")]), key: feature})
+
+
+BREAK = {"data/chunk-000/file-001.parquet": b"PAR1 half a file", "meta/episodes/chunk-000/file-001.parquet": b""}
+
+
+@pytest.mark.parametrize("name", BREAK)
+def test_the_other_episodes_of_a_broken_set_are_kept(tmp_path, name):
+    folder = filled(tmp_path / "set")
+    (folder / name).write_bytes(BREAK[name])
+    found = repair(folder, tmp_path / "mended")
+    assert found.good == [0, 2] and name in found.broken[1] or "episode 1" in found.broken[1]
+    mended = DataSet(tmp_path / "mended")
+    np.testing.assert_array_equal(mended.episode(1).columns[ACTION], episode(7, 2).columns[ACTION])
+    assert mended.episode(1).seed == 2 and survey(tmp_path / "mended").broken == {}
+
+
+def test_a_cut_off_film_is_named(tmp_path):
+    with SetWriter(tmp_path, FILMED) as writer:
+        for _ in range(2):
+            for level in range(4):
+                writer.frame({ACTION: [level], CAMERA: grey(level)})
+            writer.keep("Look.", True)
+    film = tmp_path / "videos" / CAMERA / "chunk-000/file-000.mp4"
+    film.write_bytes(film.read_bytes()[:-200])
+    found = survey(tmp_path)
+    assert found.good == [1] and "file-000.mp4" in found.broken[0]
+    film.write_bytes(film.read_bytes()[:film.stat().st_size // 2])
+    with pytest.raises(DemonstrationError, match="no readable film"):
+        list(frames_of(film))
+
+
+RECORD = """
+import os, signal, sys
+sys.path[:0] = %r
+from pathlib import Path
+from test_data_set import SCHEMA, episode
+from demonstrations.writing import SetWriter
+from demonstrations import layout
+writer = SetWriter(Path(sys.argv[1]), SCHEMA)
+writer.add(episode(5, 0)); writer.add(episode(3, 1))
+name = sys.argv[2]
+write_json = layout.write_json
+def killed(path, value):
+    if path.name == name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    write_json(path, value)
+layout.write_json = killed
+writer.add(episode(7, 2))
+"""
+
+
+@pytest.mark.parametrize("name", ["info.json", "stats.json"])
+def test_a_killed_recorder_leaves_the_complete_episodes(tmp_path, name):
+    here = os.path.dirname(__file__)
+    done = subprocess.run([sys.executable, "-c", RECORD % [here, *sys.path], str(tmp_path), name], timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    found = survey(tmp_path)
+    assert found.good == [0, 1] and found.strays == ["data/chunk-000/file-002.parquet"]
+    with SetWriter(tmp_path, SCHEMA) as writer:
+        writer.add(episode(6, 8))
+    data = DataSet(tmp_path)
+    assert survey(tmp_path).strays == [] and [data.episode(number).seed for number in range(3)] == [0, 1, 8]
+
+
+def test_a_full_disk_costs_the_present_episode_alone(tmp_path):
+    filled(tmp_path, (5,))
+    writer = SetWriter(tmp_path, SCHEMA)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, hard))
+    try:
+        with pytest.raises(DemonstrationError, match="episode 1 of .* is not kept"):
+            writer.add(episode(4000, 1))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert survey(tmp_path).good == [0] and survey(tmp_path).strays == []
+    writer.add(episode(6, 2))
+    assert DataSet(tmp_path).episode(1).seed == 2
+
+
+def test_robomimics_file_has_its_groups(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="the workspace has it; elsewhere it is optional")
+    data = DataSet(filled(tmp_path / "set"))
+    assert robomimic.write(data, tmp_path / "set.hdf5") == 3
+    with h5py.File(tmp_path / "set.hdf5") as file:
+        group = file["data"]
+        assert group.attrs["total"] == 15 and json.loads(group.attrs["env_args"])["env_name"] == "gym_baxter/Reach-v0"
+        demo = group["demo_2"]
+        assert demo.attrs["num_samples"] == 7 and demo["actions"].shape == (7, 2) and demo["states"].shape == (7, 4)
+        assert demo["obs/object-state"].shape == demo["next_obs/object-state"].shape == (7, 3)
+        np.testing.assert_array_equal(demo["next_obs/object-state"][:-1], demo["obs/object-state"][1:])
+        names = [*file["mask/train"], *file["mask/valid"]]
+        assert sorted(names) == [b"demo_0", b"demo_1", b"demo_2"]
+
+
+def test_numbers_of_files_go_on_in_the_next_chunk():
+    assert layout.numbered(999) == (0, 999) and layout.numbered(1000) == (1, 0)

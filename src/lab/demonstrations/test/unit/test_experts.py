@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Experts do their tasks, disturbed or not, and what is recorded of them is done again to the last bit."""
+import numpy as np
+import pytest
+
+from baxter_lab import Options
+from demonstrations.collecting import collect
+from demonstrations.environment import core_of, expert_of, record, replay, schema_of
+from demonstrations.experts import EXPERTS, down, rotation_vector
+from demonstrations.frames import ACTION, EXPERT_ACTION, STATE, DemonstrationError
+from demonstrations.reading import DataSet
+from demonstrations.writing import SetWriter
+
+PLAIN = Options(with_meshes=False)
+
+
+@pytest.mark.parametrize("task", EXPERTS)
+def test_an_expert_does_its_task_and_the_record_is_replayed_to_the_last_bit(task, tmp_path):
+    core = core_of(task)  # fingers of boxes do not hold
+    episode = record(core, expert_of(core), 3)
+    assert episode.success and len(episode) < 150
+    with SetWriter(tmp_path, schema_of(core)) as writer:
+        writer.add(episode)
+    found = DataSet(tmp_path).episode(0)
+    record(core, expert_of(core), 4)  # something else between
+    assert replay(core, found) == {STATE: 0.0, "observation.environment_state": 0.0}
+    found.columns[ACTION] = found.columns[ACTION] + np.float32(1e-3)
+    assert replay(core, found)[STATE] > 0.0
+    core.close()
+
+
+def test_what_an_expert_wants_is_beside_what_was_done():
+    core = core_of("Reach", options=PLAIN)
+    episode = record(core, expert_of(core), 1, noise=1.0)
+    done, wanted = episode.columns[ACTION], episode.columns[EXPERT_ACTION]
+    assert episode.success and not np.array_equal(done, wanted)
+    np.testing.assert_array_equal(done[:, [6, 13]], wanted[:, [6, 13]])  # grippers are not disturbed
+    again = record(core, expert_of(core), 1, noise=1.0)
+    np.testing.assert_array_equal(again.columns[ACTION], done)
+    core.close()
+
+
+def test_a_set_is_the_same_with_any_number_of_workers(tmp_path):
+    sets = []
+    for workers in (1, 2):
+        found = collect("Reach", tmp_path / str(workers), range(2), workers=workers)
+        assert (found.kept, found.failed) == (2, 0)
+        sets.append([DataSet(tmp_path / str(workers)).episode(number) for number in range(2)])
+    for one, other in zip(*sets, strict=True):
+        assert one.seed == other.seed
+        np.testing.assert_array_equal(one.columns[STATE], other.columns[STATE])
+
+
+def test_unknown_tasks_and_cameras_are_named():
+    with pytest.raises(DemonstrationError, match="PickPlace"):
+        core_of("Juggle")
+    with pytest.raises(DemonstrationError, match="left_hand"):
+        core_of("Reach", cameras=("left",))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 3.0, np.pi])
+def test_a_turn_is_its_axis_times_its_angle(angle):
+    assert np.linalg.norm(rotation_vector(down(angle) @ down(0.0).T)) == pytest.approx(angle, abs=1e-7)
