@@ -41,6 +41,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   labs up N | list | start | pause | stop | renew | down | logs
                         labs for a class on this machine, behind one front door
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
+  learn TASK            learn a task of gym_baxter from an expert's demonstrations, and measure and film the policy
   batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs
   batch-node            this machine as one of several for 'batch --engine ray', until Ctrl-C
   bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
@@ -101,6 +102,7 @@ declare -A PROGRAMS=(
     # -P: no module is taken from the current folder, which may hold submissions.
     [grade]="python3 -P -m rf_grading"
     [labs]="python3 -P -m lab_class"
+    [learn]="python3 -m robot_learning"
     [batch]="python3 -m lab_batch"
     [batch-node]="python3 -m lab_batch.ray_node"
     [bench]="python3 $LAB_ROOT/tests/bench/run.py"

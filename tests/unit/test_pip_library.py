@@ -15,13 +15,15 @@ try:
 except ImportError:  # Python 3.10
     from pip._vendor import tomli as tomllib
 
-FRONT_DOORS = ("baxter_lab", "gym_baxter")
+FRONT_DOORS = ("baxter_lab", "gym_baxter", "demonstrations", "robot_learning")
 #: Modules of the dependencies of pyproject.toml under another name.
 RENAMED = {"PyYAML": "yaml", "python-fcl": "fcl", "pycollada": "collada", "pillow": "PIL", "pybullet-arm64": "pybullet"}
 #: Modules that are used where they are there; for what, without them.
 OPTIONAL = {
     "rospkg": "finds packages in a workspace; installed packages have their own list",
     "gymnasium": "extra `gym`: the environments' registration",
+    "pyarrow": "extra `lerobot`: data sets", "av": "extra `lerobot`: films of cameras",
+    "scipy": "multiplies faster than Debian's NumPy",
     "h5py": "maps of reach as HDF5", "ompl": "planners by their names in ompl_planning.yaml",
     "llvmlite": "part of numba",
 }

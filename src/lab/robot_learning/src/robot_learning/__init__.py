@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Policies that learn tasks from demonstrations, in NumPy."""

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Learn a task of gym_baxter from an expert's demonstrations, and measure how often it is done."""
+from __future__ import annotations
+
+import argparse
+import datetime
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
+from demonstrations.collecting import collect
+from demonstrations.experts import EXPERTS
+from demonstrations.frames import DemonstrationError
+from demonstrations.layout import INFO, write_json
+from demonstrations.reading import DataSet
+from lab_batch import JobError
+
+from .evaluation import Score, core_for, evaluate
+from .pictures import choose, draw_curve, film
+from .policy import PolicyError, load
+from .training import TrainingSettings, train
+
+#: Seeds of demonstrations begin here: those of the evaluation are below.
+FIRST_DEMONSTRATION = 100_000
+DEMONSTRATIONS, EPISODES, NOISE = 100, 100, 1.0
+POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
+
+
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line's options."""
+    parser = Parser(
+        prog="./baxter.sh learn", description=__doc__,
+        epilog="Without --data the expert shows the task first. Exit status: 0 done, 1 something is missing or broken, "
+               "2 wrong options, 130 after Ctrl-C. `python3 -m robot_learning` is the same without ROS.")
+    parser.add_argument("task", metavar="TASK", nargs="?", help="one of %s" % ", ".join(EXPERTS))
+    parser.add_argument("--evaluate", type=Path, metavar="POLICY", help="only measure this policy file")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="of the results (default: .baxter/learned/TASK)")
+    parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
+    parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
+                        help="of the expert (default %(default)s)")
+    parser.add_argument("--steps", type=number(int, 1, 10**8), default=TrainingSettings.steps, metavar="N",
+                        help="of training (default %(default)s)")
+    parser.add_argument("--chunk", type=number(int, 1, 1000), default=TrainingSettings.chunk, metavar="N",
+                        help="actions that are predicted at once (default %(default)s)")
+    parser.add_argument("--seed", type=number(int, 0, MAX_SEED), default=0, help="of the training's chance")
+    parser.add_argument("--episodes", type=number(int, 0, FIRST_DEMONSTRATION), default=EPISODES, metavar="N",
+                        help="of the evaluation, seeds 0 to N - 1 (default %(default)s; 0: none)")
+    parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count() or 1, metavar="N",
+                        help="processes at a time (default: one for each processor, %(default)s)")
+    parser.add_argument("--no-film", action="store_true", help="do not film good and bad episodes")
+    options = parser.parse_args(argv)
+    if options.evaluate is None and options.task not in EXPERTS:
+        parser.error("TASK is one of %s; found %s%s" % (
+            ", ".join(EXPERTS), options.task or "none", did_you_mean(options.task or "", EXPERTS)))
+    return options
+
+
+def _say(text: str, end: bool = False) -> None:
+    """Progress: one line on a terminal, and only its last state elsewhere."""
+    if sys.stderr.isatty():
+        print("\r\x1b[K" + text, end="\n" if end else "", file=sys.stderr, flush=True)
+    elif end:
+        print(text, file=sys.stderr, flush=True)
+
+
+def _versions() -> dict[str, str]:
+    return {"python": platform.python_version(), "numpy": np.__version__}
+
+
+def learn(options: argparse.Namespace, folder: Path) -> Path:
+    """Demonstrations, training, the curve; returns the policy's file. Raises DemonstrationError, JobError, OSError."""
+    source = options.data or folder / SET
+    if options.data is None:
+        have = len(DataSet(source)) if (source / INFO).exists() else 0
+        if have < options.demonstrations:
+            first = FIRST_DEMONSTRATION + have
+            seeds = range(first, FIRST_DEMONSTRATION + options.demonstrations)
+            found = collect(options.task, source, seeds, NOISE, options.workers, say=_say)
+            _say("%d demonstrations of %s: %d frames; the expert failed %d times" % (
+                found.kept, options.task, found.frames, found.failed), True)
+    data = DataSet(source)
+    settings = TrainingSettings(chunk=options.chunk, steps=options.steps, seed=options.seed)
+    made = {"date": datetime.date.today().isoformat(), "demonstrations": len(data), "steps": settings.steps,
+            "seed": settings.seed, "versions": _versions()}
+    policy, curve = train(data, settings, made, lambda step, training, validation: _say(
+        "step %d of %d: loss %.4f, %.4f of episodes that only judge" % (step, settings.steps, training, validation)))
+    _say("%d steps in %.0f s: loss %.4f, %.4f of episodes that only judge" % (
+        settings.steps, curve.seconds, curve.training[-1], curve.validation[-1]), True)
+    path = folder / POLICY
+    policy.save(path)
+    draw_curve(curve, "%s: %d demonstrations" % (policy.contract.task, len(data)), folder / CURVE)
+    print("policy in %s, learning curve in %s" % (path, folder / CURVE))
+    return path
+
+
+def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
+    """Evaluation and film. Raises PolicyError, JobError, OSError."""
+    score = evaluate(path, range(options.episodes), options.workers, lambda done, good: _say(
+        "%d of %d episodes, %d succeeded" % (done, options.episodes, good)))
+    _say("", sys.stderr.isatty())
+    print("%s: %s" % (load(path).contract.task, score))
+    for seed, error in score.errors.items():
+        print("seed %d did not run: %s" % (seed, error))
+    write_json(folder / SCORE, {"successes": score.successes, "count": score.count, "episodes": score.results})
+    if chosen := ([] if options.no_film else choose(score)):
+        policy = load(path)
+        core = core_for(policy.contract)
+        try:
+            film(core, policy, chosen, folder / FILM)
+        finally:
+            core.close()
+        print("film of the seeds %s in %s" % (", ".join(map(str, chosen)), folder / FILM))
+    return score
+
+
+def run(options: argparse.Namespace) -> None:
+    """Raises DemonstrationError, PolicyError, JobError, OSError."""
+    root = Path(os.environ.get("LAB_ROOT", Path.cwd()))
+    name = options.task or (load(options.evaluate).contract.task if options.evaluate else "")
+    folder = options.out or root / ".baxter" / "learned" / name
+    folder.mkdir(parents=True, exist_ok=True)
+    path = options.evaluate or learn(options, folder)
+    if options.episodes:
+        measure(options, path, folder)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The program."""
+    options = parse(argv)
+    try:
+        run(options)
+    except (DemonstrationError, PolicyError, JobError, OSError) as error:
+        _say("", sys.stderr.isatty())
+        print("learn: %s" % error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("learn: stopped; demonstrations that were complete are kept, and the same command goes on with them",
+              file=sys.stderr)
+        return 130
+    return 0
+
+

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A small policy learns from a small set of the real format; contracts, files and figures are checked."""
+import dataclasses
+
+import numpy as np
+import pytest
+
+from demonstrations.frames import ACTION, ENVIRONMENT, STATE, DemonstrationError, Episode, Schema, numbers
+from demonstrations.reading import DataSet
+from demonstrations.writing import SetWriter
+from robot_learning.evaluation import Score, wilson
+from robot_learning.inputs import Inputs
+from robot_learning.network import Network
+from robot_learning.pictures import choose, draw_curve
+from robot_learning.policy import PolicyError, Runner, load
+from robot_learning.training import TrainingSettings, contract_of, train
+
+HAND, GOAL = ("left_hand.x", "left_hand.y", "left_hand.z"), ("goal.x", "goal.y", "goal.z")
+QUICK = TrainingSettings(chunk=2, hidden=(32,), steps=400, batch=64)
+
+
+def small_set(folder, about=(("task", "Reach"), ("control", "osc_pose")), success=True):
+    """Hands that go a third of the way to their goal with each action."""
+    schema = Schema(20, {ACTION: numbers([(axis, "") for axis in "xyz"]),
+                         STATE: numbers([(name, "m") for name in HAND]),
+                         ENVIRONMENT: numbers([(name, "m") for name in GOAL])}, about=dict(about))
+    random = np.random.default_rng(0)
+    with SetWriter(folder, schema) as writer:
+        for seed in range(12):
+            hand, goal = random.uniform(-0.3, 0.3, (2, 3))
+            rows = []
+            for _ in range(20):
+                action = np.clip(3.0 * (goal - hand), -1.0, 1.0)
+                rows.append((action, hand, goal))
+                hand = hand + 0.1 * action
+            columns = {key: np.array([row[n] for row in rows], dtype=np.float32)
+                       for n, key in enumerate((ACTION, STATE, ENVIRONMENT))}
+            writer.add(Episode("Reach.", columns, success, seed))
+    return DataSet(folder)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    return train(small_set(tmp_path_factory.mktemp("set")), QUICK, {"by": "a test"})
+
+
+def test_a_policy_learns_to_go_to_the_goal(learned):
+    policy, curve = learned
+    assert curve.validation[-1] < 0.15 and curve.steps[-1] == QUICK.steps
+    runner, hand, goal = Runner(policy), np.array((0.2, -0.1, 0.1)), np.array((-0.1, 0.2, 0.0))
+    for _ in range(30):
+        hand = hand + 0.1 * runner.act([*hand, *goal])
+    assert np.linalg.norm(hand - goal) < 0.03
+
+
+def test_the_same_set_gives_the_same_policy(learned, tmp_path):
+    again, _ = train(small_set(tmp_path), QUICK)
+    for one, other in zip(learned[0].network.layers, again.network.layers, strict=True):
+        np.testing.assert_array_equal(one[0], other[0])
+
+
+def test_a_file_holds_the_policy_and_its_contract(learned, tmp_path):
+    policy = learned[0]
+    policy.save(tmp_path / "policy.npz")
+    found = load(tmp_path / "policy.npz")
+    seen = np.random.default_rng(1).uniform(-0.3, 0.3, (5, 6))
+    np.testing.assert_array_equal(found.chunks(seen), policy.chunks(seen))
+    assert found.contract == policy.contract and found.contract.made == {"by": "a test"}
+    assert found.contract.observation == (*HAND, *GOAL) and found.contract.units == ("m",) * 6
+
+
+@pytest.mark.parametrize("content", [b"", b"half", None])
+def test_what_is_no_policy_is_refused(tmp_path, content):
+    path = tmp_path / "policy.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(PolicyError, match="policy.npz"):
+        load(path)
+
+
+def test_a_file_that_is_cut_off_and_arrays_without_a_contract_are_refused(learned, tmp_path):
+    learned[0].save(tmp_path / "whole.npz")
+    (tmp_path / "half.npz").write_bytes((tmp_path / "whole.npz").read_bytes()[:2000])
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    for name in ("half.npz", "other.npz"):
+        with pytest.raises(PolicyError, match=name):
+            load(tmp_path / name)
+
+
+@pytest.mark.parametrize(("found", "text"), [
+    ({"rate_hz": 10}, "needs rate_hz 20; here it is 10"), ({"control": "joint_pos"}, "osc_pose"),
+    ({"observation": (*HAND, "goal.x", "goal.z", "goal.y")}, "number 4 of the observation is 'goal.y'"),
+    ({"observation": HAND}, "needs 6 numbers as observation; here are 3")])
+def test_the_first_difference_from_the_contract_is_named(learned, found, text):
+    with pytest.raises(PolicyError, match=text):
+        learned[0].contract.require(**found)
+
+
+def test_observations_that_are_not_finite_are_refused(learned):
+    with pytest.raises(PolicyError, match="6 finite numbers"):
+        Runner(learned[0]).act([np.nan] * 6)
+
+
+def test_sets_without_a_task_or_without_successes_are_refused(tmp_path):
+    with pytest.raises(DemonstrationError, match="task"):
+        contract_of(small_set(tmp_path / "a", about=()), 2)
+    with pytest.raises(DemonstrationError, match="no successful episode"):
+        train(small_set(tmp_path / "b", success=False), QUICK)
+
+
+def test_weights_of_another_size_do_not_fit_the_contract(learned):
+    with pytest.raises(PolicyError, match="the network goes from"):
+        dataclasses.replace(learned[0], network=Network.random((5, 8, 6), np.random.default_rng(0)))
+
+
+def test_gradients_are_those_of_finite_differences():
+    random = np.random.default_rng(0)
+    network = Network.random((4, 6, 5, 3), random)
+    inputs, wanted, share = (random.standard_normal((7, n)).astype(np.float32) for n in (4, 3, 3))
+    _, gradients = network.gradients(inputs, wanted, share**2)
+    values = [array for layer in network.layers for array in layer]
+    for value, gradient in zip(values, gradients, strict=True):
+        at, step = (0,) * value.ndim, np.float32(1e-3)
+        losses = []
+        for sign in (1.0, -1.0):
+            value[at] += sign * step
+            losses.append(network.gradients(inputs, wanted, share**2)[0])
+            value[at] -= sign * step
+        assert gradient[at] == pytest.approx((losses[0] - losses[1]) / (2 * step), abs=2e-3)
+
+
+def test_a_quaternion_and_its_negative_are_the_same_input():
+    names = ["block.%s" % part for part in ("x", "y", "z", "qx", "qy", "qz", "qw")]
+    row = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.6, 0.8])
+    inputs = Inputs(names, False)
+    one, other = inputs.of(row[None]), inputs.of(np.concatenate([row[:3], -row[3:]])[None])
+    np.testing.assert_array_equal(one, other)
+    assert one.shape == (1, len(inputs)) == (1, 9)
+    np.testing.assert_allclose(one[0, 3:6], (1.0 - 2.0 * 0.36, 2.0 * 0.48, 0.0), atol=1e-6)
+
+
+def test_speeds_are_no_inputs_and_angles_only_of_joint_policies():
+    names = ["left_s0.pos", "left_s0.vel", "left_gripper.open"]
+    assert len(Inputs(names, False)) == 1 and len(Inputs(names, True)) == 2
+
+
+@pytest.mark.parametrize(("good", "count", "low", "high"), [
+    (95, 100, 0.888, 0.978), (0, 10, 0.0, 0.278), (100, 100, 0.963, 1.0)])
+def test_confidence_intervals_are_wilsons(good, count, low, high):
+    assert wilson(good, count) == (pytest.approx(low, abs=1e-3), pytest.approx(high, abs=1e-3))
+
+
+def test_a_score_counts_episodes_that_did_not_run_as_failures():
+    score = Score({0: {"success": True}, 1: {"success": False}, 2: {"success": True}}, {3: "no"})
+    assert (score.successes, score.count) == (2, 4) and "2 of 4" in str(score)
+    assert choose(score) == [0, 2, 1]
+
+
+def test_a_curve_becomes_a_picture(learned, tmp_path):
+    from PIL import Image
+
+    draw_curve(learned[1], "small", tmp_path / "curve.png")
+    with Image.open(tmp_path / "curve.png") as picture:
+        assert picture.size == (720, 420) and len(picture.convert("RGB").getcolors(10**6)) > 4
