@@ -113,8 +113,8 @@ class Planner:
         thread.start()
         thread.join(patience_s)
         if thread.is_alive():
-            rospy.logwarn("this robot is planned for the first time: its links are covered by spheres, which may take "
-                          "half a minute. Plans wait for that; everything else answers already")
+            rospy.logwarn("the robot is still being prepared for planning; the first time its links are covered by "
+                          "spheres, which may take half a minute. Plans wait for that, everything else answers already")
 
     def _warm_up(self):
         context = self._context
