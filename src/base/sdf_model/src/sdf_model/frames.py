@@ -39,8 +39,13 @@ class Frames:
         the name of a frame."""
         if not self._scope or name in self:
             return name
-        before, scope, rest = ("::" + name).rpartition("::" + self._scope)
-        return rest if scope and rest in self else name
+        rest = "::" + name
+        while "::" + self._scope in rest:
+            rest = rest.partition("::" + self._scope)[2]
+            if rest in self:
+                return rest
+            rest = "::" + rest
+        return name
 
     def __contains__(self, name):
         return name in OWN or name in self._given

@@ -539,6 +539,10 @@ def test_names_in_a_nested_model_may_begin_with_all_models_around_it():
     found = parse_sdf_model(text, "m.sdf").robot
     hinge = found.joints["m::n::j"]
     assert (hinge.parent, hinge.child) == ("m::n::a", "m::n::b")
+    inner = LINK % ("a", "0 0 0 0 0 0")
+    text = '<sdf version="1.6"><model name="m"><model name="m">%s</model>%s%s</model></sdf>' % (
+        inner, inner, joint("j", "m::m::a", "a"))
+    assert parse_sdf_model(text, "m.sdf").robot.joints["j"].parent == "m::a"
 
 
 def test_a_shape_without_a_size_is_tiny_and_a_negative_one_is_refused():
