@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """An action server for ``traj`` that knows its clients: their version of the action, and whether they still run."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
 import actionlib
 import rospy
 from actionlib.status_tracker import StatusTracker
@@ -10,6 +15,9 @@ from baxter_interface.goal_loop import can_be_answered
 
 from . import versions
 
+if TYPE_CHECKING:
+    from baxter_traj_streamer.versions import Version
+
 # Size of a Header on the wire without its frame_id [bytes]: seq, stamp, length.
 _HEADER_SIZE = 16
 
@@ -18,7 +26,8 @@ class TrajServer(actionlib.ActionServer):
     """``actionlib.ActionServer`` of one ``versions.Version``; a client of the other version gets a log line on both
     sides."""
 
-    def __init__(self, name, version, goal_callback, cancel_callback):
+    def __init__(self, name: str, version: Version, goal_callback: Callable[..., Any],
+                 cancel_callback: Callable[..., Any]) -> None:
         super().__init__(name, version.action, goal_callback, cancel_callback, auto_start=False)
         self._version = version
         # Accepts goals of another version, so that they can be rejected with a reason; tools still see the served type.
@@ -26,12 +35,12 @@ class TrajServer(actionlib.ActionServer):
             "__slots__": [], "_type": version.action_goal._type})
         self._told = set()
 
-    def has_client(self, handle):
+    def has_client(self, handle: Any) -> bool:
         """Whether the program that sent the goal is still connected."""
         caller = handle.goal._connection_header["callerid"]
         return any(connection.callerid_pub == caller for connection in self._connections())
 
-    def internal_goal_callback(self, message):
+    def internal_goal_callback(self, message: Any) -> None:
         """Receives goals as bytes."""
         header = message._connection_header
         if header["md5sum"] == self._version.md5sum:
@@ -56,7 +65,7 @@ class TrajServer(actionlib.ActionServer):
             self.status_list.append(tracker)
             self.publish_status()
 
-    def publish_status(self):
+    def publish_status(self) -> None:
         """Called a few times a second: a client of another version may never get to send a goal."""
         super().publish_status()
         for connection in self._connections():
@@ -65,7 +74,7 @@ class TrajServer(actionlib.ActionServer):
                 self._told.add(caller)
                 rospy.logerr(self._wrong_version(caller, connection.type, version))
 
-    def _wrong_version(self, caller, kind, md5sum):
+    def _wrong_version(self, caller: str, kind: str, md5sum: str) -> str:
         own, other = self._version, versions.of_goal(md5sum)
         what_now = ("start the server with --action %s" % other.name if other is not None
                     else "use %s in the program" % own.name)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shared by the commands that move arms."""
+from __future__ import annotations
+
 import sys
 
 import rospy
@@ -11,7 +13,7 @@ from .move_service import REFUSALS
 from .traj_client import MoveFailed, TrajClient
 
 
-def add_wait_option(parser, default_s):
+def add_wait_option(parser, default_s: float) -> None:
     """``--wait SECONDS``; ``default_s`` None: until the move is over."""
     parser.add_argument("--wait", type=number(float, 0, MAX_SECONDS), default=default_s, metavar="SECONDS",
                         help="how long to wait for the result, in the robot's time; the arm moves on in any case "
@@ -19,7 +21,7 @@ def add_wait_option(parser, default_s):
                         % ("until it is there" if default_s is None else "%g" % default_s))
 
 
-def run(name, plan, wait_s):
+def run(name: str, plan, wait_s: float | None) -> None:
     """Send the trajectory ``plan(client)`` and wait for it; exits with a line on stderr after a failure.
 
     ``plan`` returns None if there is nothing to send.

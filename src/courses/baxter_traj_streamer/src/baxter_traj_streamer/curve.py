@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The curve through the points of a goal: its polynomials and times. Free of ROS."""
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 from joint_trajectory import Trajectory, smooth_velocities
@@ -8,12 +12,13 @@ from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, constant, splines
 from .optimal import time_optimal
 
 
-def has_positions_only(points):
+def has_positions_only(points: list[tuple[float, list[float], list[float], list[Any]]]) -> bool:
     """Whether no point of ``points``, rows (time, positions, velocities, accelerations), has more than positions."""
     return not any(len(point[2]) or len(point[3]) for point in points)
 
 
-def interpolate(times, points, start, interpolation):
+def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[float], list[Any]]], start: np.ndarray,
+                interpolation: str) -> Trajectory:
     """The :class:`Trajectory` from ``start`` (k,) [rad], or from point 0 if that is None, through the points.
 
     ``times`` (m,) [s], increasing. From a ``start`` the curve begins at rest, and a point at time 0 is replaced by it.
@@ -49,23 +54,24 @@ def interpolate(times, points, start, interpolation):
     return _with_end(times, pieces, positions[-1])
 
 
-def joined(lead_in, way):
+def joined(lead_in: Any, way: Any) -> Trajectory:
     """``way`` after ``lead_in``, both :class:`Trajectory` from time 0 on."""
     delay = lead_in.end_time
     return Trajectory(np.concatenate([lead_in.starts[:-1], way.starts + delay]),
                       np.concatenate([lead_in.coefficients[:-1], way.coefficients]), way.end_times + delay)
 
 
-def fastest(start, points, velocity, acceleration):
+def fastest(start: np.ndarray, points: list[tuple[float, list[float], list[Any], list[Any]]], velocity: np.ndarray,
+            acceleration: np.ndarray) -> Trajectory:
     """The time-optimal :class:`Trajectory` from ``start`` (k,) through the positions of the points."""
     return time_optimal(np.concatenate([start[None], [point[1] for point in points]]), velocity, acceleration)
 
 
-def _with_end(times, pieces, end):
+def _with_end(times: np.ndarray, pieces: np.ndarray, end: np.ndarray) -> Trajectory:
     return Trajectory(times, np.concatenate([pieces, constant(end)[None]]), np.full(len(end), times[-1]))
 
 
-def _degree(point):
+def _degree(point: tuple[float, list[float], list[float], list[Any]]) -> int:
     if not len(point[2]):
         return LINEAR
     return QUINTIC if len(point[3]) else CUBIC

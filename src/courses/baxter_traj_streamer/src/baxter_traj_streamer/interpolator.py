@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server ``trajActionServer``: connects goals, their checks and the robot's joint commands."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -17,6 +22,10 @@ from .judging import judge
 from .motion import Motion
 from .settings import SIDES
 
+if TYPE_CHECKING:
+    from baxter_traj_streamer.settings import StreamerSettings
+    from baxter_traj_streamer.versions import Version
+
 ACTION_NAME = "trajActionServer"
 _FEEDBACK_PERIOD_S = 0.1
 STOPPED_MEANWHILE = "the robot was disabled or stopped on the way; its arms have stopped where they were"
@@ -29,7 +38,7 @@ class Interpolator:
     version: the clients' `versions.Version`.
     """
 
-    def __init__(self, robot, limits, settings, version):
+    def __init__(self, robot: Any, limits, settings: StreamerSettings, version: Version) -> None:
         self._robot = robot
         self._limits = limits
         self._settings = settings
@@ -40,7 +49,7 @@ class Interpolator:
                                                   tcp_nodelay=True) for side in SIDES}
         self._server = TrajServer(ACTION_NAME, version, self._on_goal, self._goals.cancel)
 
-    def run(self):
+    def run(self) -> None:
         """Serve until the node is shut down."""
         goal_loop.start(self._server)
         while not rospy.is_shutdown():
@@ -55,7 +64,7 @@ class Interpolator:
 
     # -- rospy's threads ------------------------------------------------------------------------------------------
 
-    def _on_goal(self, handle):
+    def _on_goal(self, handle: Any) -> None:
         try:
             # While an arm moves, the start of this goal is unknown; it is checked when the goal starts.
             self._goals.put(handle, lambda is_busy: self._judge(handle, None if is_busy else self._robot.angles()))
@@ -65,14 +74,14 @@ class Interpolator:
 
     # -- the loop -------------------------------------------------------------------------------------------------
 
-    def _judge(self, handle, measured):
+    def _judge(self, handle: Any, measured: Any):
         why = self._robot.why_not_ready()
         if why:
             raise GoalRefused("robot", why)
         trajectory = handle.get_goal().trajectory
         return judge(trajectory.joint_names, rows_of_points(trajectory.points), self._limits, measured, self._settings)
 
-    def _follow(self, handle):
+    def _follow(self, handle: Any) -> None:
         before = self._robot.resets, self._robot.stops
         try:
             plan = self._judge(handle, self._robot.angles())
@@ -87,7 +96,7 @@ class Interpolator:
             rospy.logwarn("goal %d: %s", self._count, text)
         end(self._result(handle), text)
 
-    def _stream(self, handle, plan, resets, stops):
+    def _stream(self, handle: Any, plan, resets: int, stops: int):
         """Move the arms; returns how the goal ends: the handle's method, and a text.
 
         resets, stops: how many of each the robot had seen before ``plan`` was made.
@@ -134,7 +143,7 @@ class Interpolator:
             ticker.sleep()
         return handle.set_aborted, "the trajectory server was shut down"
 
-    def _why_elsewhere(self, went_back, resets, stops):
+    def _why_elsewhere(self, went_back: bool, resets: int, stops: int):
         """Why the arms are not where the plan has them, in words; empty while they are."""
         if went_back:
             return "time went backwards: the simulation was reset"
@@ -146,7 +155,7 @@ class Interpolator:
         """Whether the active goal was cancelled, or a newer one may replace it."""
         return self._settings.preemption and (self._goals.is_cancelled or self._goals.has_next)
 
-    def _farthest(self, names, target):
+    def _farthest(self, names: Sequence[str], target: Any) -> str | None:
         """A sentence about the joint that is farthest from its target; None if all are near."""
         angles = self._robot.angles()
         error = np.array([angles[name] for name in names]) - target
@@ -156,13 +165,13 @@ class Interpolator:
         return "%s is %.4f rad from its goal, %g are accepted (goal_tolerance) after %g s (settle_time_s)" % (
             names[joint], error[joint], self._settings.goal_tolerance, self._settings.settle_time_s)
 
-    def _command(self, names, values, mode):
+    def _command(self, names: Sequence[str], values: Any, mode: int) -> None:
         for side, publisher in self._publishers.items():
             own = [i for i, name in enumerate(names) if name.startswith(side)]
             if own:
                 publisher.publish(JointCommand(mode=mode, names=[names[i] for i in own],
                                                command=[values[i] for i in own]))
 
-    def _result(self, handle):
+    def _result(self, handle: Any):
         """``return_val`` counts the executed goals, as the notes' server does."""
         return self._version.make_result(self._count, handle.get_goal())

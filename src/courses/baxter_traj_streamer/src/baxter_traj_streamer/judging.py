@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks a goal before anything moves. Free of ROS."""
+from __future__ import annotations
+
 import functools
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +15,9 @@ from joint_trajectory import Trajectory
 from .curve import fastest, has_positions_only, interpolate, joined
 from .errors import GoalRefused
 from .settings import SIDES, arm_joint_names
+
+if TYPE_CHECKING:
+    from baxter_traj_streamer.settings import StreamerSettings
 
 KNOWN_JOINTS = tuple(name for side in SIDES for name in arm_joint_names(side))
 RIGHT_ARM = tuple(arm_joint_names("right"))
@@ -38,11 +44,12 @@ class Plan(NamedTuple):
     goal: np.ndarray
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         return self.trajectory.end_time
 
 
-def judge(joint_names, points, limits, measured, settings):
+def judge(joint_names: Sequence[str], points: Any,
+          limits: dict[str, JointLimit], measured: dict[str, float] | None, settings: StreamerSettings) -> Plan:
     """Make a :class:`Plan`, or raise :class:`GoalRefused`.
 
     joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
@@ -100,14 +107,14 @@ def judge(joint_names, points, limits, measured, settings):
     return Plan(names, joined(lead_in, trajectory) if lead_in else trajectory, positions[-1])
 
 
-def _pace(names, bounds, settings):
+def _pace(names: tuple[str, str], bounds: np.ndarray, settings: StreamerSettings) -> tuple[np.ndarray, np.ndarray]:
     """Velocities [rad/s] and accelerations [rad/s^2] (k,) for trajectories whose times the server chooses."""
     velocity, acceleration = ([table[name.rpartition("_")[2]] for name in names]
                               for table in (settings.max_velocity, settings.max_acceleration))
     return np.minimum(velocity, bounds[2]), np.array(acceleration)
 
 
-def _judge_names(names):
+def _judge_names(names: tuple[str, ...]) -> None:
     for index, name in enumerate(names):
         if name not in KNOWN_JOINTS:
             raise GoalRefused("joints", "joint_names has %r, which is not an arm joint; they are %s and the same of "
@@ -116,7 +123,8 @@ def _judge_names(names):
             raise GoalRefused("joints", "joint_names has %s more than once" % name, joint=name)
 
 
-def _judge_numbers(index, point, names):
+def _judge_numbers(index: int, point: tuple[float, list[float], list[float], list[Any]],
+                   names: tuple[str, ...]) -> None:
     if not math.isfinite(point[0]):
         raise GoalRefused("number", "point %d: time_from_start is %r, not a finite number" % (index, point[0]), index,
                           value=point[0])
@@ -130,7 +138,7 @@ def _judge_numbers(index, point, names):
                     index, name, field, value), index, name, value)
 
 
-def _judge_times(times, settings):
+def _judge_times(times: np.ndarray, settings: StreamerSettings) -> None:
     if times[0] < 0.0:
         raise GoalRefused("time", "point 0 is due at %.9g s; times from start begin at 0" % times[0], 0, None, times[0],
                           0.0)
@@ -148,7 +156,8 @@ def _judge_times(times, settings):
             index, times[index], settings.max_duration_s), index, None, times[index], settings.max_duration_s)
 
 
-def _start(names, first, limits, measured):
+def _start(names: tuple[str, ...], first: np.ndarray, limits: dict[str, JointLimit],
+           measured: dict[str, float]) -> np.ndarray:
     """(k,) [rad]: the robot's position, or, if that is unknown, the position within the limits nearest to ``first``."""
     for name in names:
         if name not in limits:
@@ -161,7 +170,7 @@ def _start(names, first, limits, measured):
     return np.clip(first, [limits[name].lower for name in names], [limits[name].upper for name in names])
 
 
-def _bounds(names, limits, start, slack):
+def _bounds(names: tuple[str, ...], limits: dict[str, JointLimit], start: np.ndarray, slack: float) -> np.ndarray:
     """(3, k): lower, upper, velocity; a joint that is beyond its limit may stay there, but not go farther."""
     table = np.array([limits[name] for name in names]).T
     table[0] = np.minimum(table[0], start) - slack
@@ -169,20 +178,20 @@ def _bounds(names, limits, start, slack):
     return table
 
 
-def _judge_positions(positions, names, bounds):
+def _judge_positions(positions: np.ndarray, names: tuple[str, ...], bounds: np.ndarray) -> None:
     beyond = np.argwhere((positions < bounds[0]) | (positions > bounds[1]))
     if len(beyond):
         index, joint = (int(i) for i in beyond[0])
         _refuse_position("point %d" % index, index, names[joint], positions[index, joint], bounds[:, joint])
 
 
-def _refuse_position(where, index, name, value, bounds):
+def _refuse_position(where: str, index: int, name: str, value: float, bounds: np.ndarray) -> None:
     limit = bounds[0] if value < bounds[0] else bounds[1]
     raise GoalRefused("limit", "%s, %s: %.6f rad is beyond its limit of %.6f rad" % (where, name, value, limit), index,
                       name, float(value), float(limit))
 
 
-def _refuse_start(first, start, names, tolerance):
+def _refuse_start(first: np.ndarray, start: np.ndarray, names: tuple[str, ...], tolerance: float) -> None:
     joint = int(np.argmax(np.abs(first - start)))
     raise GoalRefused("start", "point 0, %s: %.6f rad at once, but the robot is at %.6f rad, and at most %g rad "
                       "between them are accepted (start_tolerance); begin where the robot is, or give point 0 a "
@@ -190,7 +199,7 @@ def _refuse_start(first, start, names, tolerance):
                       float(first[joint]), tolerance)
 
 
-def _judge_curve(trajectory, names, bounds, first_point):
+def _judge_curve(trajectory: Trajectory, names: tuple[str, ...], bounds: np.ndarray, first_point: int) -> None:
     """Raise GoalRefused if the curve between the points, (pieces, samples, joints), is too fast or leaves the
     limits."""
     duration = np.diff(trajectory.starts)

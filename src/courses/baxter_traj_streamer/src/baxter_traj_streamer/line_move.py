@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Moves along a straight line from the arms' present position. A separate module, because its imports take a second."""
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 import rospy
 
@@ -19,7 +23,7 @@ class LineMove:
     Raises SettingsError without robot_description, ChainError or UrdfError if it has no gripper.
     """
 
-    def __init__(self, client):
+    def __init__(self, client: Any) -> None:
         self._client = client
         if not rospy.has_param("robot_description"):
             raise SettingsError("the parameter robot_description is not set; the arms' kinematics are read from it")
@@ -27,7 +31,7 @@ class LineMove:
         self._chains = {side: Chain.from_robot(robot, BASE_FRAME, tip_of(side)) for side in SIDES}
         self._limits = read_limits()
 
-    def trajectory(self, side, displacement, speed=0.0):
+    def trajectory(self, side: str, displacement: np.ndarray, speed: float = 0.0):
         """``displacement`` (3,) [m] in base; ``speed`` [m/s], 0: the settings'. Raises LeavesReach, ValueError."""
         settings = self._client.streamer.settings
         if not 0.0 <= speed < np.inf:

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The execution of one plan: joint positions over time, and an early stop. Free of ROS."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from baxter_traj_streamer.judging import Plan
 
 # Number of samples in the search for the highest velocity of the rest of the path.
 _PLACES = 200
@@ -15,18 +21,18 @@ class Motion:
     at most ``stop_deceleration`` [rad/s^2] more than the trajectory's own acceleration.
     """
 
-    def __init__(self, plan, start_time, stop_deceleration):
+    def __init__(self, plan: Plan, start_time: float, stop_deceleration: float) -> None:
         self.plan = plan
         self._start_time = start_time
         self._stop_deceleration = stop_deceleration
         self._stop_time = None
         self._stop_duration_s = 0.0
 
-    def positions(self, time_s):
+    def positions(self, time_s: float) -> np.ndarray:
         """(k,) [rad] at ``time_s``."""
         return self.plan.trajectory.sample(self._way_time(time_s))[0]
 
-    def stop(self, time_s):
+    def stop(self, time_s: float) -> None:
         """Come to rest from ``time_s`` on, which must not be before the last queried time."""
         if self._stop_time is not None:
             return
@@ -37,23 +43,23 @@ class Motion:
         self._stop_time = time_s
 
     @property
-    def stopping(self):
+    def stopping(self) -> bool:
         """Whether :meth:`stop` was called."""
         return self._stop_time is not None
 
-    def is_at_rest(self, time_s):
+    def is_at_rest(self, time_s: float) -> bool:
         """Whether the motion is over: at its end, or after a stop."""
         if self.stopping and time_s >= self._stop_time + self._stop_duration_s:
             return True
         return self._way_time(time_s) >= self.plan.duration_s
 
-    def percent(self, time_s):
+    def percent(self, time_s: float) -> int:
         """Share of the path's time that has passed, 0 to 100."""
         # A goal at the robot's position has the duration zero.
         share = self._way_time(time_s) / self.plan.duration_s if self.plan.duration_s > 0.0 else 1.0
         return int(math.floor(100.0 * min(1.0, share)))
 
-    def _way_time(self, time_s):
+    def _way_time(self, time_s: float) -> float:
         """Time along the path [s], not below 0."""
         if self._stop_time is None:
             return max(0.0, time_s - self._start_time)

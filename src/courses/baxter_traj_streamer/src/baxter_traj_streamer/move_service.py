@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A node for one kind of move: a service that responds when the move is over."""
+from __future__ import annotations
+
 import threading
+from typing import Any
 
 import rospy
 
@@ -12,7 +15,7 @@ from .traj_client import MoveFailed, TrajClient
 REFUSALS = (MoveFailed, ValueError, OSError)
 
 
-def run(name, service, service_type, move_type, plan):
+def run(name: str, service: str, service_type, move_type, plan) -> None:
     """Run as the node ``name`` until it is shut down. ``plan(move, request)`` returns the trajectory for a request.
 
     A request during another one is refused; trajActionServer/cancel stops the active one.
@@ -24,7 +27,7 @@ def run(name, service, service_type, move_type, plan):
     busy = threading.Lock()
     answer_type = service_type._response_class
 
-    def answer(request):
+    def answer(request: Any):
         if not busy.acquire(blocking=False):
             return answer_type(success=False, message="another move is under way; trajActionServer/cancel stops it")
         try:

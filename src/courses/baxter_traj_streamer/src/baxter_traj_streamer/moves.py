@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Moves of the arms as trajectories from their present position: to a pose, along playfiles."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from . import playfile
 from .ros_settings import read_limits
 from .timing import arrival_times
 from .traj_client import joint_trajectory
 
+if TYPE_CHECKING:
+    import numpy as np
+
 
 class PoseMove:
     """To a pose: ``trajectory(side, pose, time_optimal)``."""
 
-    def __init__(self, client):
+    def __init__(self, client: Any) -> None:
         self._client = client
 
-    def trajectory(self, side, pose, time_optimal=False):
+    def trajectory(self, side: str, pose: np.ndarray, time_optimal: bool = False):
         """``pose``: a name or seven angles [rad]. Raises SettingsError, ValueError."""
         streamer = self._client.streamer
         path = [streamer.get_qvec(side), streamer.settings.pose(pose, side) if isinstance(pose, str) else pose]
@@ -24,15 +31,15 @@ class PoseMove:
 class PlayfileMove:
     """To the first row of playfiles and along them: ``trajectory(files, time_optimal)``."""
 
-    def __init__(self, client):
+    def __init__(self, client: Any) -> None:
         self._client = client
         self._limits = read_limits()
 
-    def check(self, files):
+    def check(self, files: Any) -> None:
         """Check {side: Playfile} as the server would. Raises PlayfileError."""
         playfile.check(files, self._limits, self._client.streamer.settings)
 
-    def trajectory(self, files, time_optimal=False):
+    def trajectory(self, files: Any, time_optimal: bool = False):
         """``files``: {side: Playfile}, both begin at their first rows together. Raises PlayfileError."""
         self.check(files)
         names, times, positions = playfile.merged(files)

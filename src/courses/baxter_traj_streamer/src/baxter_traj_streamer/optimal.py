@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The fastest trajectory through poses under limits on velocity and acceleration, by ruckig. Free of ROS."""
+from __future__ import annotations
+
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import ruckig
@@ -10,6 +13,9 @@ from joint_trajectory import Trajectory, smooth_velocities
 from joint_trajectory.segment import constant
 
 from .timing import arrival_times
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # Shares of the reference velocity that are tried at each inner pose; 0 is a stop there.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)
@@ -23,7 +29,7 @@ _SAME_POSE = 1e-9
 _SAME_TIME_S = 1e-9
 
 
-def time_optimal(path, velocity, acceleration):
+def time_optimal(path: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Trajectory:
     """The :class:`Trajectory` from rest through the poses ``path`` (m, n) [rad] to rest, from time 0 on.
 
     ``velocity`` [rad/s], ``acceleration`` [rad/s^2]: limits (n,).
@@ -48,7 +54,7 @@ def time_optimal(path, velocity, acceleration):
     return Trajectory(np.array(starts), np.array(pieces), np.full(count, starts[-1]))
 
 
-def _fastest(path, velocity, acceleration):
+def _fastest(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[ruckig.Trajectory]:
     """The ruckig trajectories of the segments, with the velocities at the poses that give the shortest time."""
     shares = _SHARES if len(path) <= _MANY_POSES else (_SHARES[0], _SHARES[-1])
     reference = _reference_velocities(path, velocity, acceleration)
@@ -68,7 +74,7 @@ def _fastest(path, velocity, acceleration):
         path[:-1], speeds[:-1], path[1:], speeds[1:], strict=True)]
 
 
-def _reference_velocities(path, velocity, acceleration):
+def _reference_velocities(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """(m, n): velocities at the poses, 0 at both ends, with which a segment of any duration has no overshoot."""
     if len(path) < 3:
         return np.zeros_like(path)
@@ -82,7 +88,7 @@ def _reference_velocities(path, velocity, acceleration):
 class _Solver:
     """Ruckig for one set of limits."""
 
-    def __init__(self, velocity, acceleration):
+    def __init__(self, velocity: np.ndarray, acceleration: np.ndarray) -> None:
         self._solver = ruckig.Ruckig(len(velocity))
         self._input = ruckig.InputParameter(len(velocity))
         self._input.max_velocity, self._input.max_acceleration = velocity.tolist(), acceleration.tolist()
@@ -90,7 +96,8 @@ class _Solver:
         self._input.synchronization = ruckig.Synchronization.Phase
         self._trial = ruckig.Trajectory(len(velocity))
 
-    def duration(self, here, start_velocity, there, end_velocity):
+    def duration(self, here: np.ndarray, start_velocity: np.ndarray, there: np.ndarray,
+                 end_velocity: np.ndarray) -> float:
         """Duration of the segment [s]; inf if there is none, or if a joint leaves the span of its ends."""
         if not self._calculate(here, start_velocity, there, end_velocity, self._trial):
             return math.inf
@@ -100,19 +107,21 @@ class _Solver:
                 return math.inf
         return self._trial.duration
 
-    def solve(self, here, start_velocity, there, end_velocity):
+    def solve(self, here: np.ndarray, start_velocity: np.ndarray, there: np.ndarray,
+              end_velocity: np.ndarray) -> ruckig.Trajectory:
         found = ruckig.Trajectory(len(here))
         self._calculate(here, start_velocity, there, end_velocity, found)
         return found
 
-    def _calculate(self, here, start_velocity, there, end_velocity, found):
+    def _calculate(self, here: np.ndarray, start_velocity: np.ndarray, there: np.ndarray, end_velocity: np.ndarray,
+                   found: ruckig.Trajectory) -> bool:
         self._input.current_position, self._input.current_velocity = here.tolist(), start_velocity.tolist()
         self._input.target_position, self._input.target_velocity = there.tolist(), end_velocity.tolist()
         return self._solver.validate_input(self._input) and self._solver.calculate(self._input, found) in (
             ruckig.Result.Working, ruckig.Result.Finished)
 
 
-def _changes(segment):
+def _changes(segment: ruckig.Trajectory) -> list[float]:
     """Times [s] from 0 to the segment's end at which the acceleration of any joint changes."""
     times = [0.0, segment.duration]
     for profile in segment.profiles[0]:
@@ -123,7 +132,7 @@ def _changes(segment):
     return kept.tolist()
 
 
-def _piece(segment, begin, until):
+def _piece(segment: ruckig.Trajectory, begin: float, until: float) -> np.ndarray:
     """(6, n): the polynomial between two changes, of constant acceleration."""
     coefficients = np.zeros((6, segment.degrees_of_freedom))
     coefficients[0], coefficients[1], _ = segment.at_time(begin)

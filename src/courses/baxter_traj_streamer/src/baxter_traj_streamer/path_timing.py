@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The service through which the C++ library times paths; the rules themselves are in timing and streamer."""
+from __future__ import annotations
+
 import itertools
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -10,12 +13,15 @@ from .srv import TimePath, TimePathResponse
 from .streamer import stuff_trajectory
 from .timing import transition_time
 
+if TYPE_CHECKING:
+    from baxter_traj_streamer.settings import StreamerSettings
+
 SERVICE = "/baxter_traj_streamer/time_path"
 
 
-def serve(settings):
+def serve(settings: StreamerSettings) -> rospy.Service:
     """Offer the service from now on. Invalid paths are refused with the library's error text."""
-    def answer(request):
+    def answer(request: Any) -> TimePathResponse:
         side = next((side for side in SIDES if request.path.joint_names == arm_joint_names(side)), None)
         if side is None:
             raise rospy.ServiceException("joint_names must be %s, or the same of the left arm; got %s" % (

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint-space playfiles (``.jsp``): per line the seven angles of an arm and an arrival time. Free of ROS."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +15,11 @@ from .errors import GoalRefused
 from .judging import judge
 from .settings import JOINTS, arm_joint_names
 from .timing import arrival_times
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from baxter_traj_streamer.settings import StreamerSettings
 
 #: Of a playfile; the notes' have some kilobytes.
 MAX_BYTES = 100_000_000
@@ -32,7 +40,7 @@ class Playfile(NamedTuple):
     lines: tuple
 
     @classmethod
-    def read(cls, path):
+    def read(cls, path: Path):
         """Read a file. Raises PlayfileError, OSError."""
         try:
             text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
@@ -41,7 +49,7 @@ class Playfile(NamedTuple):
         return cls.parse(text, str(path))
 
     @classmethod
-    def parse(cls, text, source="playfile"):
+    def parse(cls, text: str, source: str = "playfile"):
         """Take the content of a file; empty lines and text after a # are ignored. Raises PlayfileError."""
         rows, lines = [], []
         for number, line in enumerate(text.splitlines(), start=1):
@@ -58,17 +66,17 @@ class Playfile(NamedTuple):
         table = np.array(rows)
         return cls(table[:, :-1], table[:, -1], source, tuple(lines))
 
-    def text(self):
+    def text(self) -> str:
         """The content of a file; times are rounded to the ms, angles to the microrad."""
         return "".join("%s, %.3f\n" % (", ".join("%.6f" % angle for angle in row), time)
                        for row, time in zip(self.positions, self.times, strict=True))
 
-    def retimed(self, velocity, min_segment_s):
+    def retimed(self, velocity: Any, min_segment_s: float):
         """The same poses with the notes' arrival times for ``velocity`` (7,) [rad/s]."""
         return self._replace(times=np.array(arrival_times(self.positions, velocity, min_segment_s)))
 
 
-def merged(playfiles):
+def merged(playfiles: Any) -> tuple[list[Any], np.ndarray, np.ndarray]:
     """(joint names, times (m,), positions (m, k)) of {side: Playfile}, each starting at its first row at time 0.
 
     It has a row for each time of any file; between its own rows an arm moves linearly, after them it rests.
@@ -81,7 +89,7 @@ def merged(playfiles):
     return names, times, np.array(columns).T
 
 
-def check(playfiles, limits, settings):
+def check(playfiles: Any, limits, settings: StreamerSettings) -> None:
     """Check {side: Playfile} as the server would, but without the start; arguments as for judging.judge.
 
     Raises PlayfileError, which names the file and, if known, the line.
@@ -101,7 +109,7 @@ def check(playfiles, limits, settings):
         raise PlayfileError("%s: %s" % (where, refusal)) from refusal
 
 
-def _numbers(fields, source, line):
+def _numbers(fields: Sequence[str], source: str, line: str | int):
     if len(fields) != _COLUMNS:
         raise PlayfileError("%s, line %d has %s, expected %d: %s, arrival time" % (
             source, line, counted(len(fields), "number"), _COLUMNS, ", ".join(JOINTS)))

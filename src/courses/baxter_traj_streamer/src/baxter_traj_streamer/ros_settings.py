@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads settings and joint limits from files and the parameter server."""
+from __future__ import annotations
+
 import pathlib
+from typing import Any
 
 import rospkg
 import rospy
@@ -15,19 +18,19 @@ from .settings import SettingsError, StreamerSettings
 NAMESPACE = "/baxter_traj_streamer"
 
 
-def read_settings(changes=None):
+def read_settings(changes: dict[str, Any] | None = None) -> StreamerSettings:
     """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
     it. Raises SettingsError."""
     overrides = {**(_read(changes) if changes else {}), **rospy.get_param(NAMESPACE, {})}
     return StreamerSettings(_read("streamer.yaml"), overrides)
 
 
-def _read(name):
+def _read(name: str):
     path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / name
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-def read_limits():
+def read_limits() -> dict[str, JointLimit]:
     """{joint: JointLimit} of both arms, from robot_description. Raises SettingsError, urdf_model.UrdfError."""
     if not rospy.has_param("robot_description"):
         raise SettingsError("the parameter robot_description is not set; the joints' limits are read from its URDF")

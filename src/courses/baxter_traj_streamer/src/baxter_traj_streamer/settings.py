@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint names and settings, from config/streamer.yaml, which explains each. Free of ROS."""
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import baxter_model
 from baxter_model import JOINTS, PoseError
@@ -19,7 +22,7 @@ class SettingsError(ValueError):
     """A setting is invalid; the text says what was found and what would be right."""
 
 
-def arm_joint_names(side):
+def arm_joint_names(side: str) -> list[str]:
     """The seven joint names of one arm, from torso to tool flange. Raises SettingsError for an unknown side."""
     if side not in SIDES:
         raise SettingsError("there is no arm %r: the arms are %s" % (side, " and ".join(SIDES)))
@@ -32,7 +35,7 @@ class StreamerSettings:
     defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.
     """
 
-    def __init__(self, defaults, overrides=None):
+    def __init__(self, defaults: dict[str, Any], overrides: dict[str, Any] | None = None) -> None:
         overrides = overrides or {}
         if unknown := sorted(set(overrides) - set(defaults)):
             raise SettingsError("unknown setting %s; there are %s" % (", ".join(unknown), ", ".join(sorted(defaults))))
@@ -60,11 +63,11 @@ class StreamerSettings:
         except PoseError as error:
             raise SettingsError(str(error)) from error
 
-    def planning_velocity(self):
+    def planning_velocity(self) -> list[float]:
         """Velocities of the seven joints that arrival times are computed with [rad/s], scale factor included."""
         return [self.max_velocity[joint] * self.speed_scale_factor for joint in JOINTS]
 
-    def pose(self, name, side):
+    def pose(self, name: str, side: str) -> list[float]:
         """The seven angles [rad] of a named pose. Raises SettingsError for an unknown pose or side."""
         names = arm_joint_names(side)
         try:
@@ -74,6 +77,6 @@ class StreamerSettings:
         return [angles[joint] for joint in names]
 
 
-def _require_positive(name, value):
+def _require_positive(name: str, value: float) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) and value > 0.0):
         raise SettingsError("%s is %r; it must be a number above 0" % (name, value))

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Straight lines of an arm's tip that keep its orientation, on one branch of the inverse kinematics. Free of ROS."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +26,7 @@ _CURVATURE_SHARE = 0.5
 class LeavesReach(ValueError):
     """The line cannot be followed to its end: only ``reached_m`` of ``length_m``; the text says why."""
 
-    def __init__(self, reached_m, length_m, why):
+    def __init__(self, reached_m: float, length_m: float, why: str) -> None:
         super().__init__("the line leaves the arm's reach after %.3f m of %.3f m: %s" % (reached_m, length_m, why))
         self.reached_m, self.length_m = reached_m, length_m
 
@@ -35,7 +37,7 @@ class StraightLine(NamedTuple):
     distances: np.ndarray
     positions: np.ndarray
 
-    def timed(self, velocity, acceleration, speed):
+    def timed(self, velocity: Any, acceleration: np.ndarray, speed: float):
         """(times (m,) [s], positions (m, n), velocities (m, n)): points that give a smooth move when joined by cubics.
 
         The tip speeds up, continues at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
@@ -56,7 +58,7 @@ class StraightLine(NamedTuple):
         return times, self.positions, slope * np.array([[way.sample(t)[1, 0]] for t in times])
 
 
-def straight_line(chain, start, displacement):
+def straight_line(chain: Any, start: np.ndarray, displacement: np.ndarray) -> StraightLine:
     """The :class:`StraightLine` of the tip of ``chain`` from the posture ``start`` (n,) [rad].
 
     ``displacement`` (3,) [m] is in the base frame of the chain. Each solution is searched from the previous one, and
@@ -96,7 +98,7 @@ def straight_line(chain, start, displacement):
     return StraightLine(np.array(distances), np.array(path))
 
 
-def _next(chain, pose, before):
+def _next(chain: Any, pose: np.ndarray, before: np.ndarray):
     """(the solution for ``pose`` or None, why there is none on the branch of ``before`` or "", whether there is none on
     any branch)."""
     try:

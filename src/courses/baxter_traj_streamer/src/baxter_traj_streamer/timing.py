@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arrival times of paths. Free of ROS."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
-def transition_time(difference, velocity, scale=1.0):
+
+def transition_time(difference: np.ndarray, velocity: np.ndarray, scale: float = 1.0) -> float:
     """Shortest time [s] in which all joints can move by ``difference`` (n,) [rad], without acceleration limits.
 
     ``velocity`` (n,) [rad/s]: limits, multiplied by ``scale``. Raises ValueError for sizes that differ or numbers that
@@ -18,7 +25,7 @@ def transition_time(difference, velocity, scale=1.0):
     return float(np.max(np.abs(difference) / (velocity * scale)))
 
 
-def arrival_times(path, velocity, min_segment_s):
+def arrival_times(path: ArrayLike, velocity: ArrayLike, min_segment_s: float) -> list[float]:
     """Arrival times at m poses ``path`` (m, n) [rad]: list of m times [s], the first 0. Raises ValueError."""
     times = [0.0]
     for here, there in zip(path[:-1], path[1:], strict=True):

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sends trajectories to trajActionServer, and waits for server and robot."""
+from __future__ import annotations
+
 import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rospy
@@ -15,6 +19,9 @@ from .interpolator import ACTION_NAME
 from .streamer import BaxterTrajStreamer
 from .versions import VERSIONS
 
+if TYPE_CHECKING:
+    import numpy as np
+
 # Polling period for the end of a goal [s, wall].
 _POLL_S = 0.01
 
@@ -22,7 +29,7 @@ _POLL_S = 0.01
 class MoveFailed(Exception):
     """The goal was not reached; the text says why. ``status``: of actionlib_msgs/GoalStatus."""
 
-    def __init__(self, status, text):
+    def __init__(self, status: int, text: str) -> None:
         super().__init__("the goal ended as %s: %s" % (GoalStatus.to_string(status), text))
         self.status = status
 
@@ -31,23 +38,23 @@ class SentGoal:
     """An active goal. It is polled instead of waiting for events, because a response may arrive before send()
     returns."""
 
-    def __init__(self, client, goal, feedback):
+    def __init__(self, client: Any, goal: Any, feedback: Any) -> None:
         self._client = client
         self._handle = client.send_goal(goal, feedback_cb=lambda _, message: feedback(message.fdbk))
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Cancel the goal."""
         self._handle.cancel()
 
-    def is_active(self):
+    def is_active(self) -> bool:
         """Whether it is being executed."""
         return self._handle.get_comm_state() == actionlib.CommState.ACTIVE
 
-    def is_over(self):
+    def is_over(self) -> bool:
         """Whether it has ended in any state."""
         return self._handle.get_comm_state() in (actionlib.CommState.DONE, actionlib.CommState.LOST)
 
-    def wait(self, timeout_s=None):
+    def wait(self, timeout_s: float | None = None) -> bool:
         """Wait for the end, at most ``timeout_s`` [s, ROS time]; returns whether it has come.
 
         Raises MoveFailed when the server is gone, ROSInterruptException when ROS shuts down.
@@ -62,7 +69,7 @@ class SentGoal:
             time.sleep(_POLL_S)
         return True
 
-    def outcome(self):
+    def outcome(self) -> tuple[Any, Any, Any]:
         """(status as in actionlib_msgs/GoalStatus, text, result message) of a goal that is over."""
         return self._handle.get_terminal_state(), self._handle.get_goal_status_text(), self._handle.get_result()
 
@@ -73,11 +80,11 @@ class TrajClient:
     Raises what BaxterTrajStreamer raises.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.streamer = BaxterTrajStreamer()
         self._action = self._version = None
 
-    def wait_until_ready(self):
+    def wait_until_ready(self) -> None:
         """Wait for the server and for the robot to be enabled, in any order, and print what it waits for.
 
         Raises ValueError for a server of another action, ROSInterruptException when ROS shuts down.
@@ -88,7 +95,7 @@ class TrajClient:
         if why := self.streamer.robot.why_not_ready():
             self._wait("the robot: %s" % why, lambda: not self.streamer.robot.why_not_ready())
 
-    def _connect(self):
+    def _connect(self) -> bool:
         """Use the server's version of the action; returns whether there is a server."""
         if self._action is None:
             kind = dict(rospy.get_published_topics()).get(rospy.resolve_name(ACTION_NAME + "/result"))
@@ -100,7 +107,7 @@ class TrajClient:
                 self._action = actionlib.ActionClient(ACTION_NAME, self._version.action)
         return self._action is not None
 
-    def _wait(self, what, is_there):
+    def _wait(self, what: str, is_there: Callable[[], bool]) -> None:
         begin_s = time.monotonic()
         try:
             while not is_there():
@@ -112,14 +119,14 @@ class TrajClient:
         finally:
             startup.LINE.end()
 
-    def send(self, trajectory, traj_id=1, feedback=lambda percent: None):
+    def send(self, trajectory: Any, traj_id: int = 1, feedback: Any = lambda percent: None) -> SentGoal:
         """Send a JointTrajectory: a :class:`SentGoal`; ``feedback`` is called with the percent done.
 
         The arms continue when this program ends; see the setting stop_when_client_leaves.
         """
         return SentGoal(self._action, self._version.make_goal(trajectory, traj_id), feedback)
 
-    def move(self, trajectory, timeout_s=None):
+    def move(self, trajectory: Any, timeout_s: float | None = None) -> None:
         """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.
 
         Raises MoveFailed, ROSInterruptException when ROS shuts down; the arms then continue.
@@ -132,18 +139,19 @@ class TrajClient:
             raise MoveFailed(status, text)
         return result
 
-    def here(self, joint_names):
+    def here(self, joint_names: Sequence[str]) -> list[Any]:
         """The measured angles [rad] of these joints. Raises KeyError for one that the robot does not report."""
         angles = self.streamer.robot.angles()
         return [angles[name] for name in joint_names]
 
 
-def _raise_if_interrupted():
+def _raise_if_interrupted() -> None:
     if rospy.is_shutdown():
         raise rospy.ROSInterruptException("ROS is shutting down")
 
 
-def joint_trajectory(joint_names, times, positions, velocities=None):
+def joint_trajectory(joint_names: Sequence[str], times: np.ndarray | None, positions: Any,
+                     velocities: Any | None = None) -> JointTrajectory:
     """The message: ``times`` (m,) [s], or None to let the server choose them, ``positions``, ``velocities`` (m, k)."""
     trajectory = JointTrajectory(joint_names=list(joint_names))
     for index, row in enumerate(positions):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line of `./baxter.sh check`."""
+from __future__ import annotations
+
 import argparse
 import contextlib
 import os
@@ -7,6 +9,7 @@ import shutil
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 import rospkg
 
@@ -26,7 +29,7 @@ from rf_checks.lab import WhichRobot
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
 
-def _listing():
+def _listing() -> str:
     lab_width = max(len(exercise.lab) for exercise in EXERCISES)
     width = max(len(exercise.name) for exercise in EXERCISES)
     lines = ["  %-*s  %-*s  %s\n  %s  runs as: %s" % (lab_width, exercise.lab, width, exercise.name, exercise.title,
@@ -35,7 +38,7 @@ def _listing():
     return "\n".join(lines)
 
 
-def _command_for(word):
+def _command_for(word: str) -> str:
     """The command that checks what a single word may mean, the name of an exercise or its program; or a list of all."""
     name = Path(word).stem
     for exercise in EXERCISES:
@@ -47,7 +50,7 @@ def _command_for(word):
 class _Parser(Parser):
     """A parser whose errors have no usage text in front."""
 
-    def error(self, message):
+    def error(self, message: Any) -> None:
         self.exit(WRONG_WORDS, "check: %s%s\n" % (message, self.meant(message)))
 
 
@@ -81,7 +84,7 @@ def _parser():
     return parser
 
 
-def _program_and_exercise(parser, options):
+def _program_and_exercise(parser: argparse.ArgumentParser, options: argparse.Namespace):
     words = options.words
     if not options.lab:
         parser.error("say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows them all)")
@@ -114,12 +117,12 @@ def _program_and_exercise(parser, options):
         parser.error(str(error))
 
 
-def _link_in(path):
+def _link_in(path: Path):
     """The first part of a path, as given, that is a link; or None."""
     return next((part for part in [*reversed(path.parents), path] if part.is_symlink()), None)
 
 
-def start(name):
+def start(name: str):
     """Copy a skeleton into the current folder; returns the exit status."""
     folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
     source, target = folder / (name + ".py"), Path(name + ".py")
@@ -138,13 +141,13 @@ def start(name):
     return PASSED
 
 
-def write_report(path, text):
+def write_report(path: Path, text: str) -> None:
     """Replace a file by one with `text`, atomically. A link of that name is replaced, not followed."""
     with draft_of(path) as draft:
         draft.write_text(text, encoding="utf-8")
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     """Returns the exit status."""
     parser = _parser()
     options = parser.parse_intermixed_args(argv)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnosis of a program from one run: the first fault that explains the others. Free of ROS."""
+from __future__ import annotations
+
 import ast
 import io
 import re
 import tokenize
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +14,14 @@ from baxter_model import SIDES
 from rf_checks import slips
 from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
 from rf_checks.recording import RECORD_S, Fault
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rf_checks.exercises import Exercise
+    from rf_checks.recording import Run
+    from rf_checks.robot import Robot
+    from rf_checks.tasks import Call
 
 #: More joint commands than this in FLOOD_WINDOW_S [sim s] are a flood; the robot's own limit is some 800 a second.
 FLOOD_COMMANDS = 1000
@@ -27,7 +38,7 @@ _CODING = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", re.MULTILINE | 
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
-def check_syntax(source, name):
+def check_syntax(source: bytes, name: str) -> Fault | None:
     """A Fault for a program (bytes, as Python itself reads it) that cannot be read or is empty, or None."""
     try:
         encoding = tokenize.detect_encoding(io.BytesIO(source).readline)[0]
@@ -58,13 +69,13 @@ def check_syntax(source, name):
     return None
 
 
-def line_of(program, traceback):
+def line_of(program: str, traceback: str) -> int | None:
     """The line of `program` that a traceback names last, or None."""
     lines = [int(number) for path, number in _FRAME.findall(traceback) if path.endswith(program)]
     return lines[-1] if lines else None
 
 
-def line_of_dump(program, dump):
+def line_of_dump(program: Path, dump: str) -> int | None:
     """Where `program` (Path) was when Python's fault handler wrote `dump`: the head of its outermost loop, or None.
 
     For a program outside of loops it is the innermost line.
@@ -78,7 +89,7 @@ def line_of_dump(program, dump):
     return None
 
 
-def _loops_around(program, line):
+def _loops_around(program: Path, line: int) -> list[int]:
     """First lines of the loops that a line is in, the outermost first."""
     try:
         tree = ast.parse(program.read_bytes())
@@ -88,7 +99,7 @@ def _loops_around(program, line):
                   if isinstance(node, (ast.While, ast.For)) and node.lineno <= line <= node.end_lineno)
 
 
-def is_flood(counts):
+def is_flood(counts: np.ndarray) -> bool:
     """Whether joint commands (n, 2), counted at each record, came faster than the robot reads them."""
     total = counts.sum(axis=1) if len(counts) else np.zeros(0)
     width = round(FLOOD_WINDOW_S / RECORD_S)
@@ -97,7 +108,7 @@ def is_flood(counts):
     return bool((total[width:] - total[:-width]).max() > FLOOD_COMMANDS)
 
 
-def meddling(run):
+def meddling(run: Run) -> Fault | None:
     """A Fault for a program that changed the simulator or the ROS graph instead of moving the robot, or None."""
     changes = run.changes
     if run.ended == "simulator gone" or "/gazebo" in changes.missing_nodes:
@@ -123,12 +134,12 @@ def meddling(run):
     return _moved_otherwise(run)
 
 
-def _few(names):
+def _few(names: list[str]) -> str:
     """Three names at most, in words."""
     return ", ".join(names[:3]) + (" and %d more" % (len(names) - 3) if len(names) > 3 else "")
 
 
-def _moved_otherwise(run):
+def _moved_otherwise(run: Run) -> Fault | None:
     """A Fault for arms that were moved by something other than joint commands, or None. It uses recorded causes, not
     jumps."""
     recording = run.recording
@@ -145,7 +156,7 @@ def _moved_otherwise(run):
     return None
 
 
-def behaviour(run, sides, limit_s):
+def behaviour(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
     """A Fault of the program's behaviour that does not depend on the exercise, or None. sides: the arms that must
     move."""
     if run.ended == "output":
@@ -178,7 +189,7 @@ def behaviour(run, sides, limit_s):
     return _about_motion(run, sides) or _about_end(run, sides, limit_s)
 
 
-def crashed(run):
+def crashed(run: Run) -> Fault | None:
     """A Fault for a program that ended with an exception, or None."""
     if run.exit_code in (None, 0) or "Traceback (most recent call last)" not in run.errors:
         return None
@@ -191,11 +202,11 @@ def crashed(run):
     return Fault("crashed", "the program ended with an error%s: %s" % (where, said))
 
 
-def _at_line(run):
+def _at_line(run: Run) -> str:
     return " at line %d" % run.stuck_at if run.stuck_at else ""
 
 
-def _about_motion(run, sides):
+def _about_motion(run: Run, sides: tuple[str]) -> Fault | None:
     recording = run.recording
     if not sides or not recording.records:
         return None
@@ -217,7 +228,7 @@ def _about_motion(run, sides):
     return None
 
 
-def _about_end(run, sides, limit_s):
+def _about_end(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
     recording = run.recording
     if run.ended == "exited" and sides and recording.records:
         if not any(path_length(recording.arm(side)) > 0.02 for side in SIDES):
@@ -231,7 +242,7 @@ def _about_end(run, sides, limit_s):
     return None
 
 
-def left_on_its_way(run, sides):
+def left_on_its_way(run: Run, sides: tuple[str]) -> Fault | None:
     """A Fault for a program that ended while an arm was still moving to its target, or None."""
     recording = run.recording
     end = recording.records[-1].get("exited") if recording.records else None
@@ -250,7 +261,7 @@ def left_on_its_way(run, sides):
     return None
 
 
-def held_back(run, sides):
+def held_back(run: Run, sides: tuple[str]) -> Fault | None:
     """A Fault for an arm that collision avoidance held, and that has not moved on since, or None."""
     for side in sides:
         held = run.recording.held(side)
@@ -261,12 +272,12 @@ def held_back(run, sides):
     return None
 
 
-def _last_words(run):
+def _last_words(run: Run) -> str:
     words = (run.errors.strip() or run.output.strip()).splitlines()
     return "; its last line was: %s" % words[-1][:200] if words else ""
 
 
-def diagnose(run, exercise, call, robot, share):
+def diagnose(run: Run, exercise: Exercise, call: Call, robot: Robot, share: float) -> Fault | Any | None:
     """The fault of one run, or None when all is well. share: the result of its criteria, 0 to 1."""
     fault = meddling(run) or behaviour_that_hides(run, exercise.sides, call.limit_s)
     if fault:
@@ -284,14 +295,14 @@ def diagnose(run, exercise, call, robot, share):
     return fault
 
 
-def of_another(fault: Fault | None, exercise, other, file_name: str) -> Fault:
+def of_another(fault: Fault | None, exercise: Exercise, other: Exercise, file_name: str) -> Fault:
     """A Fault for a program that does little of `exercise` and is for the Exercise `other`. fault: of its run."""
     sentence = ("this looks like a program for the exercise %s: ./baxter.sh check %s %s %s. It was checked as %s"
                 % (other.name, other.lab, other.name, file_name, exercise.name))
     return Fault("other_exercise", sentence + (": " + fault.sentence if fault else ""), fault.cap if fault else 1.0)
 
 
-def behaviour_that_hides(run, sides, limit_s):
+def behaviour_that_hides(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
     """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
     fault = behaviour(run, sides, limit_s)
     first = ("output", "processes", "threads", "sockets", "files", "requests", "memory", "flood", "busy", "crashed",

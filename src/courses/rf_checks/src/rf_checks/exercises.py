@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The table of exercises, and which one a file is meant for. Free of ROS."""
+from __future__ import annotations
+
 import difflib
 import re
 from dataclasses import dataclass
@@ -62,7 +64,7 @@ def meant_instead(exercise: Exercise, file_name: str, text: str) -> Exercise | N
     return next((one for one in EXERCISES if named and one.name == named[-1] and one is not exercise), None)
 
 
-def choose(lab, name, file_name, text):
+def choose(lab: str, name: str, file_name: str, text: str) -> Exercise:
     """The Exercise for a lab, the name of an exercise or "", and the program. Raises UnknownExercise.
 
     Without a name: from a line `# exercise: NAME` in the text; else from the file's name; else from texts that only one

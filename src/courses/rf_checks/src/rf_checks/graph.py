@@ -4,9 +4,13 @@
 The judge uses rosgraph and is not a node. Every process that reaches a master may register, unregister and set
 parameters in any node's name. So a node counts as gone when its process is gone, even if another process has its name.
 """
+from __future__ import annotations
+
 import contextlib
 import time
 import xmlrpc.client
+from collections.abc import Callable
+from typing import Any
 
 import rosgraph
 
@@ -32,13 +36,13 @@ class MasterSilent(LabFailed):
     """The ROS master takes connections, but does not answer in time."""
 
 
-def registrations(state):
+def registrations(state: Any) -> set[tuple[str, Any, Any]]:
     """{(kind, name, node)} of a master's getSystemState; kind is "publisher", "subscriber" or "service"."""
     return {(kind, name, node) for kind, part in zip(_KINDS, state, strict=True) for name, nodes in part
             for node in nodes}
 
 
-def flat(parameters, prefix=""):
+def flat(parameters: Any, prefix: str = "") -> dict[Any, Any]:
     """A tree of parameters as {name: value}; an empty branch counts as a value."""
     found = {}
     for name, value in parameters.items():
@@ -50,33 +54,33 @@ def flat(parameters, prefix=""):
 class Graph:
     """The master at `uri`. Everything registered when `remember` is called belongs to the lab."""
 
-    def __init__(self, uri):
+    def __init__(self, uri: str) -> None:
         self._uri = uri
         self._own = frozenset()
         self._own_parameters = {}
         self._processes = {}
         self.own_nodes = frozenset()
 
-    def state(self):
+    def state(self) -> set[tuple[str, Any, Any]]:
         """The master's registrations, as `registrations` gives them. Raises LabFailed, MasterSilent."""
         return registrations(self._ask("getSystemState"))
 
-    def nodes(self):
+    def nodes(self) -> set[Any]:
         """Names of all nodes: a set. Raises LabFailed, MasterSilent."""
         return {node for _, _, node in self.state()}
 
-    def services(self):
+    def services(self) -> set[Any]:
         """Names of all services: a set. Raises LabFailed, MasterSilent."""
         return {name for kind, name, _ in self.state() if kind == "service"}
 
-    def remember(self, processes):
+    def remember(self, processes: dict[str, Callable[[], bool]]) -> None:
         """Store the present state as the lab's. processes: {node: function that returns whether its process lives}."""
         self._own = frozenset(self.state())
         self._own_parameters = self._parameters()
         self.own_nodes = frozenset(node for _, _, node in self._own)
         self._processes = {node: lives for node, lives in processes.items() if node in self.own_nodes}
 
-    def changes(self, with_parameters=False):
+    def changes(self, with_parameters: bool = False) -> Changes:
         """The Changes since `remember`; parameters only on request, since that takes longer. Raises LabFailed."""
         now = self.state()
         topics = {name for kind, name, _ in self._own if kind == "publisher"} - SHARED_TOPICS
@@ -97,7 +101,7 @@ class Graph:
     def _ended(self):
         return {node for node, lives in self._processes.items() if not lives()}
 
-    def _ending(self, nodes):
+    def _ending(self, nodes: set[str]):
         """Of the nodes that lack a registration, those that are shutting down: they unregister everything before they
         end."""
         deadline = time.monotonic() + _END_S
@@ -105,12 +109,12 @@ class Graph:
             time.sleep(0.02)
         return nodes & self._ended()
 
-    def is_as_it_was(self):
+    def is_as_it_was(self) -> bool:
         """Whether the state equals the remembered one. Raises LabFailed."""
         return (self.nodes() == self.own_nodes and not self.changes(with_parameters=True)
                 and self._parameters().keys() == self._own_parameters.keys())
 
-    def forget_strangers(self):
+    def forget_strangers(self) -> None:
         """Unregister ended nodes that were not the lab's, and delete their parameters."""
         with contextlib.suppress(LabFailed, *_NO_ANSWER):
             for kind, name, node in self.state():
@@ -130,7 +134,7 @@ class Graph:
     def _parameters(self):
         return flat(self._ask("getParam", "/"))
 
-    def _ask(self, method, *words):
+    def _ask(self, method: str, *words):
         try:
             return getattr(self._master(), method)(*words)
         except TimeoutError as error:
@@ -138,5 +142,5 @@ class Graph:
         except _NO_ANSWER as error:
             raise LabFailed("the ROS master is gone: %s" % error) from error
 
-    def _master(self, caller=_CALLER):
+    def _master(self, caller: str = _CALLER):
         return master_calls.master(caller, self._uri, _ANSWER_S)

@@ -5,6 +5,8 @@
 that merely lies there, as a roster or submissions: what git tracks, or, in a students' copy, that copy's own list. It
 makes none in which a name or an address of a roster would be.
 """
+from __future__ import annotations
+
 import argparse
 import codecs
 import contextlib
@@ -16,7 +18,9 @@ import shutil
 import subprocess
 import sys
 import unicodedata
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from command_line.user_files import read_file
 from rf_checks import roster, similarity
@@ -57,17 +61,17 @@ class HandoutFailed(Exception):
     """The copy cannot be made, or would reveal a solution or a student; the text says why."""
 
 
-def is_left_out(name):
+def is_left_out(name: str) -> bool:
     """Whether a file, named relative to the workspace, does not belong to the copy."""
     return any(name == left or name.startswith(left + "/") for left in LEFT_OUT)
 
 
-def stub(name):
+def stub(name: str) -> str:
     """The program (text) that stands for a node of STUBBED."""
     return _STUB % {"exercise": STUBBED[name], "name": Path(name).name}
 
 
-def _git(workspace, *words):
+def _git(workspace: Path, *words):
     done = subprocess.run(["git", "-C", str(workspace), "ls-files", "-z", *words], capture_output=True, check=True)
     return [os.fsdecode(name) for name in done.stdout.split(b"\0") if name]
 
@@ -91,7 +95,7 @@ def names(workspace: Path) -> list[str]:
                   or os.path.isfile(os.path.join(workspace, name)))
 
 
-def left_here(workspace: Path) -> list[str]:
+def left_here(workspace: Path | str) -> list[str]:
     """Names of files that git neither tracks nor ignores; [] without git."""
     try:
         return _git(workspace, "--others", "--exclude-standard")
@@ -143,7 +147,7 @@ def people_of_table(text: str, source: str) -> dict[str, str]:
     return {name: source for name, found in owners.items() if "@" in name or len(found) == 1}
 
 
-def known_people(workspace: Path, given: list, environment: dict) -> dict[str, str]:
+def known_people(workspace: Path, given: Any, environment: dict) -> dict[str, str]:
     """As `people`, of the rosters in ``given`` (paths), of all tables in the workspace, and of the user's class.
 
     Raises HandoutFailed for a given one that cannot be read.
@@ -195,7 +199,7 @@ def named_people(text: str, known: dict[str, str]) -> list[str]:
     return found
 
 
-def emptied_notebook(text):
+def emptied_notebook(text: str) -> str:
     """A notebook (text) without outputs, and without the code of cells tagged as solutions."""
     notebook = json.loads(text)
     for cell in notebook["cells"]:
@@ -208,7 +212,8 @@ def emptied_notebook(text):
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 
-def make(workspace, target, rosters=(), environment=os.environ):
+def make(workspace: Path | str, target: Any, rosters: Sequence[Path] = (),
+         environment: dict[str, str] = os.environ) -> int:
     """Copy the workspace into the folder `target`, which must not exist or must be empty; returns the number of files.
 
     rosters: paths of further rosters, whose names must not be in it. Raises HandoutFailed, OSError.
@@ -258,7 +263,7 @@ def told(target: Path, kept: list, known: dict[str, str]) -> list[str]:
     return found
 
 
-def leaks(workspace, target, kept):
+def leaks(workspace: Path, target: Any, kept: list) -> list[Any]:
     """Sentences on files of the copy that are, or hold, a solution."""
     library = similarity.Library(workspace)
     skeletons = library.handed_out[:library.skeleton_count]
@@ -279,12 +284,12 @@ def leaks(workspace, target, kept):
     return found
 
 
-def _is_script(path):
+def _is_script(path: Path):
     with open(path, "rb") as file:
         return file.read(64).startswith((b"#!/usr/bin/env python3", b"#!/usr/bin/python3"))
 
 
-def main(words=None):
+def main(words: list[str] | None = None) -> Any:
     """Returns the exit status: 0 done, 1 not possible, 2 wrong arguments."""
     parser = argparse.ArgumentParser(
         prog="./baxter.sh handout", description="Make the students' copy of this workspace in FOLDER: the files that "

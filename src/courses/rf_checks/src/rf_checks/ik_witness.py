@@ -3,10 +3,13 @@
 
 Any program can publish on the topic IKReport; the socket is in the lab's sandbox only.
 """
+from __future__ import annotations
+
 import contextlib
 import json
 import os
 import socket
+from typing import Any
 
 from rf_checks.recorder_names import REQUESTS, SOCKETS_VARIABLE
 
@@ -19,10 +22,10 @@ _PATIENCE_S = 2.0
 class Witness:
     """Called with each request's caller (node name) and report (IKReport), before the client has its answer."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._path = os.path.join(os.environ[SOCKETS_VARIABLE], REQUESTS)
 
-    def __call__(self, caller, report):
+    def __call__(self, caller: str, report: Any) -> None:
         told = []
         for verdict in report.verdicts[:POSES_TOLD]:
             pose = verdict.target.pose

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs a program as often as its exercise requires, each time with the robot reset, and grades it."""
+from __future__ import annotations
+
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +23,10 @@ from rf_checks.robot import Robot
 from rf_checks.run_clock import RunClock
 from rf_checks.sandbox import CPU_S, Startup, Student, adopt_orphans
 from rf_checks.similarity import Library
+
+if TYPE_CHECKING:
+    from rf_checks.exercises import Exercise
+    from rf_checks.tasks import Call
 
 #: A check that is not done within this time [s, wall] ends without a grade: the only limit in wall time.
 WALL_LIMIT_S = 900.0
@@ -49,7 +57,7 @@ class RunResult:
     trace: Run | None = None
 
     @property
-    def points(self):
+    def points(self) -> float:
         share = sum(one.share * one.weight for one in self.criteria) / sum(one.weight for one in self.criteria)
         return 100.0 * min(share, self.fault.cap if self.fault else 1.0)
 
@@ -71,12 +79,12 @@ class Result:
     which: WhichRobot = WhichRobot()
 
     @property
-    def points(self):
+    def points(self) -> float | None:
         """0 to 100; None if it was not graded."""
         return None if self.not_graded else float(np.mean([run.points for run in self.runs]))
 
     @property
-    def fault(self):
+    def fault(self) -> Fault | None:
         """The first Fault, or None."""
         return None if self.not_graded else next((run.fault for run in self.runs if run.fault), None)
 
@@ -84,7 +92,9 @@ class Result:
 class Judge:
     """Keeps one lab for any number of programs; a context manager."""
 
-    def __init__(self, wall_limit_s=WALL_LIMIT_S, trusted=False, which=WhichRobot(), hidden=()):  # noqa: B008 (a tuple)
+    def __init__(self, wall_limit_s: float = WALL_LIMIT_S, trusted: bool = False,
+                 which: WhichRobot = WhichRobot(),  # noqa: B008 (a tuple)
+                 hidden: Sequence[Path] = ()) -> None:
         """`wall_limit_s`: a check that takes longer ends without a grade [s]. `trusted`: if this machine allows no
         sandbox, run programs without one. `which`: the robot to judge on, a WhichRobot. `hidden`: further folders that
         no program may see, as other students' submissions. Raises isolation.NotIsolated, LabFailed.
@@ -102,18 +112,18 @@ class Judge:
         self._lab = None
         adopt_orphans()
 
-    def __enter__(self):
+    def __enter__(self) -> Judge:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def close(self):
+    def close(self) -> None:
         if self._lab is not None:
             self._lab.close()
             self._lab = None
 
-    def check(self, exercise, program, seed=0):
+    def check(self, exercise: Exercise, program: Path, seed: int = 0) -> Result:
         """Run `program` (path) through the Exercise; returns a Result.
 
         Raises LabFailed, submission.BadSubmission, OSError.
@@ -152,7 +162,7 @@ class Judge:
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
                       tuple(Library(_workspace()).notes(texts)), self._which)
 
-    def run(self, program, exercise, call, deadline=float("inf")):
+    def run(self, program: Path, exercise: Exercise, call: Call, deadline: float = float("inf")) -> Run:
         """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
         lab = self._fresh_lab(call, deadline)
         run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
@@ -197,7 +207,7 @@ class Judge:
             lab.graph.forget_strangers()
         return run
 
-    def _fresh_lab(self, call, deadline):
+    def _fresh_lab(self, call: Call, deadline: float) -> Lab:
         # Nobody resets a move_group.
         if self._lab is not None and (call.obstacle or self._lab.obstacle):
             self.close()
@@ -217,7 +227,7 @@ class Judge:
         raise AssertionError  # the loop above returns or raises
 
     @staticmethod
-    def _watch(lab, observer, deadline):
+    def _watch(lab: Any, observer: Observer, deadline: float) -> None:
         """Wait for the end of a run, and end it if no more records come."""
         began = time.monotonic()
         while not observer.wait(_LOOK_S):
@@ -234,12 +244,12 @@ class Judge:
                               % (_rounded(simulated_s / wall_s), simulated_s, wall_s))
 
     @staticmethod
-    def _is_satisfied(exercise, call, run, output):
+    def _is_satisfied(exercise: Exercise, call: Call, run: Run, output: Any) -> bool:
         run.output = output
         return exercise.task.is_satisfied(call, run)
 
     @staticmethod
-    def _look_at_graph(lab, run, with_parameters=False):
+    def _look_at_graph(lab: Any, run: Run, with_parameters: bool = False) -> bool:
         """Whether a part of the lab is gone, or another node publishes its topics; sets `run.changes`."""
         try:
             run.changes = lab.graph.changes(with_parameters)
@@ -252,7 +262,7 @@ class Judge:
         return bool(run.changes)
 
 
-def how_it_ended(run):
+def how_it_ended(run: Run) -> dict[str, Any]:
     """How a run ended, for the report: a dict of plain values."""
     how, number = run.ended, None
     if how == "exited":
@@ -267,11 +277,11 @@ def how_it_ended(run):
             "real_time_factor": round(run.simulated_s / run.wall_s, 2) if run.wall_s else None}
 
 
-def _rounded(factor):
+def _rounded(factor: float) -> str:
     return "%.2f" % factor if factor < 0.1 else "%.1f" % factor
 
 
-def _with_exit(records):
+def _with_exit(records: list[dict[str, Any]]):
     """The records; the last one has the time of the program's end."""
     records = list(records)
     ends = [record["exited"] for record in records if "exited" in record]

@@ -4,6 +4,8 @@
 The judge itself is not a ROS node: it gets the robot's motion through the recorder's socket, and the list of nodes from
 the master (graph.py).
 """
+from __future__ import annotations
+
 import contextlib
 import functools
 import json
@@ -16,8 +18,9 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import rospkg
 from roslib.packages import find_node
@@ -31,6 +34,9 @@ from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, changes_the_world
 from world_picture.results import ready_for
+
+if TYPE_CHECKING:
+    from rf_checks.tasks_planning import Obstacle
 
 #: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
@@ -67,7 +73,7 @@ class WhichRobot(NamedTuple):
     serial: int = 0
 
     @property
-    def is_usual(self):
+    def is_usual(self) -> bool:
         """Whether it is the one of the labs."""
         return self == WhichRobot()
 
@@ -75,7 +81,9 @@ class WhichRobot(NamedTuple):
 class Lab:
     """Start with :meth:`start`, end with :meth:`close`; a context manager."""
 
-    def __init__(self, description_xml, walls=True, which=WhichRobot(), obstacle=None):  # noqa: B008 (a tuple)
+    def __init__(self, description_xml: str, walls: bool = True,
+                 which: WhichRobot = WhichRobot(),  # noqa: B008 (a tuple)
+                 obstacle: Obstacle | None = None) -> None:
         """`description_xml`: the robot's URDF text. `walls`: in a separate sandbox, as isolation.py says. `which`:
         a WhichRobot. `obstacle`: tasks_planning.Obstacle, which comes with move_group."""
         self.uri = ""
@@ -110,23 +118,23 @@ class Lab:
         self._is_held = False
         self._is_closed_world = False
 
-    def __enter__(self):
+    def __enter__(self) -> Lab:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     @property
-    def folder(self):
+    def folder(self) -> Path | None:
         """The folder of the lab's files."""
         return self._folder
 
     @property
-    def is_alive(self):
+    def is_alive(self) -> bool:
         """False once the simulator, or its robot, is gone."""
         return not self._ended.is_set()
 
-    def start(self, deadline=float("inf")):
+    def start(self, deadline: float = float("inf")) -> None:
         """Start everything and wait until the robot is spawned. Raises LabFailed; TooSlow at `deadline` (monotonic,
         s)."""
         self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
@@ -159,7 +167,7 @@ class Lab:
         self._pacer.start()
         self._await(self._all_there, "the nodes around the robot", deadline)
 
-    def reset(self, posture, deadline=float("inf")):
+    def reset(self, posture: str, deadline: float = float("inf")) -> None:
         """Disable the robot, set its arms to `posture` (dict of joint to rad), and stop time until go_on().
 
         Raises LabFailed; TooSlow at `deadline` (monotonic, s).
@@ -188,25 +196,25 @@ class Lab:
             if self._is_closed_world:
                 self.graph.remember(self._node_processes())
 
-    def go_on(self):
+    def go_on(self) -> None:
         """Continue time after reset()."""
         self._may_go.set()
 
-    def stood_still_s(self):
+    def stood_still_s(self) -> float:
         """Time since the last record [s, of OwnTime]. Call it several times a second."""
         if self._is_held or self._heard != self._looked_at:
             self._looked_at = self._heard
             self._still_time.restart()
         return self._still_time.passed_s()
 
-    def is_as_it_was(self):
+    def is_as_it_was(self) -> bool:
         """Whether another program can be judged here: the lab is complete and unchanged, without other nodes."""
         try:
             return self.is_alive and self.graph.is_as_it_was()
         except LabFailed:
             return False
 
-    def helper_pids(self):
+    def helper_pids(self) -> list[Any]:
         """Process ids of HELPERS in this lab."""
         found = []
         for pid in self._pids():
@@ -215,7 +223,7 @@ class Lab:
                 found += [pid] if any(name.encode() in line for name in HELPERS) else []
         return found
 
-    def has_stopped_master(self):
+    def has_stopped_master(self) -> bool:
         """Whether the ROS master has ended, or was stopped by a signal."""
         states = []
         for pid in self._pids():
@@ -225,12 +233,12 @@ class Lab:
                     states.append(text[text.rfind(b")") + 2:][:1])
         return not set(states) - {b"T", b"Z"}
 
-    def log_tail(self):
+    def log_tail(self) -> str:
         """The last lines of the output of the lab's own processes."""
         lines = (self._folder / "output.txt").read_text(errors="replace").splitlines()
         return "\n".join(lines[-15:])
 
-    def close(self):
+    def close(self) -> None:
         """End every process, quickly: nothing of this lab is needed any more."""
         self._ended.set()
         self.go_on()
@@ -263,7 +271,7 @@ class Lab:
 
     # -- below
 
-    def _run(self, command, environment):
+    def _run(self, command: list[str], environment: dict[str, str]) -> None:
         if self._walls:
             ready, variables = ready_for(isolation.HOME)
             environment = {**environment, **variables}
@@ -290,7 +298,7 @@ class Lab:
         """Names of nodes that ended with an error according to roslaunch: they are not restarted."""
         return _DEAD_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))
 
-    def _await(self, condition, what, deadline):
+    def _await(self, condition: Any, what: str, deadline: float):
         while True:
             found = condition()
             if found:
@@ -322,7 +330,7 @@ class Lab:
         file.write_text(self.obstacle.urdf(), encoding="utf-8")
         return ["obstacle:=%s" % file, "obstacle_at:=-x %g -y %g -z %g" % self.obstacle.middle]
 
-    def _plans(self):
+    def _plans(self) -> bool:
         """Whether the obstacle stands there and move_group can plan; True where the lab has neither."""
         return self.obstacle is None or (
             PLANNING_SERVICE in self.graph.services() and OBSTACLE_SPAWNER not in self.graph.nodes()
@@ -341,7 +349,7 @@ class Lab:
                 # The spawner still waits for the response of a service that the first reset withdraws.
                 and SPAWNER not in nodes)
 
-    def _pace(self, connection, ended):
+    def _pace(self, connection: Any, ended: Callable[[], bool]) -> None:
         """Read records, wait until the watched programs are idle, then step the world."""
         lines = connection.makefile("r", encoding="utf-8")
         calm_in = None
@@ -377,7 +385,7 @@ class Lab:
             ended.set()
 
 
-def _accept(listener):
+def _accept(listener: Any):
     with contextlib.suppress(TimeoutError):
         return listener.accept()[0]
     return None
@@ -387,12 +395,12 @@ def _share():
     return Path(rospkg.RosPack().get_path("rf_checks"))
 
 
-def student_folder():
+def student_folder() -> Path:
     """The folder with the start-up modules of a checked program."""
     return _share() / "student"
 
 
-def robot_description(serial=0):
+def robot_description(serial: int = 0) -> str:
     """The URDF text of the lab's robot, of the one with this serial number. Raises LabFailed."""
     packages = rospkg.RosPack()
     command = [find_node("baxter_sim_hardware", "robot_of_serial")[0], str(serial),

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Measures of the quality of a motion. Free of ROS; SI units, radians."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urdf_model.transforms import rotation_angle
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # Below this speed of its fastest joint an arm counts as resting [rad/s].
 STANDS_RAD_S = 0.02
@@ -16,12 +22,12 @@ JUMP_RAD = 0.15
 AT_GOAL_RAD, OFF_GOAL_RAD = 0.02, 0.25
 
 
-def ramp(value, full, none):
+def ramp(value: float, full: float, none: float) -> float:
     """1 up to `full`, 0 from `none` on, linear between; either may be the larger one."""
     return float(np.clip((none - value) / (none - full), 0.0, 1.0))
 
 
-def distance_from_goal(names, angles, goal):
+def distance_from_goal(names: tuple[str, ...], angles: ArrayLike, goal: Any) -> tuple[float, float, str]:
     """(share of the points, largest distance [rad], that in words). names, angles [rad] and goal [rad]: (n,).
 
     No joint is named where all are at their goals: the farthest one would be another in each run.
@@ -33,17 +39,17 @@ def distance_from_goal(names, angles, goal):
     return share, off.max(), "farthest off is %s, by %.3f rad" % (names[int(off.argmax())], off.max())
 
 
-def pose_error(pose, target):
+def pose_error(pose: np.ndarray, target: np.ndarray) -> tuple[float, float]:
     """(distance [m], angle [rad]) between two (4, 4) poses."""
     return float(np.linalg.norm(pose[:3, 3] - target[:3, 3])), rotation_angle(pose[:3, :3].T @ target[:3, :3])
 
 
-def speeds(times, positions):
+def speeds(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """(n - 1,) speed of the fastest joint between two records [rad/s]. times (n,), positions (n, joints)."""
     return np.abs(np.diff(positions, axis=0)).max(axis=1) / np.maximum(np.diff(times), 1e-6)
 
 
-def moving_rows(times, positions):
+def moving_rows(times: np.ndarray, positions: np.ndarray) -> tuple[int, int] | None:
     """(first, last) row of a motion, or None if nothing moved."""
     if len(times) < 2:
         return None
@@ -51,7 +57,7 @@ def moving_rows(times, positions):
     return (int(moving[0]), int(moving[-1]) + 1) if len(moving) else None
 
 
-def halts(times, positions, window_s=0.05):
+def halts(times: np.ndarray, positions: np.ndarray, window_s: float = 0.05) -> int:
     """Number of stops of an arm between the beginning and the end of its motion."""
     rows = moving_rows(times, positions)
     if rows is None:
@@ -65,12 +71,12 @@ def halts(times, positions, window_s=0.05):
     return int(np.count_nonzero(stands[1:] & ~stands[:-1]))
 
 
-def largest_jump(positions):
+def largest_jump(positions: np.ndarray) -> float:
     """The largest change of one joint between two records [rad]."""
     return float(np.abs(np.diff(positions, axis=0)).max()) if len(positions) > 1 else 0.0
 
 
-def path_length(positions):
+def path_length(positions: np.ndarray) -> float:
     """Path length of the joint that moved most [rad]."""
     return float(np.abs(np.diff(positions, axis=0)).sum(axis=0).max()) if len(positions) > 1 else 0.0
 
@@ -78,7 +84,8 @@ def path_length(positions):
 class SineFit:
     """amplitude [m], frequency [Hz], periods, r_squared (1: a perfect sine), start, end [s]."""
 
-    def __init__(self, amplitude, frequency, periods, r_squared, start, end):
+    def __init__(self, amplitude: float, frequency: float, periods: float, r_squared: float, start: float,
+                 end: float) -> None:
         self.amplitude, self.frequency, self.periods = amplitude, frequency, periods
         self.r_squared, self.start, self.end = r_squared, start, end
 
@@ -86,7 +93,7 @@ class SineFit:
 NO_SINE = SineFit(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def fit_sine(times, points, min_periods=1.5):
+def fit_sine(times: np.ndarray, points: np.ndarray, min_periods: float = 1.5) -> SineFit:
     """The best sine in a path: times (n,), points (n, 3) [m]. The motions to its start and from its end are left out.
 
     Fits offset + sine along the main direction of motion, in windows that leave out some of either end.
@@ -109,11 +116,11 @@ def fit_sine(times, points, min_periods=1.5):
     return best
 
 
-def _worth(fit):
+def _worth(fit: SineFit) -> float:
     return fit.r_squared + 0.02 * min(fit.periods, 3.0)
 
 
-def _fit_window(times, points):
+def _fit_window(times: np.ndarray, points: np.ndarray) -> SineFit:
     if len(times) < 25:
         return NO_SINE
     centred = points - points.mean(axis=0)
@@ -123,7 +130,7 @@ def _fit_window(times, points):
     if power / len(values) < 1e-6 or span <= 0.0:
         return NO_SINE
 
-    def residual(frequency):
+    def residual(frequency: float) -> tuple[float, float]:
         phase = 2.0 * math.pi * frequency * (times - times[0])
         columns = np.stack((np.sin(phase), np.cos(phase), np.ones_like(phase)), axis=1)
         weights = np.linalg.lstsq(columns, values, rcond=None)[0]

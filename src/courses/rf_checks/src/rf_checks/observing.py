@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Decides at each record whether a run is over, by simulated time and the program's processor time. Free of ROS."""
+from __future__ import annotations
+
 import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from baxter_model import SIDES
 from rf_checks import diagnosis
 from rf_checks.recording import RECORD_S
+
+if TYPE_CHECKING:
+    from rf_checks.tasks import Call
 
 #: A program that is almost never idle for this much processor time counts as an endless computation [s]; "almost never"
 #: is this share of the records.
@@ -23,7 +30,7 @@ _LOOK_AT_GRAPH, _LOOK_AT_FAMILY = 25, 5
 class Observer:
     """Takes the records of one run. When the run is over the world waits until :meth:`release`."""
 
-    def __init__(self, call, is_satisfied, look_at_graph):
+    def __init__(self, call: Call, is_satisfied: Callable[[], bool], look_at_graph: Callable[[], None]) -> None:
         """`is_satisfied(output)`: whether the judge has seen enough; `look_at_graph()`: whether the lab was changed."""
         self.records = []
         self.ended = ""
@@ -38,7 +45,7 @@ class Observer:
         # Records come in one thread, an external end in another: the first end counts.
         self._lock = threading.Lock()
 
-    def on_record(self, record, cpu_s):
+    def on_record(self, record: Any, cpu_s: float) -> None:
         """One record, and the processor time that the program has used so far [s]."""
         with self._lock:
             if not self._over.is_set():
@@ -46,7 +53,7 @@ class Observer:
         if self._over.is_set():
             self._released.wait()
 
-    def _take(self, record, cpu_s):
+    def _take(self, record: Any, cpu_s: float) -> None:
         self.records.append(record)
         if self._exited_at is None:
             self.ended = self._end(record, cpu_s)
@@ -56,23 +63,23 @@ class Observer:
         if self.ended and (self.ended != "exited" or self._has_settled()):
             self._over.set()
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float) -> bool:
         """Whether the run is over; waits at most this long for it."""
         return self._over.wait(timeout_s)
 
-    def end(self, how):
+    def end(self, how: str) -> None:
         """End the run from outside."""
         with self._lock:
             if not self._over.is_set():
                 self.ended = how
                 self._over.set()
 
-    def release(self):
+    def release(self) -> None:
         """Let the world continue; call it when the run is processed."""
         self._over.set()
         self._released.set()
 
-    def _end(self, record, cpu_s):
+    def _end(self, record: Any, cpu_s: float):
         count = len(self.records)
         if self.student.exit_code is not None:
             # Check once more: a program that ended at once may have done it before.
@@ -96,7 +103,7 @@ class Observer:
             return "sim time"
         return "satisfied" if self._is_satisfied(self.student.output) else ""
 
-    def _has_settled(self):
+    def _has_settled(self) -> bool:
         since = len(self.records) - self._exited_at
         quiet = round(QUIET_S / RECORD_S)
         recent = np.array([record["q"] for record in self.records[-quiet:]])

@@ -5,9 +5,12 @@ So a simulation that is many times faster than real time never gets ahead of the
 machine: only the processor time of processes counts, not the wall time in which they wait for a processor. Free of ROS;
 Linux only (/proc).
 """
+from __future__ import annotations
+
 import contextlib
 import os
 import time
+from typing import Any
 
 from processes.family import children_of
 
@@ -21,7 +24,7 @@ _LOOK_AGAIN_S, _LOOK_AGAIN_AT_MAX_S = 0.0002, 0.004
 _LOADAVG = "/proc/loadavg"
 
 
-def cpu_time_s(pids):
+def cpu_time_s(pids: set[int] | tuple[int]) -> float:
     """Processor time that the processes `pids` have used so far, all threads [s]."""
     total = 0.0
     for pid in pids:
@@ -31,7 +34,7 @@ def cpu_time_s(pids):
     return total
 
 
-def last_process():
+def last_process() -> bytes:
     """The number of the newest process or thread on this machine: while it does not change, there is no new one."""
     with open(_LOADAVG, "rb") as file:
         return file.read().split()[-1]
@@ -40,7 +43,7 @@ def last_process():
 class Tree:
     """Some processes with all their descendants: states of their threads, and their processor time."""
 
-    def __init__(self, roots=()):
+    def __init__(self, roots: tuple[Any, ...] = ()) -> None:
         """`roots`: process ids."""
         self.roots = tuple(roots)
         #: Processor time that was used since the beginning [s]; for ended processes, the last known value.
@@ -52,7 +55,7 @@ class Tree:
         self._files = {}
         self._renewed_at = None
 
-    def renew(self):
+    def renew(self) -> None:
         """Update the list of processes and threads, if there may be new ones."""
         newest = self.roots, last_process()
         if newest == self._renewed_at:
@@ -72,7 +75,7 @@ class Tree:
             with contextlib.suppress(OSError):
                 self._files[pid, thread] = os.open("/proc/%d/task/%d/stat" % (pid, thread), os.O_RDONLY | os.O_CLOEXEC)
 
-    def count(self):
+    def count(self) -> float:
         """Bring `used_s` up to date and return it."""
         for pid, seen in self._seen_s.items():
             now = cpu_time_s((pid,))
@@ -81,7 +84,7 @@ class Tree:
                 self._seen_s[pid] = now
         return self.used_s
 
-    def runs(self):
+    def runs(self) -> bool:
         """Whether any thread runs, waits for a processor, or waits for a disk within its allowance."""
         self.waits_for_disk = False
         for key, file in list(self._files.items()):
@@ -97,13 +100,13 @@ class Tree:
             self.waits_for_disk |= state == b"D"
         return self.waits_for_disk and self.disk_s < DISK_ALLOWANCE_S
 
-    def rests(self):
+    def rests(self) -> bool:
         """Whether nothing runs, or ran during this check."""
         before = self.count()
         # If threads wake each other in turn, each one may be idle at the moment of its check.
         return not self.runs() and self.count() == before
 
-    def close(self):
+    def close(self) -> None:
         self.roots = ()
         for file in self._files.values():
             os.close(file)
@@ -115,13 +118,13 @@ class Tree:
 class Watch:
     """Detects when a program and its helpers are idle."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         #: Helpers: processes whose responses the program waits for.
         self.program, self.helpers = Tree(), Tree()
         #: Called sometimes; True ends a wait.
         self.gives_up = lambda: False
 
-    def wait_until_rest(self):
+    def wait_until_rest(self) -> bool:
         """Wait until nothing runs, or the allowances are used up; True when nothing runs."""
         program, helpers = self.program, self.helpers
         program.renew()
@@ -142,7 +145,7 @@ class Watch:
             helpers.renew()
             pause_s = min(1.2 * pause_s, _LOOK_AGAIN_AT_MAX_S)
 
-    def close(self):
+    def close(self) -> None:
         self.program.close()
         self.helpers.close()
 
@@ -153,20 +156,20 @@ class OwnTime:
     On an otherwise idle machine this is wall time; while they wait for a processor, it stands still.
     """
 
-    def __init__(self, roots):
+    def __init__(self, roots: tuple[Any, ...]) -> None:
         """`roots`: function that returns process ids."""
         self._roots = roots
         self._tree = Tree()
         self.restart()
 
-    def restart(self):
+    def restart(self) -> None:
         """Restart at zero."""
         self._passed_s = 0.0
         self._tree.roots = tuple(self._roots())
         self._tree.renew()
         self._used_s, self._looked_at = self._tree.count(), time.monotonic()
 
-    def passed_s(self):
+    def passed_s(self) -> float:
         """Call it several times a second."""
         self._tree.roots = tuple(self._roots())
         self._tree.renew()
@@ -175,5 +178,5 @@ class OwnTime:
         self._used_s, self._looked_at = used_s, now
         return self._passed_s
 
-    def close(self):
+    def close(self) -> None:
         self._tree.close()

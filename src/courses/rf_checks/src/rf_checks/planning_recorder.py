@@ -3,7 +3,10 @@
 
 They come from a topic, in which a checked program has no part: a node that publishes on it meddles with the lab.
 """
+from __future__ import annotations
+
 import threading
+from typing import Any
 
 import numpy as np
 import rospy
@@ -20,13 +23,13 @@ class PlanningRecorder(Recorder):
     """See the module. `scene` of a record, where it has changed: [[name, pose in the planning frame (16, by rows), x y
     z edges [m]]]."""
 
-    def __init__(self, context):
+    def __init__(self, context: Any) -> None:
         super().__init__(context)
         self._lock = threading.Lock()
         self._boxes, self._has_changed = {}, False
         self._subscriber = rospy.Subscriber(SCENE, PlanningScene, self._on_scene)
 
-    def close(self):
+    def close(self) -> None:
         self._subscriber.unregister()
         super().close()
 
@@ -36,7 +39,7 @@ class PlanningRecorder(Recorder):
             boxes = [[name, *box] for name, of_name in sorted(self._boxes.items()) for box in of_name]
         return {"scene": boxes} if changed else {}
 
-    def _on_scene(self, message):
+    def _on_scene(self, message: Any) -> None:
         """A scene, or its changes."""
         with self._lock:
             if not message.is_diff:
@@ -49,14 +52,14 @@ class PlanningRecorder(Recorder):
             self._has_changed = True
 
 
-def _boxes(thing):
+def _boxes(thing: Any):
     """[pose (16), edges (3)] of the boxes of a CollisionObject."""
     return [[(_matrix(thing.pose) @ _matrix(pose)).ravel().round(5).tolist(), list(shape.dimensions)]
             for shape, pose in zip(thing.primitives, thing.primitive_poses, strict=False)
             if shape.type == SolidPrimitive.BOX]
 
 
-def _matrix(pose):
+def _matrix(pose: np.ndarray):
     at, turn = pose.position, pose.orientation
     quaternion = turn.x, turn.y, turn.z, turn.w
     return rigid(matrix_from_quaternion(quaternion) if any(quaternion) else np.eye(3), (at.x, at.y, at.z))

@@ -11,9 +11,12 @@ messages: the program's reaction to the last tick's time and joint states has ar
 The first order withdraws all services and topics that change the world: from then on the simulator only serves those
 that read, and nothing but the robot's own interface moves the robot.
 """
+from __future__ import annotations
+
 import json
 import os
 import socket
+from typing import Any
 
 import rospy
 from gazebo_msgs.srv import SetModelConfigurationRequest
@@ -33,7 +36,7 @@ _RESET, _CONFIGURE = "/gazebo/reset_world", "/gazebo/set_model_configuration"
 class Recorder(ModelPlugin):
     """See the module."""
 
-    def __init__(self, context):
+    def __init__(self, context: Any) -> None:
         super().__init__(context)
         folder = os.environ.get(SOCKETS_VARIABLE)
         if not folder:
@@ -55,7 +58,7 @@ class Recorder(ModelPlugin):
         self._handlers = {}
         self._tell({"joints": list(self._model.joint_names)})
 
-    def update(self, time_s, step_s):
+    def update(self, time_s: float, step_s: float) -> None:
         if round(time_s / step_s) % RECORD_TICKS or self._socket is None:
             return
         self._watch_robot()
@@ -75,30 +78,30 @@ class Recorder(ModelPlugin):
         """Further entries of a record: a dict."""
         return {}
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         self._note_placed()
 
-    def reset(self):
+    def reset(self) -> None:
         self._note_placed()
 
-    def close(self):
+    def close(self) -> None:
         self._requests.close()
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
-    def _note_placed(self):
+    def _note_placed(self) -> None:
         if not self._is_ordered:
             self._placed += 1
 
-    def _watch_robot(self):
+    def _watch_robot(self) -> None:
         """Subscribe to the commands of the robot's plugin, which may be a new object."""
         robot = next((plugin for plugin in self.context.plugins() if hasattr(plugin, "command_observers")), None)
         if robot is not self._robot and robot is not None:
             robot.command_observers.append(self._on_command)
         self._robot = robot
 
-    def _on_command(self, side, message, command):
+    def _on_command(self, side: str, message: Any, command: list[str]) -> None:
         """command: the checked command, None where the robot refused it."""
         caller = (getattr(message, "_connection_header", None) or {}).get("callerid", "")
         self._counts[side] += 1
@@ -129,13 +132,13 @@ class Recorder(ModelPlugin):
                 return told
             told += json.loads(datagram)["poses"]
 
-    def _tell(self, record):
+    def _tell(self, record: Any) -> None:
         try:
             self._socket.sendall(json.dumps(record).encode() + b"\n")
         except OSError:
             self._judge_has_gone()
 
-    def _judge_has_gone(self):
+    def _judge_has_gone(self) -> None:
         """The judge is gone, so nobody else ends this lab."""
         self.close()
         rospy.signal_shutdown("the judge has gone")
@@ -149,7 +152,7 @@ class Recorder(ModelPlugin):
             self._judge_has_gone()
         return json.loads(line) if line.strip() else None
 
-    def _obey(self, order, time_s):
+    def _obey(self, order: dict[str, Any], time_s: float):
         """Reset the robot, disabled: `names`, `positions` [rad] of the arms. Returns "", or why it failed."""
         self._close_world()
         if self._robot is None:
@@ -164,7 +167,7 @@ class Recorder(ModelPlugin):
             self._is_ordered = False
         return "" if answer.success else answer.status_message
 
-    def _close_world(self):
+    def _close_world(self) -> None:
         """Withdraw the services and topics that a checked program must not use; keep the services' handlers."""
         for name in self.context.served():
             if changes_the_world("service", name):
@@ -174,5 +177,5 @@ class Recorder(ModelPlugin):
                 self.context.withdraw(topic)
 
 
-def _link(own, model, link):
+def _link(own: Any, model: Any, link: str):
     return link if model == own else "%s/%s" % (model, link)

@@ -1,17 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The report of a check: as text, as JSON, as JUnit XML. Free of ROS."""
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from rf_checks.exercises import PASS_MARK
 
+if TYPE_CHECKING:
+    from rf_checks.judge import Result
+    from rf_checks.lab import WhichRobot
 
-def has_passed(result):
+
+def has_passed(result: Result) -> bool:
     return result.points is not None and result.points >= PASS_MARK
 
 
-def text(result):
+def text(result: Result) -> str:
     """As text for users: a table of each run, then the hint."""
     exercise = result.exercise
     lines = ["%s %s: %s" % (exercise.lab, exercise.name, exercise.title)]
@@ -33,12 +40,12 @@ def text(result):
     return "\n".join(lines)
 
 
-def _robot(which):
+def _robot(which: WhichRobot) -> str:
     """The robot, where it is not the labs' usual one."""
     return "" if which.is_usual else "profile %s, serial %d, " % which
 
 
-def as_json(result):
+def as_json(result: Result) -> str:
     """The same as a JSON text."""
     return json.dumps({
         "lab": result.exercise.lab, "exercise": result.exercise.name, "program": result.program, "seed": result.seed,
@@ -55,7 +62,7 @@ def as_json(result):
     }, indent=1)
 
 
-def as_junit(result):
+def as_junit(result: Result) -> str:
     """The same as JUnit XML: one case for each run; a failure has points and hint."""
     failed = sum(run.points < PASS_MARK for run in result.runs)
     name = "%s.%s" % (result.exercise.lab, result.exercise.name)
@@ -81,6 +88,6 @@ def as_junit(result):
     return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)
 
 
-def _clean(words):
+def _clean(words: str) -> str:
     """Without characters that XML cannot carry."""
     return "".join(c if c in "\t\n" or " " <= c < "\ud800" or "\ue000" <= c <= "\ufffd" else "?" for c in words)

@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses of the robot's frames for given joint values. Free of ROS."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from arm_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
 from baxter_model import BASE_FRAME, joint_names, poses, tip_of
 from urdf_model import parse_urdf
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rf_checks.recording import Recording
 
 # Start of inverse kinematics: the middle of the arm's usual workspace.
 _START = "neutral"
@@ -13,16 +22,16 @@ _START = "neutral"
 class Robot:
     """The robot's kinematics, from its description."""
 
-    def __init__(self, description_xml):
+    def __init__(self, description_xml: str) -> None:
         self._robot = parse_urdf(description_xml)
         self._chains = {}
 
     @property
-    def frame_names(self):
+    def frame_names(self) -> list[str]:
         """Names of all frames that hang on `base`: list."""
         return [link for link in self._robot.links if self._hangs_on_base(link)]
 
-    def frame(self, name, joints):
+    def frame(self, name: str, joints: dict[str, float]) -> np.ndarray:
         """(4, 4) pose of a frame in `base` [m]. `joints`: dict of name to rad."""
         if name in (BASE_FRAME, "world"):
             return np.eye(4)
@@ -36,7 +45,7 @@ class Robot:
             return self._fixed(name)
         return chain.fk(np.array([joints[joint] for joint in chain.joint_names]))
 
-    def _hangs_on_base(self, link):
+    def _hangs_on_base(self, link: str) -> bool:
         while link != BASE_FRAME:
             joint = self._robot.parent_joint(link)
             if joint is None:
@@ -44,36 +53,36 @@ class Robot:
             link = joint.parent
         return True
 
-    def _fixed(self, name):
+    def _fixed(self, name: str) -> np.ndarray:
         """Pose of a frame that no joint moves."""
         matrix = np.eye(4)
         for joint in self._robot.chain(BASE_FRAME, name):
             matrix = matrix @ joint.origin @ joint.child_offset
         return matrix
 
-    def between(self, target, source, joints):
+    def between(self, target: str, source: str, joints: dict[str, float]) -> np.ndarray:
         """(4, 4) pose of `source` in `target`."""
         return np.linalg.inv(self.frame(target, joints)) @ self.frame(source, joints)
 
-    def gripper_path(self, side, recording):
+    def gripper_path(self, side: str, recording: Recording) -> np.ndarray:
         """(n, 3) positions of one gripper in `base` [m]."""
         chain = self._chain(side)
         return np.array([chain.fk(q)[:3, 3] for q in recording.arm(side)])
 
-    def gripper(self, side, recording, row=-1):
+    def gripper(self, side: str, recording: Recording, row: int = -1) -> np.ndarray:
         """(4, 4) pose of one gripper in `base` at a row of the recording."""
         return self._chain(side).fk(recording.arm(side)[row])
 
-    def solve(self, side, xyz, xyzw):
+    def solve(self, side: str, xyz: tuple[float, float, float], xyzw: ArrayLike) -> np.ndarray | NoSolution:
         """Solve an IK request: returns joint values (7,), or the NoSolution."""
         try:
             return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=self._start(side)).q
         except NoSolution as failure:
             return failure
 
-    def _start(self, side):
+    def _start(self, side: str) -> np.ndarray:
         return np.array(list(poses().angles(_START, side).values()))
 
-    def _chain(self, side):
+    def _chain(self, side: str) -> Chain:
         self.frame(tip_of(side), dict.fromkeys(joint_names(side), 0.0))
         return self._chains[tip_of(side)]

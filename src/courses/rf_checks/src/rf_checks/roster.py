@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The students of a class: a number of students, or a CSV file. No ROS, no files."""
+from __future__ import annotations
+
 import codecs
 import csv
 import hashlib
 import io
 import re
 import unicodedata
+from collections.abc import Sequence
 from typing import NamedTuple
 
 #: Students of one class; more is a mistake in the command.
@@ -39,7 +42,7 @@ class Student(NamedTuple):
     full_name: str
 
 
-def numbered(count):
+def numbered(count: int) -> list[Student]:
     """``count`` students: student-01, student-02, ... Raises RosterError."""
     if not 1 <= count <= MAX_STUDENTS:
         raise RosterError("%d students; a class has 1 to %d" % (count, MAX_STUDENTS))
@@ -47,7 +50,7 @@ def numbered(count):
     return [Student("student-%0*d" % (width, number), "Student %d" % number) for number in range(1, count + 1)]
 
 
-def text_of(data):
+def text_of(data: bytes) -> str:
     """The text of a roster's bytes: UTF-8, or UTF-16 with its mark. Raises RosterError."""
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
@@ -60,7 +63,7 @@ def text_of(data):
     return text
 
 
-def read(text):
+def read(text: str) -> list[Student]:
     """The students of a CSV file's text: one per line, with a header, or names alone. Separated by comma, semicolon or
     tab.
 
@@ -93,11 +96,11 @@ def read(text):
                       if name.lower() not in _NO_STUDENTS or (key and "test" not in name.lower())])
 
 
-def _column(header, headings):
+def _column(header: list[str], headings: tuple[str, ...]) -> int | None:
     return next((header.index(heading) for heading in headings if heading in header), None)
 
 
-def _names_of(header):
+def _names_of(header: list[str]) -> Sequence[int]:
     """The columns that make a student's name together, or None."""
     whole, first, last = (_column(header, headings) for headings in (_NAMES, _FIRST_NAMES, _LAST_NAMES))
     if whole is not None:
@@ -105,17 +108,17 @@ def _names_of(header):
     return None if first is None or last is None else [first, last]
 
 
-def _cell(row, column):
+def _cell(row: list[str], column: int | None) -> str:
     return row[column] if column is not None and len(row) > column else ""
 
 
-def _in_order(name):
+def _in_order(name: str):
     """First and last name of "last, first"; any other name as it is."""
     last, comma, first = name.partition(",")
     return "%s %s" % (first.strip(), last.strip()) if comma and first.strip() and "," not in first else name
 
 
-def _students(rows):
+def _students(rows: list[tuple[int, str, str]]) -> list[Student]:
     """rows: (line, full name, what tells this student apart or "")."""
     students, seen = [], {}
     for line, text, key in rows:
@@ -136,12 +139,12 @@ def _students(rows):
     return students
 
 
-def _number_of(full_name):
+def _number_of(full_name: str):
     """For a name of other letters: the same in each roster, whatever the order."""
     return "student-" + hashlib.sha256(full_name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
 
 
-def slug(text):
+def slug(text: str) -> str:
     """The part of an address that stands for a text: "" where no letter or digit of it is ASCII."""
     plain = unicodedata.normalize("NFKD", text.casefold().translate(_LETTERS)).encode("ascii", "ignore").decode()
     return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:_LONGEST_NAME].strip("-")

@@ -3,6 +3,8 @@
 
 student/sitecustomize.py replaces Python's own clocks and `time.sleep` by it. Free of ROS; Linux only.
 """
+from __future__ import annotations
+
 import ctypes
 import errno
 import fcntl
@@ -29,7 +31,7 @@ _ADD_SEALS, _SEALS = 1033, 0x1 | 0x2 | 0x4 | 0x10  # seals, shrink, grow, future
 class RunClock:
     """Advances only by :meth:`advance`. Must be closed."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         writable, can_be_sealed = _new_page()
         try:
             os.ftruncate(writable, mmap.PAGESIZE)
@@ -46,11 +48,11 @@ class RunClock:
         self._write()
 
     @property
-    def environment(self):
+    def environment(self) -> dict[str, str]:
         """Variables for the program's environment: dict."""
         return {VARIABLE: str(self.descriptor)}
 
-    def advance(self, step_s):
+    def advance(self, step_s: float) -> None:
         """Advance simulated time by `step_s` and wake all sleepers."""
         self._simulated_ns += round(step_s * 1e9)
         self._write()
@@ -60,11 +62,11 @@ class RunClock:
                                ctypes.c_int(_EVERYBODY), None, None, 0)
             del address
 
-    def close(self):
+    def close(self) -> None:
         os.close(self.descriptor)
         self._page.close()
 
-    def _write(self):
+    def _write(self) -> None:
         content = PAGE.pack(0, 0, self._simulated_ns, time.monotonic_ns(), *self._start)
         # Not by struct.pack_into: it clears its target first, and 0 is even.
         word = ctypes.c_uint32.from_buffer(self._page)

@@ -4,6 +4,8 @@
 It runs in a sandbox of bubblewrap (isolation.py). Only a trusted author's program may run without it, on machines
 without namespaces: then a session, limits and a search for descendants replace it. Free of ROS.
 """
+from __future__ import annotations
+
 import collections
 import contextlib
 import ctypes
@@ -16,7 +18,9 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import rospy_fixes
 from processes import isolation, system_calls, usage
@@ -50,7 +54,7 @@ _SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _STARTUP_FOLDER = "/run/startup"
 
 
-def adopt_orphans():
+def adopt_orphans() -> None:
     """Make orphaned processes children of this one, so that they can be found."""
     ctypes.CDLL(None, use_errno=True).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
@@ -59,13 +63,14 @@ class Startup:
     """Start-up data of every checked program: a folder for PYTHONPATH, variables, inherited descriptors, and what it
     must not see."""
 
-    def __init__(self, folder, environment, descriptors=(), hidden=()):
+    def __init__(self, folder: Path, environment: dict[str, Any], descriptors: tuple[Any, ...] = (),
+                 hidden: tuple[str, str, str] = ()) -> None:
         """folder: path; environment: dict; descriptors: keep their numbers; hidden: absolute paths."""
         self.folder, self.environment, self.descriptors = str(folder), dict(environment), tuple(descriptors)
         self.hidden = tuple(hidden)
 
     @staticmethod
-    def python_path(folder, python_path):
+    def python_path(folder: str, python_path: str) -> str:
         """PYTHONPATH of a program: with `folder` in front, but behind the lab's own environment.
 
         Python runs the first sitecustomize.py of all folders. The lab's runs the next one after its own work.
@@ -76,7 +81,8 @@ class Startup:
 class Student:
     """A running program. `output`, `errors`: its output so far; `wrote_too_much`: whether that exceeds the limit."""
 
-    def __init__(self, program, arguments, environment, walls=True, startup=None):
+    def __init__(self, program: Path, arguments: Sequence[str], environment: dict[str, str], walls: bool = True,
+                 startup: Startup | None = None) -> None:
         """Start a Python program (path) with `arguments` (strings).
 
         environment: the variables that ROS and the workspace need are passed on. walls: in a sandbox; False for
@@ -96,7 +102,8 @@ class Student:
             raise
         self._streams = [_Stream(self._process.stdout), _Stream(self._process.stderr)]
 
-    def _start(self, program, arguments, environment, walls, startup, refused):
+    def _start(self, program: Path, arguments: Sequence[str], environment: dict[str, str], walls: bool,
+               startup: Startup | None, refused: tuple[list[str], tuple[int, ...]]) -> subprocess.Popen:
         options, descriptors = refused
         home = isolation.HOME if walls else self.folder
         names = submission.copy(program, self.folder)
@@ -131,29 +138,29 @@ class Student:
                                 pass_fds=(*descriptors, *(startup.descriptors if startup else ())))
 
     @property
-    def pid(self):
+    def pid(self) -> int:
         return self._process.pid
 
     @property
-    def exit_code(self):
+    def exit_code(self) -> int | None:
         """None while it runs; minus the signal's number if a signal ended it."""
         code = self._process.poll()
         # Bubblewrap reports signals as shells do.
         return 128 - code if self._has_walls and code is not None and 128 < code <= 192 else code
 
     @property
-    def output(self):
+    def output(self) -> str:
         return self._streams[0].text()
 
     @property
-    def errors(self):
+    def errors(self) -> str:
         return self._streams[1].text()
 
     @property
-    def wrote_too_much(self):
+    def wrote_too_much(self) -> bool:
         return any(stream.total > OUTPUT_BYTES for stream in self._streams)
 
-    def family(self):
+    def family(self) -> set[int]:
         """Process ids of the program and of all its descendants, including orphans."""
         roots = direct_children(os.getpid()) - self._before
         # Once it has ended its number may be another process's.
@@ -161,7 +168,7 @@ class Student:
             roots.add(self.pid)
         return children_of(roots)
 
-    def excess(self):
+    def excess(self) -> str:
         """The limit that the program exceeds: "output", "processes", "threads", "sockets", "files", "memory", or ""."""
         if self.wrote_too_much:
             return "output"
@@ -176,7 +183,7 @@ class Student:
             return "files"
         return "memory" if memory_exceeds(family, MEMORY_BYTES) else ""
 
-    def dump(self):
+    def dump(self) -> None:
         """Make Python write its traceback to `errors`, which also ends it."""
         aborted = self.family()
         # Without walls this is the program; with them it is bubblewrap, which is ended by end().
@@ -190,7 +197,7 @@ class Student:
             time.sleep(0.01)
         self._streams[1].wait(_DRAIN_S)
 
-    def end(self):
+    def end(self) -> None:
         """Kill remaining processes and count those that outlived the program. Call it once."""
         # Processes in a sandbox end with it.
         if self.exit_code is not None and not self._has_walls:
@@ -211,13 +218,13 @@ class Student:
             stream.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _is_bubblewrap(self):
+    def _is_bubblewrap(self) -> bool:
         with contextlib.suppress(OSError), open("/proc/%d/comm" % self.pid, encoding="utf-8") as file:
             return file.read().strip() == "bwrap"
         return True
 
 
-def _count_threads(pids):
+def _count_threads(pids: set[int]) -> int:
     count = 0
     for pid in pids:
         with contextlib.suppress(OSError):
@@ -226,7 +233,7 @@ def _count_threads(pids):
     return count
 
 
-def _count_entries(pids):
+def _count_entries(pids: set[int]) -> int:
     """Files and folders in the writable folders of the sandbox that these processes are in."""
     with contextlib.suppress(OSError):
         root = usage.root_of(pids)
@@ -234,7 +241,7 @@ def _count_entries(pids):
     return 0
 
 
-def _reap(pids):
+def _reap(pids: set[int]) -> None:
     for pid in pids:
         with contextlib.suppress(ChildProcessError):
             os.waitpid(pid, os.WNOHANG)
@@ -243,7 +250,7 @@ def _reap(pids):
 class _Stream:
     """Reads a pipe completely, and keeps the beginning and the end of the data."""
 
-    def __init__(self, pipe):
+    def __init__(self, pipe: BinaryIO) -> None:
         self.total = 0
         self._pipe = pipe
         self._head = bytearray()
@@ -251,7 +258,7 @@ class _Stream:
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
-    def _read(self):
+    def _read(self) -> None:
         with contextlib.suppress(OSError, ValueError):
             while chunk := os.read(self._pipe.fileno(), 4096):
                 self.total += len(chunk)
@@ -262,18 +269,18 @@ class _Stream:
                 if self.total > OUTPUT_BYTES:
                     time.sleep(0.01)  # the program then waits at the full pipe instead of using a processor
 
-    def text(self):
+    def text(self) -> str:
         return (bytes(self._head) + b"".join(list(self._tail))).decode(errors="replace")
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float) -> None:
         """Wait until all has been read, or for timeout_s."""
         self._thread.join(timeout_s)
 
-    def close(self):
+    def close(self) -> None:
         self.wait(1.0)
         self._pipe.close()
 
 
-def python():
+def python() -> str:
     """The interpreter for programs: the one of this process."""
     return sys.executable

@@ -6,6 +6,8 @@ first (the program's own names, numbers, texts, comments, docstrings, annotation
 Names of libraries and their methods stay. Code that was handed out to all students (skeletons, notebooks) counts on
 neither side, so an untouched skeleton is not a copy of the solution made from it.
 """
+from __future__ import annotations
+
 import ast
 import functools
 import hashlib
@@ -16,6 +18,7 @@ import re
 import tokenize
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 #: Tokens of a fingerprint: about two lines of code.
 SPAN = 14
@@ -43,14 +46,14 @@ class Likeness:
     of_reference: float
 
     @property
-    def is_copy(self):
+    def is_copy(self) -> bool:
         return max(self.of_program, self.of_reference) >= COPY_SHARE
 
 
 class _Level(ast.NodeTransformer):
     """Normalize what a copyist changes first. Imported names are replaced by the full names of what they refer to."""
 
-    def __init__(self, tree):
+    def __init__(self, tree: ast.Module) -> None:
         self._own, self._imported = set(), {}
         for node in ast.walk(tree):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
@@ -65,65 +68,65 @@ class _Level(ast.NodeTransformer):
                 for alias in node.names:
                     self._imported[alias.asname or alias.name.split(".")[0]] = alias.name.split(".")[-1]
 
-    def visit_Name(self, node):
+    def visit_Name(self, node: ast.Name) -> ast.Name:
         node.id = "v" if node.id in self._own else self._imported.get(node.id, node.id)
         return node
 
-    def visit_arg(self, node):
+    def visit_arg(self, node: ast.arg) -> ast.arg:
         node.arg, node.annotation = "v", None
         return node
 
-    def visit_Attribute(self, node):
+    def visit_Attribute(self, node: ast.Attribute) -> ast.Attribute:
         self.generic_visit(node)
         if node.attr in self._own:
             node.attr = "v"
         return node
 
-    def visit_keyword(self, node):
+    def visit_keyword(self, node: ast.keyword) -> ast.keyword:
         self.generic_visit(node)
         if node.arg in self._own:
             node.arg = "v"
         return node
 
-    def visit_ExceptHandler(self, node):
+    def visit_ExceptHandler(self, node: ast.ExceptHandler) -> ast.ExceptHandler:
         self.generic_visit(node)
         node.name = "v" if node.name else None
         return node
 
-    def visit_AnnAssign(self, node):
+    def visit_AnnAssign(self, node: str):
         self.generic_visit(node)
         return None if node.value is None else ast.Assign([node.target], node.value, lineno=node.lineno)
 
-    def visit_JoinedStr(self, node):
+    def visit_JoinedStr(self, node: str):
         return ast.Constant("s")
 
-    def visit_Constant(self, node):
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
         if isinstance(node.value, str | bytes):
             return ast.Constant("s")
         return ast.Constant(0) if isinstance(node.value, int | float | complex) and not isinstance(
             node.value, bool) else node
 
-    def visit_Import(self, node):
+    def visit_Import(self, node: ast.Import | ast.ImportFrom) -> None:
         return None
 
     visit_ImportFrom = visit_Import
 
-    def visit_Expr(self, node):
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
         if isinstance(node.value, ast.Constant):  # a docstring
             return None
         self.generic_visit(node)
         return node
 
-    def visit_FunctionDef(self, node):
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
         node.returns = None
         return self._definition(node)
 
     visit_AsyncFunctionDef = visit_FunctionDef
 
-    def visit_ClassDef(self, node):
+    def visit_ClassDef(self, node: ast.ClassDef) -> Any:
         return self._definition(node)
 
-    def _definition(self, node):
+    def _definition(self, node: ast.FunctionDef | ast.ClassDef) -> ast.FunctionDef | ast.ClassDef:
         self.generic_visit(node)
         node.name = "v"
         node.body = node.body or [ast.Pass()]
@@ -131,7 +134,7 @@ class _Level(ast.NodeTransformer):
 
 
 @functools.cache
-def spans(text):
+def spans(text: str) -> tuple[bytes, ...]:
     """The hashes of a program's runs of tokens, in their order: tuple of bytes; empty for what Python cannot read."""
     try:
         tree = ast.parse(text)
@@ -143,18 +146,18 @@ def spans(text):
     return hashes(tokens)
 
 
-def hashes(tokens):
+def hashes(tokens: list[str]) -> tuple[bytes, ...]:
     """The hash of each run of SPAN tokens (texts): tuple of bytes."""
     return tuple(hashlib.blake2b("\0".join(tokens[k:k + SPAN]).encode("utf-8", "surrogatepass"), digest_size=8).digest()
                  for k in range(len(tokens) - SPAN + 1))
 
 
-def fingerprints(text):
+def fingerprints(text: str) -> frozenset[bytes]:
     """The set of hashes of a program's runs of tokens; empty for what Python cannot read."""
     return frozenset(spans(text))
 
 
-def compare(text, references, handed_out):
+def compare(text: str, references: dict[str, str], handed_out: list[str]) -> list[Likeness]:
     """Likenesses of a program to each reference, the most alike first.
 
     text: the program. references: {name: text}. handed_out: texts handed out to all students.
@@ -172,7 +175,7 @@ def compare(text, references, handed_out):
     return sorted(found, key=lambda one: max(one.of_program, one.of_reference), reverse=True)
 
 
-def opaque_calls(text):
+def opaque_calls(text: str) -> list[tuple[int, str]]:
     """(line, name) of calls that run code which is not in the program."""
     tree = _parsed(text)
     modules, functions = {}, {}
@@ -195,14 +198,14 @@ def opaque_calls(text):
     return sorted(found)
 
 
-def judges_own(text):
+def judges_own(text: str) -> list[tuple[int, str]]:
     """(line, text) of the texts in a program that name the judge's files."""
     constants = [node for node in ast.walk(_parsed(text)) if isinstance(node, ast.Constant)]
     return sorted({(node.lineno, node.value[:80]) for node in constants
                    if isinstance(node.value, str) and _JUDGES_OWN.search(node.value)})
 
 
-def _parsed(text):
+def _parsed(text: str) -> ast.Module:
     """The tree of a program; an empty one for invalid Python."""
     try:
         return ast.parse(text)
@@ -210,14 +213,14 @@ def _parsed(text):
         return ast.Module([], [])
 
 
-def notebook_code(path):
+def notebook_code(path: Path) -> str:
     """The Python code of a notebook's cells, as one text."""
     cells = json.loads(Path(path).read_text(encoding="utf-8"))["cells"]
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     return "\n".join(text for text in code if _is_python(text))
 
 
-def _is_python(text):
+def _is_python(text: str) -> bool:
     try:
         ast.parse(text)
     except SyntaxError:
@@ -228,7 +231,7 @@ def _is_python(text):
 class Library:
     """The references and handed-out texts of a workspace; a students' copy has no references."""
 
-    def __init__(self, workspace):
+    def __init__(self, workspace: Path) -> None:
         """workspace: its folder."""
         root = Path(workspace)
         checks, lab = root / "src/courses/rf_checks/exercises", root / "src/courses/rf_lab2"
@@ -240,7 +243,7 @@ class Library:
         self.skeleton_count = len(self.handed_out)
         self.handed_out += [notebook_code(path) for path in sorted(root.glob("src/*/*/notebooks/*.ipynb"))]
 
-    def notes(self, texts):
+    def notes(self, texts: dict[str, str]) -> list[str]:
         """Notes on a program for the instructor: a list of sentences. They change no points.
 
         texts: {name: text} of the program's files, the program itself first.
@@ -262,5 +265,5 @@ class Library:
         return notes
 
 
-def _text(path):
+def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace")

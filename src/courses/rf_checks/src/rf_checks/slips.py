@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Typical mistakes that can be recognized by their effect, also those in a lab sheet's own listing. Free of ROS."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +11,9 @@ from baxter_model import joint_names
 from command_line.options import counted
 from rf_checks.measures import pose_error
 from urdf_model.transforms import matrix_from_quaternion, rotation_angle
+
+if TYPE_CHECKING:
+    from rf_checks.robot import Robot
 
 # Tolerance to identify a known wrong answer [m], [rad].
 NEAR_M, NEAR_RAD = 0.02, 0.06
@@ -23,7 +29,7 @@ SHEET_ROTATE = ("the sheet's listing of rotate_pose puts w first in the line tha
                 "list; compare yours")
 
 
-def rotation_of(w, x, y, z):
+def rotation_of(w: float, x: float, y: float, z: float) -> np.ndarray:
     """(3, 3) rotation of four numbers, read as a quaternion w x y z of any length; NaN for length 0."""
     try:
         return matrix_from_quaternion((x, y, z, w))
@@ -31,7 +37,7 @@ def rotation_of(w, x, y, z):
         return np.full((3, 3), np.nan)  # too short
 
 
-def quaternion_of(rotation):
+def quaternion_of(rotation: np.ndarray) -> np.ndarray:
     """x, y, z, w with w >= 0 of a (3, 3) rotation."""
     # The eigenvector of Bar-Itzhack's matrix, which never divides by nearly zero.
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
@@ -43,7 +49,7 @@ def quaternion_of(rotation):
     return np.array((x, y, z, w)) * (1.0 if w >= 0.0 else -1.0)
 
 
-def about(axis, angle_rad):
+def about(axis: str, angle_rad: float) -> np.ndarray:
     """(3, 3) rotation about "x", "y" or "z"."""
     k = "xyz".index(axis)
     i, j = (k + 1) % 3, (k + 2) % 3
@@ -53,25 +59,25 @@ def about(axis, angle_rad):
     return matrix
 
 
-def is_near(rotation, other):
+def is_near(rotation: np.ndarray, other: np.ndarray) -> bool:
     """Whether two (3, 3) rotations are the same within NEAR_RAD."""
     return rotation_angle(rotation.T @ other) < NEAR_RAD
 
 
-def is_xyzw_taken_as_wxyz(found, true):
+def is_xyzw_taken_as_wxyz(found: np.ndarray, true: np.ndarray) -> bool:
     """Whether a (3, 3) rotation results from reading x y z w as w x y z, once, or at both input and output."""
     x, y, z, w = quaternion_of(true)
     return is_near(found, rotation_of(x, y, z, w))
 
 
-def wrong_rotations(start, axis, angle_rad):
+def wrong_rotations(start: np.ndarray, axis: str, angle_rad: float) -> list[tuple[str, str, np.ndarray]]:
     """Results of known mistakes in "turn `start` (3, 3) about its own axis": list of (key, description, rotation)."""
     x, y, z, w = quaternion_of(start)
     scrambled = rotation_of(x, y, z, w)
     turn = about(axis, angle_rad)
     degrees = math.degrees(angle_rad)
 
-    def read_back(rotation):
+    def read_back(rotation: np.ndarray) -> np.ndarray:
         """The rotation if its quaternion w x y z is sent as x y z w."""
         qx, qy, qz, qw = quaternion_of(rotation)
         return rotation_of(qz, qw, qx, qy)
@@ -93,7 +99,8 @@ def wrong_rotations(start, axis, angle_rad):
     ]
 
 
-def matrix_slip(found, robot, joints, pairs, preferred):
+def matrix_slip(found: np.ndarray, robot: Robot, joints: dict[str, float], pairs: list[tuple[str, str]],
+                preferred: tuple[str, ...]) -> tuple[str, str] | None:
     """The mistake in a (4, 4) matrix that should be the pose of one of `pairs`: (key, sentence) or None.
 
     pairs: (target, source) each, those of the exercise that are missing. preferred: frames that are named first if
@@ -115,7 +122,8 @@ def matrix_slip(found, robot, joints, pairs, preferred):
     return _another_pair(found, robot, joints, pairs, preferred)
 
 
-def _another_pair(found, robot, joints, pairs, preferred):
+def _another_pair(found: np.ndarray, robot: Robot, joints: dict[str, float], pairs: list[tuple[str, str]],
+                  preferred: tuple[str, ...]) -> tuple[str, str] | None:
     """The other pair of frames that the matrix belongs to, directly or with a mistake in its rotation."""
     names = [*preferred, *(name for name in robot.frame_names if name not in preferred)]
     poses = {name: robot.frame(name, joints) for name in names}
@@ -136,7 +144,7 @@ def _another_pair(found, robot, joints, pairs, preferred):
     return None
 
 
-def _rotation_slip(found, true, near_m):
+def _rotation_slip(found: np.ndarray, true: np.ndarray, near_m: float) -> tuple[str, str] | None:
     """The mistake in the rotation of a pose with the right position: (key, sentence) or None."""
     if np.linalg.norm(found[:3, 3] - true[:3, 3]) > near_m or is_near(found[:3, :3], true[:3, :3]):
         return None
@@ -148,12 +156,12 @@ def _rotation_slip(found, true, near_m):
     return None
 
 
-def _same(matrix, other):
+def _same(matrix: np.ndarray, other: np.ndarray) -> bool:
     distance, angle = pose_error(matrix, other)
     return distance < SAME_M and angle < 0.02
 
 
-def command_slip(commands):
+def command_slip(commands: list[tuple[str, int, list[str], list[float]]]) -> tuple[str, str] | None:
     """The mistake in joint commands: (key, sentence) or None. commands: (side, mode, names, values) each."""
     for _, _, names, values in commands:
         repeated = sorted({name for name in names if names.count(name) > 1})

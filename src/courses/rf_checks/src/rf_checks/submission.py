@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The files of a student's program: the program, and the modules beside it that it imports. Free of ROS."""
+from __future__ import annotations
+
 import ast
 import io
 import os
@@ -15,7 +17,7 @@ class BadSubmission(Exception):
     """The program is refused; the text says why."""
 
 
-def read(path, most_bytes=LARGEST_BYTES):
+def read(path: Path, most_bytes: int = LARGEST_BYTES) -> bytes:
     """The bytes of a regular file that is not a link. Raises BadSubmission, OSError."""
     # Never wait for a pipe; and a link could lead to a file that only the judge may read.
     if os.path.islink(path):
@@ -30,7 +32,7 @@ def read(path, most_bytes=LARGEST_BYTES):
         return file.read(most_bytes)
 
 
-def files(program):
+def files(program: Path) -> dict[str, bytes]:
     """{name below the program's folder: bytes} of the program (Path) and of the modules beside it that it imports.
 
     Raises BadSubmission, OSError.
@@ -55,12 +57,12 @@ def files(program):
     return found
 
 
-def texts(program):
+def texts(program: Path) -> dict[str, str]:
     """As `files`, decoded."""
     return {name: decoded(content) for name, content in files(program).items()}
 
 
-def decoded(content):
+def decoded(content: bytes) -> str:
     """The text of a program (bytes) in the encoding that its first lines name, as Python reads it, without the mark
     that Windows puts before UTF-8; other bytes are replaced."""
     try:
@@ -70,7 +72,7 @@ def decoded(content):
         return content.decode("utf-8-sig", errors="replace")
 
 
-def imported(source):
+def imported(source: bytes) -> set[str]:
     """Names of the modules that a program (bytes) imports, as far as its text shows them."""
     try:
         tree = ast.parse(source)
@@ -85,7 +87,7 @@ def imported(source):
     return names
 
 
-def copy(program, folder):
+def copy(program: Path, folder: str) -> tuple[str, ...]:
     """Copy `files` into an empty folder; returns the names. Raises BadSubmission, OSError."""
     found = files(program)
     for name, content in found.items():

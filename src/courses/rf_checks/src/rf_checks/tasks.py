@@ -5,8 +5,12 @@ A task has `calls(rng)`, the runs of the check; `criteria(call, run, robot)`, th
 robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program that does not
 end. It may have `foremost(call, run)`, a Fault that explains how the program behaved, or None.
 """
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +18,13 @@ from baxter_model import SIDES, joint_names, poses
 from rf_checks import measures, slips
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import ArrayLike
+
+    from rf_checks.recording import Recording, Run
+    from rf_checks.robot import Robot
 
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
@@ -39,13 +50,13 @@ class Call:
     obstacle: object = None
 
 
-def postures(rng, spread=0.12):
+def postures(rng: Generator, spread: float = 0.12) -> dict[str, float]:
     """Postures of both arms near neutral, each joint within `spread` [rad]."""
     return {name: round(float(angle + rng.uniform(-spread, spread)), 4)
             for side in SIDES for name, angle in poses().angles("neutral", side).items()}
 
 
-def pose_matrix(point, quaternion_xyzw):
+def pose_matrix(point: Sequence[float], quaternion_xyzw: ArrayLike) -> np.ndarray:
     """(4, 4) of a position [m] and a quaternion x y z w of any length."""
     matrix = np.eye(4)
     x, y, z, w = quaternion_xyzw
@@ -53,7 +64,8 @@ def pose_matrix(point, quaternion_xyzw):
     return matrix
 
 
-def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
+def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: Call,
+                    weights: tuple[float, float, float], halts_allowed: int) -> list[Criterion]:
     """Smoothness, collisions, time: weighted by the solved share of the task (`done_share`)."""
     smooth, clear, quick = weights
     recording = run.recording
@@ -66,7 +78,7 @@ def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
         return [Criterion(name, 0.0, weight, in_part)
                 for name, weight in (("smoothness", smooth), ("collisions", clear), ("time", quick))]
 
-    def criterion(name, share, weight, found):
+    def criterion(name: str, share: float, weight: float, found: str) -> Criterion:
         return Criterion(name, done_share * share, weight,
                          "%s; %s" % (found, in_part) if share == 1.0 > done_share else found)
 
@@ -80,12 +92,12 @@ def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
     ]
 
 
-def counted(number, word):
+def counted(number: Any, word: str) -> str:
     """A number with its noun: "1 time", "2 times"."""
     return "%s %s%s" % (number, word, "" if str(number) == "1" else "s")
 
 
-def _duration(recording):
+def _duration(recording: Recording) -> float:
     arms = np.hstack([recording.arm(side) for side in SIDES]) if len(recording.times) else np.empty((0, 14))
     rows = measures.moving_rows(recording.times, arms)
     return float(recording.times[rows[1]] - recording.times[0]) if rows else 0.0
@@ -94,21 +106,21 @@ def _duration(recording):
 class RotateGripper:
     """`rotate_gripper.py AXIS DEGREES`: the left gripper to the lab's pose, then turned about its own axis."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         return [Call((axis, "%d" % degrees), postures(rng), 45.0, (axis, math.radians(degrees)), 22.0)
                 for axis, degrees in (("z", 90), ("x", 90), ("y", -90))]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
-    def _target(self, call):
+    def _target(self, call: Call) -> tuple[np.ndarray, np.ndarray]:
         axis, angle = call.expected
         start = pose_matrix(LAB_POINT, LAB_QUATERNION)
         target = start.copy()
         target[:3, :3] = start[:3, :3] @ slips.about(axis, angle)
         return start, target
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         position = orientation = 0.0
         distance, angle = math.inf, math.inf
         recording = run.recording
@@ -124,7 +136,7 @@ class RotateGripper:
         return [Criterion("position", position, 20.0, reached), Criterion("orientation", orientation, 40.0, turned),
                 *motion_criteria(run, ("left",), min(position, orientation), call, (10.0, 15.0, 15.0), 4)]
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         axis, angle = call.expected
         start, target = self._target(call)
         requests = run.recording.ik_requests()
@@ -141,7 +153,7 @@ class RotateGripper:
                 or self._missed(run, robot, start, bool(requests)))
 
     @staticmethod
-    def _missed(run, robot, start, has_asked):
+    def _missed(run: Run, robot: Robot, start: np.ndarray, has_asked: bool) -> Any:
         """The sentence for an arm that is at another place without a known mistake."""
         distance = measures.pose_error(robot.gripper("left", run.recording), start)[0]
         if distance < 0.05 or measures.path_length(run.recording.arm("left")) < 0.1:
@@ -151,7 +163,8 @@ class RotateGripper:
             text += "; the IK service was never asked for joint angles"
         return Fault("far_off", text)
 
-    def _rotation_fault(self, pose, start, target, axis, angle):
+    def _rotation_fault(self, pose: np.ndarray, start: np.ndarray, target: np.ndarray, axis: str,
+                        angle: float) -> Fault | None:
         rotation = pose[:3, :3]
         if slips.is_near(rotation, target[:3, :3]) or slips.is_near(rotation, start[:3, :3]):
             return None
@@ -162,7 +175,8 @@ class RotateGripper:
                 return Fault(key, sentence)
         return None
 
-    def _reached_fault(self, run, robot, start, target, axis, angle):
+    def _reached_fault(self, run: Run, robot: Robot, start: np.ndarray, target: np.ndarray, axis: str,
+                       angle: float) -> Fault | None:
         if not run.recording.records:
             return None
         reached = robot.gripper("left", run.recording)
@@ -187,15 +201,15 @@ class RotateGripper:
 class JointCommand:
     """`joint_command.py Q0 ... Q6`: the right arm to seven angles, s0 to w2, by a stream of joint commands."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         goal = [round(float(angle), 3) for angle in np.array((-0.4, -0.3, 0.5, 1.1, 0.3, 0.8, 0.7))
                 + rng.uniform(-0.15, 0.15, 7)]
         return [Call(tuple(map(str, goal)), postures(rng), 30.0, tuple(goal), 12.0)]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         share, found = 0.0, "the arm did not move"
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
@@ -205,7 +219,7 @@ class JointCommand:
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Any:
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
             off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
@@ -219,18 +233,18 @@ class JointCommand:
 class Wave:
     """`wave.py`: both grippers to and fro along a sine path at the same time, three periods or more, then an end."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         return [Call((), postures(rng), 60.0, None, 40.0)]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
-    def fits(self, run, robot):
+    def fits(self, run: Run, robot: Robot) -> dict[str, measures.SineFit]:
         """The sine of each gripper's path: dict of side to SineFit."""
         recording = run.recording
         return {side: measures.fit_sine(recording.times, robot.gripper_path(side, recording)) for side in SIDES}
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         fits = self.fits(run, robot) if len(run.recording.times) > 50 else dict.fromkeys(SIDES, measures.NO_SINE)
         found, shares = [], []
         for side, fit in fits.items():
@@ -252,14 +266,14 @@ class Wave:
                                  4 + round(3 * max(fit.periods for fit in fits.values())))]
 
     @staticmethod
-    def _together(fits):
+    def _together(fits: Any) -> float:
         left, right = (fits[side] for side in SIDES)
         if not (left.periods and right.periods):
             return 0.0
         both = min(left.end, right.end) - max(left.start, right.start)
         return float(np.clip(both / min(left.end - left.start, right.end - right.start), 0.0, 1.0))
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         if len(run.recording.times) < 50:
             return None
         fits = self.fits(run, robot)

@@ -3,8 +3,12 @@
 
 The methods of a task are described in tasks.py.
 """
+from __future__ import annotations
+
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +17,12 @@ from command_line.options import counted
 from rf_checks import measures
 from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import Call, motion_criteria, postures
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from rf_checks.recording import Recording, Run
+    from rf_checks.robot import Robot
 
 ARM, STATE = "left", "left_neutral"
 # The pillar stands on the floor in front of the arm's left half, in `base` [m].
@@ -45,11 +55,11 @@ class Obstacle:
     middle: tuple
     edges: tuple
 
-    def urdf(self):
+    def urdf(self) -> str:
         """Its description, URDF text."""
         return _URDF % {"box": '<box size="%g %g %g"/>' % self.edges}
 
-    def is_covered(self, pose, edges):
+    def is_covered(self, pose: np.ndarray, edges: Any) -> bool:
         """Whether a box with `pose` (4, 4) and `edges` (3,) stands for it: as large, or a little larger."""
         own = np.eye(4)
         own[:3, 3] = self.middle
@@ -57,7 +67,7 @@ class Obstacle:
                     and _beyond(pose, edges, own, np.array(self.edges)) < BEYOND_M)
 
 
-def _beyond(pose, edges, other, size):
+def _beyond(pose: np.ndarray, edges: Any, other: Any, size: Any) -> float:
     """How far a box with `pose` and `edges` reaches beyond the faces of one with `other` and `size` [m]."""
     corners = 0.5 * edges * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     seen = np.linalg.inv(other) @ pose
@@ -67,7 +77,7 @@ def _beyond(pose, edges, other, size):
 class PlanAround:
     """`plan_around.py X Y Z LX LY LZ`: the left arm to `left_neutral`, past a pillar at X Y Z with edges LX LY LZ."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         x, y = (round(float(value + rng.uniform(-_SPREAD_M, _SPREAD_M)), 3) for value in _PLACE_M)
         edges = _WIDTH_M, _WIDTH_M, round(_TOP_M - _FLOOR_M, 3)
         pillar = Obstacle((x, y, round(0.5 * (_FLOOR_M + _TOP_M), 3)), edges)
@@ -76,10 +86,10 @@ class PlanAround:
         words = tuple("%g" % value for value in (*pillar.middle, *pillar.edges))
         return [Call(words, posture, 60.0, tuple(poses().angles("neutral", ARM).values()), 25.0, pillar)]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         recording = run.recording
         share, found = 0.0, "the arm did not move"
         if _has_moved(recording):
@@ -92,13 +102,13 @@ class PlanAround:
                 *motion_criteria(run, (ARM,), share, call, (10.0, 20.0, 10.0), 3)]
 
     @staticmethod
-    def _knows(pillar, told):
+    def _knows(pillar: Any, told: list[Any]) -> bool:
         return len(told) <= MAX_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
 
-    def foremost(self, call, run):
+    def foremost(self, call: Call, run: Run) -> Fault | None:
         return self._about_scene(call, run) if _touched(run.recording) else None
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         recording = run.recording
         fault = self._about_scene(call, run)
         if fault is None and not recording.accepted_count(ARM) and recording.was_enabled():
@@ -113,7 +123,7 @@ class PlanAround:
         return fault
 
     @staticmethod
-    def _about_scene(call, run):
+    def _about_scene(call: Call, run: Run):
         """A Fault for what move_group was told of the pillar, or None."""
         pillar, told = call.obstacle, _told(run.recording)
         if PlanAround._knows(pillar, told):
@@ -139,15 +149,15 @@ class PlanAround:
                      "on each side is a margin" % (name, _words(edges), _words(pillar.edges), end, BEYOND_M))
 
 
-def _has_moved(recording):
+def _has_moved(recording: Recording) -> bool:
     return bool(recording.records) and measures.path_length(recording.arm(ARM)) > 0.1
 
 
-def _touched(recording):
+def _touched(recording: Recording) -> bool:
     return any("pillar" in link for pair in recording.contacts() for link in pair)
 
 
-def _told(recording):
+def _told(recording: Recording) -> list[Any]:
     """The different boxes in move_group's scene until the arm came to rest: list of (name, pose, edges)."""
     rows = measures.moving_rows(recording.times, recording.arm(ARM)) if _has_moved(recording) else None
     last = rows[1] if rows else len(recording.records)
@@ -158,5 +168,5 @@ def _told(recording):
     return list(found.values())
 
 
-def _words(numbers):
+def _words(numbers: Sequence[float]) -> str:
     return " ".join("%.2f" % value for value in numbers)

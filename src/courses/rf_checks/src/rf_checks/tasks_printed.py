@@ -4,8 +4,12 @@
 Each answer has a form that holds one: the last matrices, as many as are asked for; the line with the verdict; one name.
 A program that prints all it could be has not answered. The methods of a task are described in tasks.py.
 """
+from __future__ import annotations
+
 import math
 import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +19,12 @@ from rf_checks import measures, slips
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+
+    from rf_checks.recording import Run
+    from rf_checks.robot import Robot
 
 SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))
 # Frames that a wrong answer is compared with first.
@@ -30,7 +40,7 @@ MAX_NUMBERS = 3
 _NOT_ROW = re.compile(r"[^\s\d.,;\[\]()eE+-]")
 
 
-def matrices(text):
+def matrices(text: str) -> list[np.ndarray]:
     """All 4 by 4 matrices in a text, as printed by numpy, as lists or as plain rows: list of (4, 4) arrays."""
     found, rows = [], []
     for line in text.splitlines():
@@ -49,7 +59,7 @@ def matrices(text):
     return found
 
 
-def last_matrices(text, count):
+def last_matrices(text: str, count: int) -> list[np.ndarray]:
     """The last `count` different matrices in a text, in their order: list of (4, 4). A program in a loop prints each
     again and again."""
     found = []
@@ -64,15 +74,15 @@ def last_matrices(text, count):
 class TfListener:
     """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three, and no other last."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         pairs = [(a, b) for a, b in (("head", "right_hand"), ("right_hand", "head_camera"), ("left_gripper", "torso"))]
         pair = pairs[int(rng.integers(len(pairs)))]
         return [Call((), postures(rng, 0.3), 15.0, SHEET_PAIRS), Call(pair, postures(rng, 0.3), 15.0, (pair,))]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return len(matrices(run.output)) >= len(call.expected)
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         found = last_matrices(run.output, len(call.expected))
         result = []
         for target, source in call.expected:
@@ -90,7 +100,7 @@ class TfListener:
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
         return result
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         found = last_matrices(run.output, len(call.expected))
         if not run.recording.records:
             return None
@@ -115,7 +125,7 @@ class TfListener:
         return None
 
 
-def _near(matrix, true):
+def _near(matrix: np.ndarray, true: np.ndarray) -> bool:
     distance, angle = measures.pose_error(matrix, true)
     return distance < 0.01 and angle < 0.03
 
@@ -127,7 +137,7 @@ _VERDICT = re.compile("|".join(VERDICTS))
 class Unreachable:
     """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict on that pose, and its reason."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
         turned = slips.quaternion_of(down @ slips.about("y", -np.pi / 2))
         kinds = ((LAB_POINT, LAB_QUATERNION), ((1.5, 0.6, 0.2), (0.0, 1.0, 0.0, 0.0)), ((0.6, 0.3, 0.3), turned))
@@ -138,14 +148,14 @@ class Unreachable:
             calls.append(Call(words, postures(rng), 12.0, tuple(float(word) for word in words)))
         return calls
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
-    def _truth(self, call, robot):
+    def _truth(self, call: Call, robot: Robot) -> Any:
         answer = robot.solve("left", call.expected[:3], call.expected[3:])
         return answer if hasattr(answer, "reason") else None
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         failure = self._truth(call, robot)
         verdict = failure.reason.name if failure else "SOLVED"
         lines = [line for line in run.output.splitlines() if _VERDICT.search(line)]
@@ -162,7 +172,7 @@ class Unreachable:
                           "counts with the right verdict")]
 
     @staticmethod
-    def _says_why(failure, line):
+    def _says_why(failure: Any, line: str) -> bool:
         """Whether a line of the output gives the reason, and no other."""
         if failure is None:
             return True
@@ -174,7 +184,7 @@ class Unreachable:
         return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m)
                    for number in numbers[:MAX_NUMBERS])
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         requests = run.recording.ik_requests()
         for _, frame, xyz, xyzw, _ in requests:
             if frame.lstrip("/") not in ("base", "world", ""):
@@ -199,14 +209,14 @@ class IkFrame:
     """`ik_frame.py`: finds out by an experiment the reference frame of poses and the frame that is moved there; prints
     both."""
 
-    def calls(self, rng):
+    def calls(self, rng: Generator) -> list[Call]:
         return [Call((), postures(rng), 40.0, None, 20.0)]
 
-    def is_satisfied(self, call, run):
+    def is_satisfied(self, call: Call, run: Run) -> bool:
         return False
 
     @staticmethod
-    def answers(text):
+    def answers(text: str) -> tuple[str, str]:
         """(reference frame, commanded frame) as printed: "" where there is none, all names where there are several."""
         found = []
         for name in ("reference frame", "commanded frame"):
@@ -214,7 +224,7 @@ class IkFrame:
             found.append(" and ".join([*said][:3]) + (" and others" if len(said) > 3 else ""))
         return tuple(found)
 
-    def criteria(self, call, run, robot):
+    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
         reference, commanded = self.answers(run.output)
         asked, arrived, found = self._experiment(run, robot)
         return [
@@ -228,7 +238,7 @@ class IkFrame:
         ]
 
     @staticmethod
-    def _experiment(run, robot):
+    def _experiment(run: Run, robot: Robot) -> Sequence[Any]:
         recording = run.recording
         solved = [request for request in recording.ik_requests() if request[4] == 0]
         best = 0.0, "no arm moved to a pose that the service had solved"
@@ -246,7 +256,7 @@ class IkFrame:
             best = max(best, (share, found))
         return bool(solved), *best
 
-    def slip(self, call, run, robot):
+    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
         reference, commanded = self.answers(run.output)
         if not reference or not commanded:
             return Fault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Start and end of the lab's programs."""
+from __future__ import annotations
+
 import errno
 import os
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import rospy
 
@@ -13,7 +17,7 @@ class ProgramFailed(Exception):
     """The program did not reach its aim; the text says why."""
 
 
-def run(node_name, body):
+def run(node_name: str, body: Callable[[], Any]) -> int:
     """Wait for the robot, become the node `node_name`, call `body()`; return the exit status.
 
     0 after success; 1 after ProgramFailed, OSError, ValueError or an error of ROS, with one line on stderr; 130 after

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Waving: a pose held up, and a sine on top of it. Free of ROS."""
+from __future__ import annotations
+
 import numpy as np
 
 from baxter_model import arm_angles
@@ -10,12 +12,12 @@ HANDS_UP = {"s0": -0.3, "s1": -1.2, "e0": 0.0, "e1": 1.2, "w0": 0.0, "w1": -1.4,
 RAMP_S = 1.0
 
 
-def hands_up(side):
+def hands_up(side: str):
     """Joint angles {name: rad} of the arm `side`, "left" or "right", with its hand up."""
     return arm_angles(side, HANDS_UP)
 
 
-def shifts(side, amplitude_m, count):
+def shifts(side: str, amplitude_m: float, count: int):
     """Shifts (count, 3) [m, in base] of the gripper along one period: a sine along y, mirrored for the other arm."""
     phases = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     out = np.zeros((count, 3))
@@ -26,7 +28,7 @@ def shifts(side, amplitude_m, count):
 class Swing:
     """Joint angles along a closed path, as a function of time."""
 
-    def __init__(self, rows, period_s):
+    def __init__(self, rows: np.ndarray, period_s: float) -> None:
         """`rows`: (n, joints) angles [rad] at even times within `period_s` [s]; the first one is the start.
 
         Raises ValueError for invalid rows or an invalid period.
@@ -39,7 +41,7 @@ class Swing:
         self._places = np.arange(len(rows) + 1)
         self._columns = np.vstack([rows, rows[:1]]).T
 
-    def angles(self, elapsed_s, total_s):
+    def angles(self, elapsed_s: float, total_s: float):
         """Angles (joints,) [rad] after `elapsed_s` of `total_s`: at rest in the first row at both ends."""
         place = (elapsed_s / self._period_s * len(self._rows)) % len(self._rows)
         there = np.array([np.interp(place, self._places, column) for column in self._columns])
