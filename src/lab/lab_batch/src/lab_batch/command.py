@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh batch`: run a job for many seeds, continue where it was, and show how it goes."""
+from __future__ import annotations
+
 import argparse
 import ast
 import os
@@ -7,7 +9,9 @@ import shlex
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, counted, did_you_mean, number, seconds
 
@@ -15,6 +19,11 @@ from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, check, class_of, parameters_of
 from .records import Records, RecordsError, summary, versions
 from .shipped import JOBS
+
+if TYPE_CHECKING:
+    from io import TextIOWrapper
+
+    from lab_batch.job import Outcome
 
 ROOT = Path(os.environ.get("LAB_ROOT", Path.cwd()))
 # Between two lines of progress: on a terminal, where each replaces the last one, and in a file.
@@ -30,7 +39,7 @@ MAX_SEEDS = 10_000_000
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 
-def seeds_of(text):
+def seeds_of(text: str) -> list[int]:
     """0:1000 is 0 to 999; 5 is 5 alone; 1:3,7 is 1, 2, 7. Raises argparse.ArgumentTypeError."""
     parts, count = [], 0
     try:
@@ -51,7 +60,7 @@ def seeds_of(text):
     return list(dict.fromkeys(seed for part in parts for seed in part))
 
 
-def setting_of(text):
+def setting_of(text: str) -> tuple[str, Any]:
     """NAME=VALUE, where VALUE is a Python literal, or else a text. Raises argparse.ArgumentTypeError."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals):
@@ -62,7 +71,7 @@ def setting_of(text):
         return name, value
 
 
-def parse(argv):
+def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = Parser(
         prog="./baxter.sh batch", description=__doc__,
         epilog="JOB is a name of --list, or package.module:Class (a class that derives from lab_batch.Job). "
@@ -106,7 +115,7 @@ def _spec(options: argparse.Namespace) -> Spec:
     return Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(options.set))
 
 
-def repeating_line(options, seed):
+def repeating_line(options: argparse.Namespace, seed: int) -> str:
     """The command that runs one episode again, in the folder of this one."""
     script = "./baxter.sh"
     if not os.path.exists(script):
@@ -117,12 +126,13 @@ def repeating_line(options, seed):
         words += ["--set", text if setting_of(text) == (name, value) else "%s=%r" % (name, value)]
     if options.time_limit:
         words += ["--time-limit", "%g" % options.time_limit]
-    if memory_bytes_of(options) not in (None, keeping.default_memory_bytes(os.cpu_count())):
-        words += ["--memory", "%.3g" % (memory_bytes_of(options) / 1e9)]
+    memory_bytes = memory_bytes_of(options)
+    if memory_bytes not in (None, keeping.default_memory_bytes(os.cpu_count() or 1)):
+        words += ["--memory", "%.3g" % (memory_bytes / 1e9)]
     return shlex.join([*words, "--out", "/dev/null"])
 
 
-def memory_bytes_of(options):
+def memory_bytes_of(options: argparse.Namespace) -> int | None:
     """The limit of memory of each worker, or None: the machines of a cluster may have other ones."""
     if options.memory:
         return round(1e9 * options.memory)
@@ -135,13 +145,13 @@ class Progress:
     clock: returns the time [s]; stream: a text stream.
     """
 
-    def __init__(self, total, stream=None, clock=time.monotonic):
+    def __init__(self, total: int, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream, self._clock = sys.stderr if stream is None else stream, clock
         self._total, self._count, self._failed = total, 0, 0
         self._began = self._shown = self._ended = clock()  # of the last episode
         self._longest, self._silent_s = 0.0, SILENT_S
 
-    def step(self, outcome):
+    def step(self, outcome: Outcome) -> None:
         self._count += 1
         self._failed += not outcome.is_done
         now = self._clock()
@@ -155,7 +165,7 @@ class Progress:
             return
         self._shown = now
 
-    def silence(self):
+    def silence(self) -> str:
         """A line to show where no episode has ended for much longer than before, else "". Each line of one silence
         comes after twice the time of the last. Any thread may call it."""
         silent = self._clock() - self._ended
@@ -167,40 +177,40 @@ class Progress:
         return ("batch: no episode has ended for %s. If one hangs, --time-limit SECONDS gives it up: Ctrl-C, then the "
                 "same command with it, which goes on from here" % duration(silent))
 
-    def _bar(self):
+    def _bar(self) -> str:
         full = BAR_WIDTH * self._count // self._total
         return "[%s%s]" % ("#" * full, "." * (BAR_WIDTH - full))
 
-    def _text(self, now):
+    def _text(self, now: float) -> str:
         seconds = max(now - self._began, 1e-9)
         left = (self._total - self._count) * seconds / self._count
         return "%d/%d, %d failed, %.3g/s, %s left" % (
             self._count, self._total, self._failed, self._count / seconds, duration(left))
 
-    def _write(self, text):
+    def _write(self, text: str) -> None:
         self._stream.write(text)
         self._stream.flush()
 
-    def end(self):
+    def end(self) -> None:
         if self._stream.isatty() and self._count:
             self._write("\n")
 
 
-def duration(seconds):
+def duration(seconds: float) -> str:
     """1:02:03 for 3723 s, 02:03 for 123 s."""
     minutes, second = divmod(round(seconds), 60)
     hours, minute = divmod(minutes, 60)
     return "%d:%02d:%02d" % (hours, minute, second) if hours else "%02d:%02d" % (minute, second)
 
 
-def list_jobs():
+def list_jobs() -> None:
     for name, (target, text) in JOBS.items():
         print("%-14s %s" % (name, text))
         for parameter, default in parameters_of(class_of(target)).items():
             print("%-14s   --set %s=%s" % ("", parameter, default))
 
 
-def run(options):
+def run(options: argparse.Namespace) -> int:
     spec = _spec(options)
     check(spec)  # wrong names are told before anything starts
     if options.parquet:
@@ -230,13 +240,13 @@ def run(options):
         records.close()
 
 
-def changes(earlier, now):
+def changes(earlier: dict[str, str], now: dict[str, str]) -> str:
     """Say which versions ({name: text}) are others now."""
     return ", ".join("%s %s (now %s)" % (name, earlier.get(name, "absent"), now.get(name, "absent"))
                      for name in sorted({**earlier, **now}) if earlier.get(name) != now.get(name))
 
 
-def _run_left(options, spec, left, records):
+def _run_left(options: argparse.Namespace, spec: Spec, left: list[int], records: Records) -> None:
     progress = Progress(len(left))
     limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle,
                               memory_bytes_of(options))
@@ -252,13 +262,13 @@ def _run_left(options, spec, left, records):
         progress.end()
 
 
-def _tell_silence(progress, done):
+def _tell_silence(progress: Progress, done: threading.Event) -> None:
     while not done.wait(1.0):
         if line := progress.silence():
             print("\n" + line if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
 
 
-def report(options, outcomes, path, count, seconds):
+def report(options: argparse.Namespace, outcomes: list[Outcome], path: Path, count: int, seconds: float) -> int:
     failed = [one for one in outcomes if not one.is_done]
     for line in summary(outcomes):
         print(line)
@@ -269,10 +279,10 @@ def report(options, outcomes, path, count, seconds):
     return 1 if failed else 0
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     options = parse(argv)
     # Errors of jobs hold any text.
-    sys.stdout.reconfigure(errors="backslashreplace")
+    cast("TextIOWrapper", sys.stdout).reconfigure(errors="backslashreplace")
     try:
         if options.list:
             list_jobs()

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A job: a class of which each instance runs episodes, one for each seed."""
+from __future__ import annotations
+
 import errno
 import importlib
 import inspect
@@ -8,6 +10,7 @@ import resource
 import time
 import traceback
 from dataclasses import dataclass, field
+from typing import Any
 
 from . import keeping
 
@@ -32,10 +35,10 @@ class Job:
     on parameters and seed alone, because seeds are given to workers in any order.
     """
 
-    def start(self):
+    def start(self) -> None:
         """Prepare what all episodes share, such as a model or compiled code. Called once, before the first episode."""
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         """Run one episode; return its results as {name: value that JSON can hold}. seed: int >= 0.
 
         Numbers and arrays of NumPy count as numbers and lists.
@@ -43,7 +46,7 @@ class Job:
         """
         raise NotImplementedError
 
-    def end(self):
+    def end(self) -> None:
         """Release what start() took. Not called in a worker that died or was stopped."""
 
 
@@ -52,7 +55,7 @@ class Spec:
     """Which job: "package.module:Class", and its parameters as {name: value that JSON can hold}."""
 
     name: str
-    parameters: dict = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -61,17 +64,17 @@ class Outcome:
     worker should run no other one."""
 
     seed: int
-    result: dict
+    result: dict[str, Any]
     error: str = ""
     seconds: float = 0.0
     is_out_of_memory: bool = False
 
     @property
-    def is_done(self):
+    def is_done(self) -> bool:
         return not self.error
 
 
-def class_of(name):
+def class_of(name: str) -> type[Job]:
     """The class of "package.module:Class". Raises JobError."""
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):
@@ -90,13 +93,13 @@ def class_of(name):
     return found
 
 
-def parameters_of(kind):
+def parameters_of(kind: type[Job]) -> dict[str, Any]:
     """{name: default} of a job's parameters."""
     return {name: one.default for name, one in inspect.signature(kind).parameters.items()
             if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
 
 
-def check(spec: Spec) -> type:
+def check(spec: Spec) -> type[Job]:
     """Return the class of a job that has these parameters. Raises JobError."""
     kind = class_of(spec.name)
     known = parameters_of(kind)
@@ -107,7 +110,7 @@ def check(spec: Spec) -> type:
     return kind
 
 
-def load(spec):
+def load(spec: Spec) -> Job:
     """Return an instance of the job that is ready for run(). Raises JobError."""
     kind = check(spec)
     try:
@@ -118,7 +121,7 @@ def load(spec):
     return job
 
 
-def run_episode(job, seed):
+def run_episode(job: Job, seed: int) -> Outcome:
     """Return the Outcome of one episode; an exception of the job is its error, with the line where it was raised."""
     started = time.monotonic()
     is_out_of_memory = False
@@ -136,7 +139,7 @@ def run_episode(job, seed):
     return Outcome(seed, result, text, time.monotonic() - started, is_out_of_memory)
 
 
-def plain(result):
+def plain(result: dict[Any, Any] | None) -> dict[str, Any]:
     """Return what run() returned as JSON gives it back: tuples are lists, arrays of NumPy as well.
 
     So a batch that was interrupted has the same results as one that was not. Raises ResultError.
@@ -146,7 +149,7 @@ def plain(result):
     return {name: _plain(name, value) for name, value in result.items()}
 
 
-def _plain(name, value):
+def _plain(name: Any, value: Any) -> Any:
     if not isinstance(name, str):
         raise ResultError("run() named a result %r; names are texts, such as 'error_m'" % (name,))
     try:
@@ -158,7 +161,7 @@ def _plain(name, value):
     raise ResultError("result %r cannot be written as JSON: %s" % (name, text))
 
 
-def _of_numpy(value):
+def _of_numpy(value: Any) -> Any:
     if getattr(value, "size", 0) > MAX_NUMBERS:
         raise TypeError("it is an array of %d numbers; the most is %d, so write it to a file and return the file's name"
                         % (value.size, MAX_NUMBERS))
@@ -168,7 +171,7 @@ def _of_numpy(value):
                     % type(value).__name__)
 
 
-def _text_of(error):
+def _text_of(error: BaseException) -> str:
     try:
         text = "%s: %s" % (type(error).__name__, error)
     # A job's exception may have a __str__ that fails.
@@ -180,10 +183,10 @@ def _text_of(error):
     return text
 
 
-def _is_of_memory(error):
+def _is_of_memory(error: BaseException) -> bool:
     return isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
 
 
-def gigabytes(count):
+def gigabytes(count: int) -> str:
     """A number of bytes as text: 2.5 GB."""
     return "%.3g GB" % (count / 1e9)

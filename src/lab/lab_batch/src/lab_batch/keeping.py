@@ -4,13 +4,17 @@
 It ends all that the worker has started, also where worker or batch are killed, and ends the worker where it and its
 processes take too much memory together. Linux only.
 """
+from __future__ import annotations
+
 import contextlib
 import ctypes
 import os
 import resource
 import signal
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from processes.family import children_of, memory_exceeds
 
@@ -28,7 +32,7 @@ _OOM_SCORE = "500"
 _WAKING = (signal.SIGCHLD, signal.SIGTERM)
 
 
-def default_memory_bytes(workers, root=Path("/")):
+def default_memory_bytes(workers: int, root: Path = Path("/")) -> int:
     """Memory of each of so many workers, with all of its processes, by default: a share of the machine's, or of its
     control group's where that has less. root: of /proc and /sys."""
     most = int((root / "proc/meminfo").read_text(encoding="ascii").split("MemTotal:")[1].split()[0]) << 10
@@ -41,26 +45,26 @@ def default_memory_bytes(workers, root=Path("/")):
     return int(SHARE * most / workers)
 
 
-def limit_memory(memory_bytes):
+def limit_memory(memory_bytes: int) -> None:
     """Let this process, and each that it starts, have so much memory; more is a MemoryError."""
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     if hard == resource.RLIM_INFINITY or memory_bytes < hard:
         resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, hard))
 
 
-def raise_limit():
+def raise_limit() -> None:
     """Let this process have a little more than its limit of memory, to say that it is reached."""
     limit = resource.getrlimit(resource.RLIMIT_DATA)[0]
     if limit != resource.RLIM_INFINITY:
         limit_memory(limit + _RESERVE_BYTES)
 
 
-def own_memory_bytes():
+def own_memory_bytes() -> int:
     """The memory of this process that counts for its limit [bytes]."""
     return int(Path("/proc/self/status").read_text(encoding="ascii").split("VmData:")[1].split()[0]) << 10
 
 
-def be_kept(parent, memory_bytes, close):
+def be_kept(parent: int, memory_bytes: int, close: Callable[[], None]) -> None:
     """Go on as the worker: a new child of this process, which becomes its keeper and does not return.
 
     parent: process id of the batch; memory_bytes: None, no limit; close: called in the keeper, to close what the worker
@@ -85,11 +89,11 @@ def be_kept(parent, memory_bytes, close):
         limit_memory(memory_bytes)
 
 
-def _prctl(option, value):
+def _prctl(option: int, value: Any) -> None:
     ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def _keep(worker, parent, memory_bytes):
+def _keep(worker: int, parent: int, memory_bytes: int) -> None:
     """Wait for the worker's end, end what it leaves, and end as it has ended."""
     code = 1
     try:
@@ -101,7 +105,7 @@ def _keep(worker, parent, memory_bytes):
         os._exit(code)
 
 
-def _wait(worker, parent, memory_bytes):
+def _wait(worker: int, parent: int, memory_bytes: int) -> int:
     """The worker's exit code, or minus a signal's number; TOO_MUCH_MEMORY where it has more than its limit."""
     deadline = float("inf")
     while True:
@@ -119,7 +123,7 @@ def _wait(worker, parent, memory_bytes):
             return -signal.SIGKILL
 
 
-def _end_family():
+def _end_family() -> None:
     """Kill all descendants. Those that are started meanwhile are found: orphans become children of this process."""
     own = os.getpid()
     while family := children_of([own]) - {own}:
@@ -129,7 +133,7 @@ def _end_family():
         _reap()
 
 
-def _end_by(number):
+def _end_by(number: int) -> None:
     """End this process by a signal, without a core file."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if number != signal.SIGKILL:
@@ -138,7 +142,7 @@ def _end_by(number):
     os.kill(os.getpid(), number)
 
 
-def _reap():
+def _reap() -> None:
     """Wait for children that have ended, for one at least."""
     try:
         os.waitpid(-1, 0)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Libraries that few batches need are installed from PyPI when one needs them for the first time."""
+from __future__ import annotations
+
 import importlib.util
 import os
 import shutil
@@ -11,7 +13,7 @@ from pathlib import Path
 from .job import JobError
 
 
-def ensure_installed(root: Path, module: str, requirements: Path):
+def ensure_installed(root: Path, module: str, requirements: Path) -> None:
     """Make ``module`` importable here and in processes started from here. Raises JobError.
 
     On first use everything of the file ``requirements`` is installed into a folder below root/.baxter: a separate one,
@@ -27,13 +29,13 @@ def ensure_installed(root: Path, module: str, requirements: Path):
     importlib.invalidate_caches()
 
 
-def _is_complete(folder, requirements):
+def _is_complete(folder: Path, requirements: Path) -> bool:
     """Whether all of the requirements, as they are now, are installed there."""
     kept = folder / requirements.name
     return kept.is_file() and kept.read_bytes() == requirements.read_bytes()
 
 
-def _install(folder, module, requirements):
+def _install(folder: Path, module: str, requirements: Path) -> None:
     print("batch: %s is installed from PyPI into %s" % (module, folder), file=sys.stderr)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results as Parquet (https://parquet.apache.org), which pandas, R and others read. pyarrow is installed on first use.
 """
+from __future__ import annotations
+
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from . import on_first_use
+
+if TYPE_CHECKING:
+    from lab_batch.job import Outcome
 
 REQUIREMENTS = Path(__file__).with_name("requirements-pyarrow.txt")
 _FIXED = ("seed", "seconds", "error")
 
 
-def columns_of(outcomes):
+def columns_of(outcomes: list[Outcome]) -> dict[str, list[Any]]:
     """{name: [a value or None for each Outcome]}: seed, seconds, error (None where it ended well), then the results.
 
     A result that is named as one of these three gets the name result.NAME.
@@ -22,19 +28,19 @@ def columns_of(outcomes):
     return columns
 
 
-def ensure_installed(root: Path):
+def ensure_installed(root: Path) -> None:
     """Make pyarrow importable; install it below root/.baxter on first use. Raises JobError."""
     on_first_use.ensure_installed(root, "pyarrow", REQUIREMENTS)
 
 
-def write(path, header, outcomes):
+def write(path: Path, header: dict[str, Any], outcomes: list[Outcome]) -> None:
     """Write outcomes in one file; header: what JSON can hold, kept as the file's metadata ``batch``.
 
     Dictionaries, and values of a result that have different types, become JSON texts. :func:`ensure_installed` has been
     called before. Raises OSError.
     """
-    import pyarrow
-    from pyarrow import parquet
+    import pyarrow  # pyright: ignore[reportMissingImports]
+    from pyarrow import parquet  # pyright: ignore[reportMissingImports]
 
     arrays = {}
     for name, values in columns_of(outcomes).items():

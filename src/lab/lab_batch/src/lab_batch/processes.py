@@ -1,17 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The engine that is always there: worker processes on this machine."""
+from __future__ import annotations
+
 import multiprocessing
 import os
 import signal
 import sys
 import time
 from collections import deque
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
+from typing import TYPE_CHECKING, Any
 
 from . import keeping
 from .job import JobError, Outcome, gigabytes, load, run_episode
+
+if TYPE_CHECKING:
+    from lab_batch.job import Spec
 
 # A worker has its next seed while the answer to the last one is on its way.
 SEEDS_AHEAD = 2
@@ -36,7 +43,7 @@ class Limits:
     memory_bytes: int | None = None
 
 
-def map_seeds(spec, seeds, limits):
+def map_seeds(spec: Spec, seeds: range | list[int], limits: Limits) -> Iterator[Outcome]:
     """Yield an Outcome for each seed, in the order in which they end. spec: Spec, seeds: iterable of int.
 
     Raises JobError where the job cannot start. When the caller closes the generator, the workers are stopped.
@@ -49,26 +56,26 @@ def map_seeds(spec, seeds, limits):
 
 
 class _Pool:
-    def __init__(self, spec, seeds, limits):
+    def __init__(self, spec: Spec, seeds: range | list[int], limits: Limits) -> None:
         self._spec, self._limits = spec, limits
         self._seeds, self._again = iter(seeds), deque()
         self._tries = {}  # of seeds whose worker died
         self._workers = []
         self._lost_at_start = 0  # workers in a row that died before the job had started
 
-    def outcomes(self):
+    def outcomes(self) -> Iterator[Outcome]:
         while True:
             self._fill()
             if not self._workers:
                 return
             yield from self._wait()
 
-    def _next_seed(self):
+    def _next_seed(self) -> int | None:
         if self._again:
             return self._again.popleft()
         return next(self._seeds, None)
 
-    def _fill(self):
+    def _fill(self) -> None:
         """Give every worker its seeds; start workers while there are seeds for them, and end those without any."""
         for worker in list(self._workers):
             while len(worker.seeds) < SEEDS_AHEAD and not worker.is_worn(self._limits):
@@ -87,7 +94,7 @@ class _Pool:
             self._workers.append(worker)
             worker.give(seed)
 
-    def _wait(self):
+    def _wait(self) -> Iterator[Outcome]:
         deadline = min((worker.deadline(self._limits) for worker in self._workers), default=None)
         timeout = None if deadline is None or deadline == float("inf") else max(0.0, deadline - time.monotonic())
         ready = connection.wait([worker.link for worker in self._workers], timeout)
@@ -97,10 +104,10 @@ class _Pool:
             elif worker.deadline(self._limits) <= time.monotonic():
                 self._lose(worker)
                 text = "took more than the limit of %g s" % self._limits.episode_s
-                yield Outcome(worker.seeds.popleft(), {}, text, self._limits.episode_s)
+                yield Outcome(worker.seeds.popleft(), {}, text, self._limits.episode_s or 0.0)
                 self._again.extend(worker.seeds)
 
-    def _hear(self, worker):
+    def _hear(self, worker: _Worker) -> Iterator[Outcome]:
         try:
             message = worker.link.recv()
         except (EOFError, OSError):
@@ -122,7 +129,7 @@ class _Pool:
                 return
         worker.began = time.monotonic()
 
-    def _died(self, worker):
+    def _died(self, worker: _Worker) -> Iterator[Outcome]:
         """The episode that ran gets another try; those that had not begun count as untouched."""
         has_excess = worker.process.exitcode == keeping.TOO_MUCH_MEMORY
         if worker.began is None:
@@ -145,14 +152,15 @@ class _Pool:
         else:
             yield Outcome(seed, {}, "its worker died twice: %s" % _cause(worker.process.exitcode), 0.0)
 
-    def _memory_text(self):
-        return "with its processes it took more than the limit of %s of memory" % gigabytes(self._limits.memory_bytes)
+    def _memory_text(self) -> str:
+        limit = gigabytes(self._limits.memory_bytes or 0)
+        return "with its processes it took more than the limit of %s of memory" % limit
 
-    def _lose(self, worker):
+    def _lose(self, worker: _Worker) -> None:
         self._workers.remove(worker)
         worker.kill()
 
-    def stop(self):
+    def stop(self) -> None:
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers:
@@ -160,7 +168,7 @@ class _Pool:
         self._workers.clear()
 
 
-def _cause(code):
+def _cause(code: int | None) -> str:
     if code is not None and code < 0:
         # The kernel sends it where memory has run out.
         more = "; from outside, or because memory had run out" if code == -signal.SIGKILL else ""
@@ -169,7 +177,7 @@ def _cause(code):
 
 
 class _Worker:
-    def __init__(self, spec, limits):
+    def __init__(self, spec: Spec, limits: Limits) -> None:
         context = multiprocessing.get_context("spawn")
         self.link, theirs = context.Pipe()
         given = (spec, theirs, os.getpid(), limits.memory_bytes)
@@ -178,25 +186,25 @@ class _Worker:
             self.process.start()
         theirs.close()
         self.seeds, self.count = deque(), 0
-        self.began = None  # when the episode that now runs began; None: the job has not started
+        self.began: float | None = None  # when the episode that now runs began; None: the job has not started
 
-    def give(self, seed):
+    def give(self, seed: int) -> None:
         self.seeds.append(seed)
         try:
             self.link.send(seed)
         except OSError:
             pass  # it has died: its end of the link says so to the next wait
 
-    def is_worn(self, limits):
+    def is_worn(self, limits: Limits) -> bool:
         return limits.episodes is not None and self.count + len(self.seeds) >= limits.episodes
 
-    def deadline(self, limits):
+    def deadline(self, limits: Limits) -> float:
         """When the episode that runs must have ended, on the monotonic clock [s]."""
         if self.began is None or limits.episode_s is None:
             return float("inf")
         return self.began + limits.episode_s
 
-    def end(self):
+    def end(self) -> None:
         """Let it release what it holds, and wait for its end."""
         try:
             self.link.send(None)
@@ -205,7 +213,7 @@ class _Worker:
         self.process.join(STOP_TIMEOUT_S)
         self.kill()
 
-    def kill(self):
+    def kill(self) -> None:
         """End it; its keeper ends all processes that it has started."""
         if self.process.pid is not None:
             # A worker that has died is still followed by its keeper, for a moment.
@@ -219,7 +227,7 @@ class _Worker:
 
 
 @contextmanager
-def _environment(values):
+def _environment(values: Mapping[Any, str]) -> Iterator[None]:
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
@@ -232,7 +240,7 @@ def _environment(values):
                 os.environ[name] = value
 
 
-def _work(spec, link, parent, memory_bytes):
+def _work(spec: Spec, link: connection.Connection, parent: int, memory_bytes: int) -> None:
     """A worker's program: episodes until a None or the end of the link."""
     os.setpgid(0, 0)  # Ctrl-C goes to the parent alone
     keeping.be_kept(parent, memory_bytes, link.close)
@@ -245,7 +253,7 @@ def _work(spec, link, parent, memory_bytes):
     sys.exit(1)
 
 
-def _episodes(spec, link):
+def _episodes(spec: Spec, link: connection.Connection) -> None:
     try:
         job = load(spec)
     except JobError as error:
@@ -264,5 +272,5 @@ class _Stopped(BaseException):
     """The pool ends this worker. Not SystemExit, which an episode may raise for itself."""
 
 
-def _stop(*_):
+def _stop(*_: object) -> None:
     raise _Stopped

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The engine for several machines: Ray (https://ray.io), which is installed on first use."""
+from __future__ import annotations
+
 import contextlib
 import os
 import time
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import psutil
 
@@ -13,6 +18,10 @@ from processes.work_folder import claimed_folder
 from . import keeping, on_first_use
 from .job import JobError, Outcome, load, run_episode
 from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
+
+if TYPE_CHECKING:
+    from lab_batch.job import Spec
+    from lab_batch.processes import Limits
 
 REQUIREMENTS = Path(__file__).with_name("requirements-ray.txt")
 # Ray's own limits for the start of its processes (15 to 30 s) are too short for a busy machine. Usage is not reported,
@@ -27,12 +36,12 @@ STARTS = 3
 END_S = 10.0
 
 
-def ensure_installed(root: Path):
+def ensure_installed(root: Path) -> None:
     """Make Ray importable here and in its workers; install it below root/.baxter on first use. Raises JobError."""
     on_first_use.ensure_installed(root, "ray", REQUIREMENTS)
 
 
-def has_token():
+def has_token() -> bool:
     """Whether this user has a token of Ray's, where Ray looks for it."""
     named = os.environ.get("RAY_AUTH_TOKEN_PATH")
     file = Path(named) if named else Path.home() / ".ray" / "auth_token"
@@ -42,20 +51,20 @@ def has_token():
 class _Episodes:
     """A Ray actor: one worker with its job."""
 
-    def __init__(self, spec, memory_bytes):
+    def __init__(self, spec: Spec, memory_bytes: int) -> None:
         if memory_bytes is not None:
             # Ray's own threads have some already.
             keeping.limit_memory(keeping.own_memory_bytes() + memory_bytes)
         self._job = load(spec)
 
-    def started(self):
+    def started(self) -> None:
         """Return when the job has started."""
 
-    def run(self, seed):
+    def run(self, seed: int) -> Outcome:
         return run_episode(self._job, seed)
 
 
-def map_seeds(spec, seeds, limits, address=None):
+def map_seeds(spec: Spec, seeds: range, limits: Limits, address: str | None = None) -> Iterator[Outcome]:
     """Yield an Outcome for each seed, as processes.map_seeds.
 
     address: HOST:PORT of a cluster's head; None: a Ray of its own on this machine. limits.workers is the number of
@@ -70,16 +79,16 @@ def map_seeds(spec, seeds, limits, address=None):
     if address and has_token():
         # Ray sends its token only where this says so; to a head that asks for it, it would try without it for ever.
         os.environ.setdefault("RAY_AUTH_MODE", "token")
-    import ray
+    import ray  # pyright: ignore[reportMissingImports]
 
     with contextlib.ExitStack() as ending:
         _start(ray, limits, address, ending)
         yield from _Actors(ray, spec, seeds, limits).outcomes()
 
 
-def _start(ray, limits, address, ending):
+def _start(ray: ModuleType, limits: Limits, address: str | None, ending: contextlib.ExitStack) -> None:
     """Connect to a cluster, or start a Ray here; `ending` (contextlib.ExitStack) ends it. Raises JobError."""
-    options = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
+    options: dict[str, Any] = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
     tries, folder = STARTS, None
     if address:
         options["address"], tries = address, 1
@@ -102,19 +111,19 @@ def _start(ray, limits, address, ending):
                 raise JobError("no Ray at %s: %s" % (address or "this machine", error)) from error
 
 
-def end_processes(folder):
+def end_processes(folder: str) -> None:
     """End the processes below this one that have ``folder`` in their command: ray.shutdown leaves those of a Ray whose
     start failed."""
     _end_users(folder, psutil.Process().children(recursive=True))
 
 
-def _end_left(folder):
+def _end_left(folder: str) -> None:
     """End the processes of this user that have ``folder`` in their command: those of a batch that was killed."""
     with contextlib.suppress(psutil.Error):
         _end_users(folder, [one for one in psutil.process_iter() if one.pid != os.getpid()])
 
 
-def _end_users(folder, processes):
+def _end_users(folder: str, processes: list[psutil.Process]) -> None:
     found = []
     for process in processes:
         with contextlib.suppress(psutil.Error):
@@ -127,10 +136,10 @@ def _end_users(folder, processes):
 class _Actor:
     """handle: Ray's; began: when the episode that it runs began, None while its job starts."""
 
-    def __init__(self, handle):
+    def __init__(self, handle: Any) -> None:
         self.handle, self.began = handle, None
 
-    def deadline(self, limits):
+    def deadline(self, limits: Limits) -> float:
         """When the episode that runs must have ended, on the monotonic clock [s]."""
         if self.began is None or limits.episode_s is None:
             return float("inf")
@@ -141,7 +150,7 @@ class _Actors:
     """Actors, each with up to SEEDS_AHEAD seeds. Where one dies, it is not known which of its seeds has killed it: the
     outcome of a seed that is done may be lost as well. From then on its seeds run one by one."""
 
-    def __init__(self, ray, spec, seeds, limits):
+    def __init__(self, ray: ModuleType, spec: Spec, seeds: range, limits: Limits) -> None:
         self._ray, self._spec, self._limits = ray, spec, limits
         self._seeds, self._again, self._deaths = iter(seeds), [], {}
         self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)
@@ -150,7 +159,7 @@ class _Actors:
         self._starting = {}  # {reference: actor}
         self._running = {}  # {reference: (actor, seed)}
 
-    def outcomes(self):
+    def outcomes(self) -> Iterator[Outcome]:
         for _ in range(self._limits.workers):
             self._start()
         while self._running:
@@ -162,7 +171,7 @@ class _Actors:
             else:
                 yield from self._stop_late()
 
-    def _start(self):
+    def _start(self) -> None:
         """A new actor, where a seed is left for it."""
         following = self._following([])
         if following:
@@ -170,7 +179,7 @@ class _Actors:
             self._starting[actor.handle.started.remote()] = actor
             self._give(actor, following)
 
-    def _following(self, waiting):
+    def _following(self, waiting: list[int]) -> list[int]:
         """The seeds for an actor that has still those ``waiting``."""
         if self._again:
             return [] if waiting else [self._again.pop()]
@@ -178,15 +187,15 @@ class _Actors:
             return []
         return list(islice(self._seeds, SEEDS_AHEAD - len(waiting)))
 
-    def _give(self, actor, seeds):
+    def _give(self, actor: _Actor, seeds: list[int]) -> None:
         for seed in seeds:
             self._running[actor.handle.run.remote(seed)] = (actor, seed)
 
-    def _of(self, actor):
+    def _of(self, actor: _Actor) -> dict[tuple[int, int], int]:
         """{reference: seed} of what an actor has still to do, the one that it runs first."""
         return {reference: seed for reference, (one, seed) in self._running.items() if one is actor}
 
-    def _take(self, reference):
+    def _take(self, reference: tuple[Any, int]) -> Iterator[Outcome]:
         actor = self._starting[reference] if reference in self._starting else self._running[reference][0]
         try:
             outcome = self._result(reference)
@@ -208,20 +217,20 @@ class _Actors:
             return
         self._give(actor, self._following(list(self._of(actor).values())))
 
-    def _result(self, reference):
+    def _result(self, reference: tuple[Any, int]) -> Outcome:
         try:
             return self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
             raise JobError(str(error.cause)) from error
 
-    def _forget(self, actor):
+    def _forget(self, actor: _Actor) -> dict[tuple[int, int], int]:
         """Take away what an actor has still to do; returns {reference: seed}."""
         seeds = self._of(actor)
         self._running = {reference: one for reference, one in self._running.items() if reference not in seeds}
         self._starting = {reference: one for reference, one in self._starting.items() if one is not actor}
         return seeds
 
-    def _died(self, actor, error):
+    def _died(self, actor: _Actor, error: Exception) -> Iterator[Outcome]:
         if "JobError" in str(error):
             raise JobError(str(error).strip().splitlines()[-1])
         for reference, seed in self._forget(actor).items():
@@ -236,7 +245,7 @@ class _Actors:
                 yield Outcome(seed, {}, "its worker died twice: %s" % str(error).strip().splitlines()[0], 0.0)
         self._start()
 
-    def _stop_late(self):
+    def _stop_late(self) -> Iterator[Outcome]:
         """Stop the actors whose episode takes too long."""
         now = time.monotonic()
         late = {id(actor): actor for actor, _ in self._running.values() if actor.deadline(self._limits) <= now}
@@ -245,5 +254,5 @@ class _Actors:
             self._again += waiting
             self._ray.kill(actor.handle)
             yield Outcome(seed, {}, "took more than the limit of %g s" % self._limits.episode_s,
-                          self._limits.episode_s)
+                          self._limits.episode_s or 0.0)
             self._start()

@@ -7,6 +7,8 @@
 
 All machines need this workspace in the same place, the same Python and the same token (docs/security.md).
 """
+from __future__ import annotations
+
 import argparse
 import os
 import subprocess
@@ -26,7 +28,7 @@ FIXED = {"--node-manager-port": 6380, "--object-manager-port": 6381, "--runtime-
          "--min-worker-port": 10002, "--max-worker-port": 10999}
 
 
-def parse(argv):
+def parse(argv: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="./baxter.sh batch-node", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     role = parser.add_mutually_exclusive_group(required=True)
@@ -40,7 +42,7 @@ def parse(argv):
     return parser.parse_args(argv)
 
 
-def command_of(options):
+def command_of(options: argparse.Namespace) -> list[str]:
     """The words of the command `ray start` for the options of :func:`parse`."""
     role = (["--head", "--port", str(options.port), "--include-dashboard", "false"] if options.head
             else ["--address", options.address])
@@ -49,7 +51,7 @@ def command_of(options):
             "--node-ip-address", options.listen, "--num-cpus", str(options.cpus), *fixed]
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     options = parse(argv)
     try:
         ray_engine.ensure_installed(Path(os.environ.get("LAB_ROOT", Path.cwd())))

@@ -4,6 +4,8 @@
 A file that exists is continued: seeds with a result are not run again, and a last line that a crash cut off is dropped.
 Where versions have changed meanwhile, another header stands before the lines of the new ones.
 """
+from __future__ import annotations
+
 import fcntl
 import json
 import math
@@ -13,6 +15,7 @@ import subprocess
 import sys
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from .job import Outcome, Spec
 
@@ -23,7 +26,7 @@ class RecordsError(Exception):
     """A file is no file of results, or of another job."""
 
 
-def versions(root):
+def versions(root: Path) -> dict[str, str]:
     """{name: version} of what results may depend on. root: a folder of the workspace, for its commit."""
     found = {"python": platform.python_version(), "machine": platform.machine()}
     for name in PACKAGES:
@@ -37,7 +40,7 @@ def versions(root):
     return found
 
 
-def line_of(outcome):
+def line_of(outcome: Outcome) -> str:
     row = {"seed": outcome.seed, "seconds": round(outcome.seconds, 6)}
     row.update({"error": outcome.error} if outcome.error else {"result": outcome.result})
     return json.dumps(row, allow_nan=False)
@@ -50,7 +53,7 @@ class Records:
     results are of others.
     """
 
-    def __init__(self, path: Path, spec: Spec, found_versions: dict):
+    def __init__(self, path: Path, spec: Spec, found_versions: dict) -> None:
         self._path = path
         self.outcomes = {}  # {seed: the newest Outcome}
         self.header = header = {"job": spec.name, "parameters": spec.parameters, "versions": found_versions}
@@ -64,7 +67,7 @@ class Records:
             self._stream.close()
             raise
 
-    def _take_over(self, header):
+    def _take_over(self, header: dict[str, Any]) -> None:
         # Of devices, only /dev/null is of use; others may be read without end.
         there = []
         if self._path.is_file():
@@ -79,7 +82,7 @@ class Records:
         if earlier := [one for one in there if one != header["versions"]]:
             self.header = {**header, "earlier versions": earlier}
 
-    def _read(self, header):
+    def _read(self, header: dict[str, Any]) -> list[dict[str, str]]:
         """Take over what the file has; return the versions of its headers."""
         data = self._path.read_bytes()
         whole = data.rfind(b"\n") + 1
@@ -105,25 +108,25 @@ class Records:
         self.outcomes = {one.seed: one for one in outcomes}
         return versions_there
 
-    def _truncate(self, size):
+    def _truncate(self, size: int) -> None:
         if self._path.stat().st_size != size:
             os.truncate(self._path, size)
 
-    def _write(self, line):
+    def _write(self, line: str) -> None:
         self._stream.write(line + "\n")
         self._stream.flush()
 
-    def add(self, outcome):
+    def add(self, outcome: Outcome) -> Outcome:
         """Write one outcome, whose result is as job.plain() returns it. Returns the outcome."""
         self._write(line_of(outcome))
         self.outcomes[outcome.seed] = outcome
         return outcome
 
-    def close(self):
+    def close(self) -> None:
         self._stream.close()
 
 
-def summary(outcomes):
+def summary(outcomes: list[Outcome]) -> list[str]:
     """Lines about the results: the share of each truth value, mean, least and greatest of each number."""
     done = [one.result for one in outcomes if one.is_done]
     lines = []

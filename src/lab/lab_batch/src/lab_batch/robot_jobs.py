@@ -1,18 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Jobs about robots, on cores that need no ROS. What a job needs is imported when it starts."""
+from __future__ import annotations
+
 import math
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .job import Job
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.random import Generator
 
-def _package_file(package, file):
+    from arm_kinematics.chain import Chain
+    from motion_planning.model.group import Group
+    from motion_planning.scene.scene import Scene
+
+
+def _package_file(package: str, file: str) -> Path:
     import rospkg
     return Path(rospkg.RosPack().get_path(package)) / file
 
 
-def _expanded(package, file):
+def _expanded(package: str, file: str) -> str:
     from urdf_model import description_text
     return description_text(_package_file(package, file))
 
@@ -23,21 +34,22 @@ class ReachPart(Job):
     The seed is the number of the part. `reach` with the same options and `--out` makes the map of the parts.
     """
 
-    def __init__(self, out="", side="left", cell=0.08, orientations=50, tool=None, starts=40, self_collision=True):
+    def __init__(self, out: str = "", side: str = "left", cell: float = 0.08, orientations: int = 50,
+                 tool: str | None = None, starts: int = 40, self_collision: bool = True) -> None:
         self._folder = out
         words = ["--side", str(side), "--cell", str(cell), "--orientations", str(orientations), "--starts", str(starts)]
         if tool is not None:
             words += ["--tool", *map(str, tool)]
         self._words = [*words, *["--self-collision"] * bool(self_collision), "--out", str(out)]
 
-    def start(self):
+    def start(self) -> None:
         from baxter_sim_kinematics import reach_commands
 
         if not self._folder:
             raise ValueError("set out, the folder of the map: --set out=FOLDER")
         self._parts = reach_commands.map_of(self._words)
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, float]:
         firsts = list(self._parts.settings.parts())
         if seed >= len(firsts):
             raise ValueError("the map has %d parts, 0 to %d" % (len(firsts), len(firsts) - 1))
@@ -49,10 +61,10 @@ class ReachPart(Job):
 class Planning(Job):
     """Plans a path of one of Baxter's arms between two random postures among random boxes on a table."""
 
-    def __init__(self, side="left", boxes=7, time_limit_s=10.0):
+    def __init__(self, side: str = "left", boxes: int = 7, time_limit_s: float = 10.0) -> None:
         self._group, self._boxes, self._limit_s = side + "_arm", boxes, time_limit_s
 
-    def start(self):
+    def start(self) -> None:
         from model_files.resources import ResourceFinder
         from motion_planning.exact import ExactChecker
         from motion_planning.model import MeshReader, PlanningModel
@@ -65,7 +77,7 @@ class Planning(Job):
         self._exact = ExactChecker(self._model, MeshReader(ResourceFinder()))
         prepare(self._exact)
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         import numpy as np
 
         from motion_planning.planners.errors import NoPath
@@ -83,7 +95,7 @@ class Planning(Job):
         return {"planned": True, "length_rad": float(steps.sum()), "corners": len(path.points),
                 "straight_rad": float(np.linalg.norm(goal - start))}
 
-    def _scene(self, rng):
+    def _scene(self, rng: Generator) -> Scene:
         """A table before the robot, with boxes on it."""
         import numpy as np
 
@@ -100,10 +112,11 @@ class Planning(Job):
         return Scene(self._model).with_objects(
             [WorldObject(name, pose, ((shape, np.eye(4)),)) for name, shape, pose in things])
 
-    def _free_posture(self, scene, group, rng):
+    def _free_posture(self, scene: Scene, group: Group, rng: Generator) -> np.ndarray:
+        state: Any = scene.state
         for _ in range(10_000):
             q = rng.uniform(*self._model.bounds[group.indices].T)
-            if self._exact.free(scene, scene.state.with_q(q, group.indices), group.name):
+            if self._exact.free(scene, state.with_q(q, group.indices), group.name):
                 return q
         raise ValueError("no random posture is free of collisions")
 
@@ -114,10 +127,12 @@ class PidTuning(Job):
     Gains are drawn on a logarithmic scale between the bounds. The other joints are held in place.
     """
 
-    def __init__(self, joint="joint_2", step_rad=0.3, seconds=2.0, p=(10.0, 3000.0), i=(0.1, 300.0), d=(0.1, 100.0)):
+    def __init__(self, joint: str = "joint_2", step_rad: float = 0.3, seconds: float = 2.0,
+                 p: tuple[float, float] = (10.0, 3000.0), i: tuple[float, float] = (0.1, 300.0),
+                 d: tuple[float, float] = (0.1, 100.0)) -> None:
         self._joint, self._step, self._seconds, self._bounds = joint, step_rad, seconds, {"p": p, "i": i, "d": d}
 
-    def start(self):
+    def start(self) -> None:
         from bullet_sim import World
         from model_files.resources import ResourceFinder
         from urdf_model import parse_urdf
@@ -132,7 +147,7 @@ class PidTuning(Job):
         if self._joint not in self._arm.joint_names:
             raise ValueError("joint is %r; the robot has %s" % (self._joint, ", ".join(self._arm.joint_names)))
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         import numpy as np
 
         from controller_manager.pid import Gains, Pid
@@ -156,11 +171,11 @@ class PidTuning(Job):
             errors.append(float(error[0]))
         return {**gains, **_step_figures(np.array(errors), self._step, dt)}
 
-    def end(self):
+    def end(self) -> None:
         self._world.close()
 
 
-def _step_figures(errors, step, dt):
+def _step_figures(errors: np.ndarray, step: float, dt: float) -> dict[str, Any]:
     """Figures of a step's answer, from its errors (n,) [rad] every ``dt`` [s]: overshoot, settling time to 5 % (the
     whole time where it does not settle), integral of time times error, error at the end."""
     import numpy as np
@@ -179,10 +194,10 @@ class Serials(Job):
     Over random postures, seen in the robot's base: what a program meets that trusts the drawing.
     """
 
-    def __init__(self, postures=500):
+    def __init__(self, postures: int = 500) -> None:
         self._postures = postures
 
-    def start(self):
+    def start(self) -> None:
         import numpy as np
 
         from baxter_model import SIDES
@@ -196,14 +211,14 @@ class Serials(Job):
                    for side, chain in self._drawing.items()}
 
     @staticmethod
-    def _chain(xml, side):
+    def _chain(xml: str, side: str) -> Chain:
         from arm_kinematics import Chain
         from baxter_model import BASE_FRAME, tip_of
         from urdf_model import parse_urdf
 
         return Chain.from_robot(parse_urdf(xml, source="robot"), BASE_FRAME, tip_of(side))
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, float]:
         import numpy as np
 
         from baxter_sim_hardware import individual

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The jobs that come with the workspace. What a job needs is imported when it starts."""
+from __future__ import annotations
+
 import contextlib
 import json
 import os
@@ -9,11 +11,15 @@ import signal
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from processes.family import with_parent
 from processes.ports import free_port
 
 from .job import Job
+
+if TYPE_CHECKING:
+    from _io import BufferedRandom
 
 TAIL = 400  # characters of a program's output in the error of an episode
 STOP_TIMEOUT_S = 20.0
@@ -25,10 +31,10 @@ _BEFORE = "=\x1b[31m"
 class InverseKinematics(Job):
     """Solves random reachable poses of one of Baxter's arms, as the IK service does."""
 
-    def __init__(self, side="left", poses=200, tolerance=1e-5):
+    def __init__(self, side: str = "left", poses: int = 200, tolerance: float = 1e-5) -> None:
         self._side, self._poses, self._tolerance = side, poses, tolerance
 
-    def start(self):
+    def start(self) -> None:
         import rospkg
 
         from arm_kinematics import Chain, warm_up
@@ -42,7 +48,7 @@ class InverseKinematics(Job):
         self._chain = Chain.from_robot(robot, BASE_FRAME, tip_of(self._side))
         warm_up(self._chain)
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         import numpy as np
 
         from arm_kinematics import Budget, NoSolution, solve
@@ -70,14 +76,14 @@ class Command(Job):
     required node of roslaunch that ends with another exit code than 0 is a failure; roslaunch itself ends with 0.
     """
 
-    def __init__(self, command="", exit_codes=(0,)):
+    def __init__(self, command: str = "", exit_codes: tuple[int] = (0,)) -> None:
         self._words, self._codes = shlex.split(command), set(exit_codes)
 
-    def start(self):
+    def start(self) -> None:
         if not self._words:
             raise ValueError('set command, for instance --set command="roslaunch PACKAGE FILE seed:={seed}"')
 
-    def run(self, seed):
+    def run(self, seed: int) -> dict[str, Any]:
         words = [word.replace("{seed}", str(seed)) for word in self._words]
         with tempfile.TemporaryDirectory() as folder:
             environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
@@ -94,7 +100,7 @@ class Command(Job):
         return {"exit_code": code, **_last_object(text)}
 
 
-def _run(words, environment, output):
+def _run(words: list[str], environment: dict[str, str], output: BufferedRandom) -> int:
     """Exit code of a program; its children end with it."""
     # Ctrl-C for a program whose worker has died.
     child = subprocess.Popen(with_parent(words, "INT"), env=environment, stdin=subprocess.DEVNULL, stdout=output,
@@ -111,7 +117,7 @@ def _run(words, environment, output):
                 child.wait()
 
 
-def _last_object(text):
+def _last_object(text: str) -> dict[str, Any]:
     """The last line that is a JSON object, or {}: behind those of its nodes roslaunch has lines of its own."""
     for line in reversed(text.splitlines()):
         if line.startswith("{"):

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`rosrun lab_display show`: the functions of `show` on the command line."""
+from __future__ import annotations
+
 import argparse
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import rospy
 
@@ -17,12 +20,12 @@ FARTHEST_M = 1e6
 EPILOG = "Exit status: 0 shown, 1 there was nothing to show (standard error says why), 2 wrong options."
 
 
-def parser():
+def parser() -> argparse.ArgumentParser:
     """The command line."""
     top = argparse.ArgumentParser(prog="show", description="Show the robot, its joints and its frames.", epilog=EPILOG)
     commands = top.add_subparsers(dest="what", required=True, metavar="WHAT")
 
-    def add(name, text, picture=True):
+    def add(name: str, text: str, picture: bool = True):
         command = commands.add_parser(name, help=text, description=text)
         if picture:
             command.add_argument("--out", metavar="FILE.png", type=Path,
@@ -51,13 +54,13 @@ def parser():
     return top
 
 
-def _joints(arguments):
+def _joints(arguments: Any) -> Any:
     with show.recording(arguments.topic, arguments.names or None) as log:
         rospy.sleep(arguments.seconds)
     return show.plot(log)
 
 
-def _tree(arguments):
+def _tree(arguments: Any) -> Any:
     tree = (show.tf_tree if arguments.what == "tf" else show.urdf_tree)(below=arguments.below)
     return tree if arguments.text else tree.draw()
 
@@ -81,7 +84,7 @@ def picture_path(name: str, here: Path, workspace: str) -> Path:
     return here / ".baxter" / "pictures" / (name + ".png") if is_top else Path(name + ".png")
 
 
-def main():
+def main() -> int:
     """Show it; returns the exit code."""
     arguments = parser().parse_args(rospy.myargv()[1:])
     try:

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints over time. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from baxter_model import JOINTS, SIDES
 
 from .picture import Picture, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Distinguishable colours on white, also for most colour-blind readers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#333333", "#8c564b")
@@ -14,7 +21,7 @@ class NothingRecorded(ValueError):
     """There are no samples to plot."""
 
 
-def figure_of(samples, unit="rad", title=""):
+def figure_of(samples: dict[str, np.ndarray], unit: Any | str = "rad", title: str = "") -> Figure:
     """Return a matplotlib figure of {label: (2, n) array of times [s] and values}, time counted from the first sample.
 
     Left and right arm have a panel each, other joints a third; ``unit``: of all, or {label: unit}, and each unit has
@@ -47,18 +54,18 @@ def figure_of(samples, unit="rad", title=""):
     return figure
 
 
-def _side(label):
+def _side(label: str) -> str:
     """left, right, or ~ for joints of no arm, which sorts last."""
     side = label.partition("_")[0]
     return side if side in SIDES else "~"
 
 
-def _place(label):
+def _place(label: str) -> int:
     """The number of a joint in its arm, from the shoulder on; of other joints the number of joints."""
     side, _, joint = label.partition("_")
     return JOINTS.index(joint) if side in SIDES and joint in JOINTS else len(JOINTS)
 
 
-def draw(samples, unit="rad", title=""):
+def draw(samples: dict[str, np.ndarray], unit: str | dict[str, str] = "rad", title: str = "") -> Picture:
     """The same as a :class:`Picture`."""
     return Picture.of_figure(figure_of(samples, unit, title))

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Homogeneous matrices, made readable. ROS-free."""
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,15 +13,15 @@ from urdf_model.transforms import rotation_angle
 class FrameMatrix:
     """The pose of frame `source` in frame `target`: the matrix that takes points from `source` to `target`."""
 
-    def __init__(self, target, source, matrix):
+    def __init__(self, target: str, source: str, matrix: np.ndarray) -> None:
         """`matrix`: (4, 4), rotation and translation [m]."""
         self.target, self.source = target, source
         self.matrix = np.array(matrix, dtype=float)
 
-    def __array__(self, dtype=None):
+    def __array__(self, dtype: Any = None) -> np.ndarray:
         return self.matrix.astype(dtype or float)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         rows = ["  [%s ]" % "".join("%9s" % _tidy(value) for value in row) for row in self.matrix]
         x, y, z = self.matrix[:3, 3]
         angle, axis = angle_and_axis(self.matrix[:3, :3])
@@ -28,7 +31,7 @@ class FrameMatrix:
                                             "x %s, y %s, z %s" % (_tidy(x), _tidy(y), _tidy(z)), turn)
 
 
-def angle_and_axis(rotation):
+def angle_and_axis(rotation: np.ndarray) -> tuple[float, np.ndarray | None]:
     """Return (angle [rad, 0 to pi], unit axis (3,)) of a (3, 3) rotation; the axis is None for a zero rotation."""
     angle = rotation_angle(rotation)
     if angle < 1e-6:
@@ -43,7 +46,7 @@ def angle_and_axis(rotation):
     return angle, axis if reference >= 0.0 else -axis
 
 
-def _tidy(value, digits=4):
+def _tidy(value: float, digits: int = 4) -> str:
     """A number without -0.0000."""
     text = "%.*f" % (digits, value)
     return text[1:] if float(text) == 0.0 and text.startswith("-") else text

@@ -1,19 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world from outside: a camera outside of the robot, and frames drawn into its picture. ROS-free."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sensor_renderer.best import best_renderer
 from sensor_renderer.following import WorldFollower
 from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import extent, looking_at, overview
 
+if TYPE_CHECKING:
+    pass
+
 FIELD_OF_VIEW_RAD = 0.75
 # Axes x, y, z as everywhere in ROS [red, green, blue].
 _AXIS_COLOURS = ((214, 39, 40), (34, 150, 60), (31, 90, 210))
 
 
-def draw_frame(pixels, pinhole, view, frame, length, name=""):
+def draw_frame(pixels: np.ndarray, pinhole: Pinhole, view: np.ndarray, frame: np.ndarray, length: float,
+               name: str = "") -> None:
     """Draw the axes of `frame` (4, 4 in the world), `length` [m] long, into `pixels`; `view`: world to optical frame.
 
     A frame behind the camera is left out.
@@ -33,12 +43,12 @@ def draw_frame(pixels, pinhole, view, frame, length, name=""):
 class Outside(WorldFollower):
     """Draws the world of one snapshot folder. Use it in the thread that made it."""
 
-    def __init__(self, folder, warn):
+    def __init__(self, folder: str, warn: Callable[[str], None]) -> None:
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot."""
         super().__init__(folder, warn)
-        self._renderer = None
+        self._renderer: Any = None
 
-    def link_pose(self, link):
+    def link_pose(self, link: str) -> np.ndarray | None:
         """Pose (4, 4) in the world of a link that is its own body; None if there is none."""
         for body in self.mirror.bodies.values():
             try:
@@ -47,7 +57,9 @@ class Outside(WorldFollower):
                 continue
         return None
 
-    def look(self, width=640, height=480, eye=None, target=None, frames=None, length=0.12):
+    def look(self, width: int = 640, height: int = 480, eye: ArrayLike | None = None,
+             target: ArrayLike | None = None, frames: dict[str, np.ndarray] | None = None,
+             length: float = 0.12) -> np.ndarray:
         """The picture, uint8 (height, width, 3), of the world as of the last :meth:`follow`.
 
         `eye`, `target` [m, in the world, where the floor is at 0]: position of the camera and the point it looks at; by

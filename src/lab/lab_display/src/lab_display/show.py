@@ -4,9 +4,13 @@ draw.
 
 Call them in a process that is a ROS node. They raise ShowError if data does not arrive in time.
 """
+from __future__ import annotations
+
 import contextlib
 import threading
 import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import rosgraph
@@ -18,7 +22,7 @@ from sensor_msgs.msg import Image, JointState
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
 from live_plot.recording import Recording
-from urdf_model import parse_urdf
+from urdf_model import Robot, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
 from world_picture.snapshot import SnapshotError
 
@@ -44,7 +48,8 @@ class ShowError(Exception):
     """There is nothing to show; the text gives the reason."""
 
 
-def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):
+def picture(eye: Sequence[float] | None = None, target: Sequence[float] | None = None, frames: Sequence[str] = (),
+            size: tuple[int, int] = (640, 480), length: float = 0.12) -> Picture:
     """The simulated world from outside, as a Picture; with the axes of tf frames in it (x red, y green, z blue).
 
     `eye`, `target`: position of the camera and the point it looks at [m, physics' world: the floor is at z = 0,
@@ -64,7 +69,7 @@ def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):
     return Picture.of_array(view.look(*size, eye, target, placed, length))
 
 
-def camera(name):
+def camera(name: str) -> Picture:
     """The newest image of a camera, as a Picture. `name`: a topic, or for /cameras/NAME/image: NAME."""
     topic = name if name.startswith("/") else "/cameras/%s/image" % name
     message = _message(topic, Image, "is the camera open? rosrun baxter_tools camera_control.py -l",
@@ -75,13 +80,13 @@ def camera(name):
 class JointLog:
     """Positions of joints while a `with` block runs; `joints`: which ones, None for all."""
 
-    def __init__(self, topic, joints):
+    def __init__(self, topic: str, joints: Sequence[str] | None) -> None:
         self._topic, self._joints = topic, joints
         self._recording = Recording()
-        self._subscriber = None
+        self._subscriber: rospy.Subscriber | None = None
         self._arrived = threading.Event()
 
-    def __enter__(self):
+    def __enter__(self) -> JointLog:
         """Returns after the first message, so that no later one is missed."""
         self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
         try:
@@ -91,10 +96,11 @@ class JointLog:
             raise
         return self
 
-    def __exit__(self, *_):
-        self._subscriber.unregister()
+    def __exit__(self, *_: object) -> None:
+        if self._subscriber is not None:
+            self._subscriber.unregister()
 
-    def _take(self, message):
+    def _take(self, message: JointState) -> None:
         for name, position in zip(message.name, message.position, strict=True):
             if self._joints is None or name in self._joints:
                 self._recording.add(name)
@@ -102,17 +108,17 @@ class JointLog:
         self._arrived.set()
 
     @property
-    def samples(self):
+    def samples(self) -> dict[str, np.ndarray]:
         """{joint: (2, n) array of times [s] and positions}."""
         return self._recording.samples()[0]
 
 
-def recording(topic=JOINT_STATES, joints=None):
+def recording(topic: str = JOINT_STATES, joints: Sequence[str] | None = None) -> JointLog:
     """`with show.recording() as log: ...` records joint states; then `show.plot(log)`."""
     return JointLog(topic, joints)
 
 
-def plot(log, title="", unit=None):
+def plot(log: JointLog, title: str = "", unit: str | dict[str, str] | None = None) -> Picture:
     """Joints over time, as a Picture. Without a unit, joints that slide are in metres and the others in radians."""
     samples = log.samples
     if unit is None:
@@ -125,7 +131,7 @@ def plot(log, title="", unit=None):
     return joint_plot.draw(samples, unit, title)
 
 
-def robot(parameter="robot_description"):
+def robot(parameter: str = "robot_description") -> Robot:
     """The `urdf_model.Robot` on the parameter server."""
     try:
         # rospy.get_param uses a cache, which would be stale after a new simulator.
@@ -134,18 +140,18 @@ def robot(parameter="robot_description"):
         raise ShowError("the parameter %s is not set: is a robot running?" % parameter) from error
 
 
-def urdf_tree(parameter="robot_description", below=None):
+def urdf_tree(parameter: str = "robot_description", below: str | None = None) -> Tree:
     """Links and joints of the robot's description, as a Tree: print it, or draw() it. `below`: from that link down."""
     tree = Tree.of_urdf(robot(parameter))
     return tree if below is None else tree.below(below)
 
 
-def tf_tree(below=None):
+def tf_tree(below: str | None = None) -> Tree:
     """Frames that tf knows, as a Tree. The robot's description tells which joints move."""
     description = robot()
     moving = {joint.child: joint.name for joint in description.joints.values() if joint.type != "fixed"}
     with _transforms() as buffer:
-        def is_complete():
+        def is_complete() -> bool:
             return set(description.links) <= {*_frames(buffer), *(parent for parent in _frames(buffer).values())}
 
         _wait("tf to name every link of the robot", is_complete, "robot_state_publisher has not sent all of them")
@@ -154,14 +160,14 @@ def tf_tree(below=None):
     return tree if below is None else tree.below(below)
 
 
-def matrix(target, source):
+def matrix(target: str, source: str) -> FrameMatrix:
     """The pose of frame `source` in frame `target`, as a FrameMatrix: print it, or use it as a (4, 4) array."""
     with _transforms() as buffer:
         return FrameMatrix(target, source, _look_up(buffer, target, source))
 
 
 @contextlib.contextmanager
-def _transforms():
+def _transforms() -> Iterator[tf2_ros.Buffer]:
     buffer = tf2_ros.Buffer(debug=False)
     listener = tf2_ros.TransformListener(buffer)
     try:
@@ -170,17 +176,17 @@ def _transforms():
         listener.unregister()
 
 
-def _frames(buffer):
+def _frames(buffer: tf2_ros.Buffer) -> dict[str, str]:
     """{frame: its parent}; lines are `Frame CHILD exists with parent PARENT.`"""
     words = [line.rstrip(".").split() for line in buffer.all_frames_as_string().splitlines()]
     return {line[1]: line[5] for line in words if len(line) == 6 and line[5] != "NO_PARENT"}
 
 
-def _look_up(buffer, target, source):
-    def known():
+def _look_up(buffer: tf2_ros.Buffer, target: str, source: str) -> np.ndarray:
+    def known() -> bool:
         return bool(buffer.can_transform_core(target, source, rospy.Time())[0])
 
-    def why():
+    def why() -> str:
         names = sorted({*_frames(buffer), *_frames(buffer).values()})
         missing = [name for name in (target, source) if name not in names]
         return "tf knows no frame %s; it knows %s" % (" and no ".join(missing), ", ".join(names) or "none") if missing \
@@ -192,9 +198,9 @@ def _look_up(buffer, target, source):
     return rigid(rotation, np.array([getattr(transform.translation, axis) for axis in "xyz"]))
 
 
-def _view():
+def _view() -> Outside:
     try:
-        folder = rosgraph.Master(rospy.get_name()).getParam("/gazebo/snapshot")
+        folder = str(rosgraph.Master(rospy.get_name()).getParam("/gazebo/snapshot"))
         known = getattr(_outside, "view", None)
         if known is None or _outside.folder != folder or not known.is_alive:
             _outside.view, _outside.folder = Outside(folder, rospy.logwarn), folder
@@ -203,10 +209,10 @@ def _view():
         raise ShowError("no simulator on the master at %s: %s" % (rosgraph.get_master_uri(), error)) from error
 
 
-def _message(topic, message_class, hint, timeout_s=TIMEOUT_S):
+def _message(topic: str, message_class: type, hint: str, timeout_s: float = TIMEOUT_S) -> Any:
     found, arrived = [], threading.Event()
 
-    def take(message):
+    def take(message: object) -> None:
         found.append(message)
         arrived.set()
 
@@ -218,7 +224,8 @@ def _message(topic, message_class, hint, timeout_s=TIMEOUT_S):
     return found[-1]
 
 
-def _wait(what, is_met, hint, timeout_s=TIMEOUT_S):
+def _wait(what: str, is_met: Callable[[], bool], hint: str | Callable[[], str],
+          timeout_s: float = TIMEOUT_S) -> None:
     explain = hint if callable(hint) else lambda: hint
     try:
         wait_in_order([Condition(what, lambda: bool(is_met()), explain)], timeout_s, startup.LINE,

@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trees of frames, as text and as pictures. ROS-free."""
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from .picture import Picture, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from urdf_model.model import Robot
 
 _COLOURS = {"moves": "#c23b22", "fixed": "#5b7083"}
 
@@ -18,20 +26,20 @@ class Tree:
     edges: dict = field(default_factory=dict)
 
     @classmethod
-    def of_urdf(cls, robot):
+    def of_urdf(cls, robot: Robot) -> Tree:
         """Of a `urdf_model.Robot`: links, by their joints."""
         return cls({joint.child: (joint.parent, joint.name, joint.type != "fixed") for joint in robot.joints.values()})
 
     @property
-    def roots(self):
+    def roots(self) -> list[str]:
         """Frames without a parent, in alphabetical order."""
         return sorted({parent for parent, _, _ in self.edges.values()} - set(self.edges))
 
-    def children(self, name):
+    def children(self, name: str) -> list[str]:
         """Names of the direct children of a frame, in their given order."""
         return [child for child, (parent, _, _) in self.edges.items() if parent == name]
 
-    def below(self, name):
+    def below(self, name: str) -> Tree:
         """The tree from one frame down. Raises TreeError for an unknown frame."""
         if name not in self.edges and name not in self.roots:
             names = sorted({*self.edges, *self.roots})
@@ -43,11 +51,11 @@ class Tree:
                 todo.append(child)
         return Tree({child: edge for child, edge in self.edges.items() if child in chosen})
 
-    def rows(self):
+    def rows(self) -> list[tuple[int, str, str, bool]]:
         """List of (depth, name, label, moves), depth first. Raises TreeError if parents form rings."""
         listed = []
 
-        def add(name, depth):
+        def add(name: str, depth: int) -> None:
             _, label, moves = self.edges.get(name, (None, "", False))
             listed.append((depth, name, label, moves))
             for child in self.children(name):
@@ -60,16 +68,16 @@ class Tree:
                             % ", ".join(sorted(set(self.edges) - {name for _, name, _, _ in listed})))
         return listed
 
-    def __str__(self):
+    def __str__(self) -> str:
         """One line per frame, indented below its parent; the joint in brackets if it moves."""
         return "\n".join("%s%s%s" % ("  " * depth, "[%s] " % label if moves else "", name)
                          for depth, name, label, moves in self.rows())
 
-    def draw(self, title=""):
+    def draw(self, title: str = "") -> Picture:
         """:meth:`figure` as a :class:`Picture`."""
         return Picture.of_figure(self.figure(title))
 
-    def figure(self, title=""):
+    def figure(self, title: str = "") -> Figure:
         """Return a matplotlib figure: root on the left, frames that move in red, fixed ones in grey."""
         places, leaves = self._places()
         depth = max((x for x, _ in places.values()), default=0)
@@ -96,12 +104,12 @@ class Tree:
         axes.set_title(title or "red: moves; grey: fixed", fontsize=9, loc="left")
         return figure
 
-    def _places(self):
+    def _places(self) -> tuple[dict[str, tuple[int, float]], int]:
         """{name: (depth, height)} and the number of leaves: a frame is centred above its leaves."""
         self.rows()  # a ring would never end below
         places, count = {}, 0
 
-        def place(name, depth):
+        def place(name: str, depth: int) -> float:
             nonlocal count
             children = self.children(name)
             if not children:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The labs by name: their launch files, and how to recognize a running one. ROS-free."""
+from __future__ import annotations
+
 from typing import NamedTuple
 
 
@@ -12,7 +14,7 @@ class LabStart(NamedTuple):
     arguments: tuple = ()
 
     @property
-    def command(self):
+    def command(self) -> tuple[str, str]:
         """The arguments of `roslaunch`."""
         return (self.package, self.launch_file, *self.arguments)
 

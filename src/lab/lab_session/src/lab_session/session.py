@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the simulator on this master, or starts one that ends with this process."""
+from __future__ import annotations
+
 import atexit
 import contextlib
 import fcntl
@@ -7,7 +9,9 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import IO, Any, cast
 from urllib.parse import urlparse
 
 import rosgraph
@@ -41,29 +45,29 @@ class LabError(Exception):
 class Lab:
     """The result of :func:`connect`. Printing it shows what runs and how to stop it."""
 
-    def __init__(self, command, topic):
+    def __init__(self, command: Sequence[str], topic: str) -> None:
         self._command = command
         self._topic = topic
         self._master_keeper = None
         self._keeper = None
         self._programs = {}
-        self._log = None
+        self._log = Path()
 
     @property
-    def is_ours(self):
+    def is_ours(self) -> bool:
         """Whether this process has started the simulator, and it still runs."""
         return self._keeper is not None and self._keeper.poll() is None
 
     @property
-    def nodes(self):
+    def nodes(self) -> list[Any]:
         """Names of the nodes that the master knows."""
         try:
-            listed = rosgraph.Master("/lab_session").getSystemState()
+            listed: Any = rosgraph.Master("/lab_session").getSystemState()
         except (OSError, rosgraph.MasterException):
             return []
         return sorted({name for group in listed for _, names in group for name in names})
 
-    def run(self, *command):
+    def run(self, *command: str) -> Path:
         """Run a program beside the notebook, until :meth:`stop` or until the notebook's kernel ends.
 
         A running one is not started again. Returns the file with its output.
@@ -79,7 +83,7 @@ class Lab:
         print("started: %s (its output: %s)" % (" ".join(command), log))
         return log
 
-    def page(self):
+    def page(self) -> str:
         """The address of the lab's page in a browser, with its token; starts the page's server where none runs.
 
         Raises LabError where it does not start.
@@ -95,7 +99,7 @@ class Lab:
                 found = page_files.address(rosgraph.get_master_uri())
         return found
 
-    def stop(self):
+    def stop(self) -> None:
         """End the programs and the simulator that this process has started. The master stays until this process
         ends."""
         for command, program in self._programs.items():
@@ -108,13 +112,13 @@ class Lab:
         self._keeper = _closed(self._keeper)
         print("stopped: %s" % " ".join(self._command))
 
-    def close(self):
+    def close(self) -> None:
         """End everything that this process has started, the master too."""
         for program in self._programs.values():
             _closed(program)
         self._keeper, self._master_keeper = _closed(self._keeper), _closed(self._master_keeper)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         uri = os.environ["ROS_MASTER_URI"]
         names = self.nodes
         if not names:
@@ -129,7 +133,7 @@ class Lab:
             stop = "The simulator is stopped: run the cell that connects again."
         return "%s\n%s\nThe same lab in a terminal: %s" % (running, stop, shell)
 
-    def _ask_for(self, command):
+    def _ask_for(self, command: list[str]) -> None:
         """Set `command` for the next start; our running simulator goes on."""
         if not self.is_ours:
             self._command = command
@@ -137,10 +141,10 @@ class Lab:
             _say("what runs was started as: roslaunch %s; lab.stop() stops it, and the next connect starts it again"
                  % " ".join(self._command))
 
-    def _is_up(self):
+    def _is_up(self) -> bool:
         return self._topic in {name for name, _ in _published_topics()}
 
-    def _start(self, port, has_master):
+    def _start(self, port: int, has_master: bool) -> None:
         """Start the simulator, and a master for it if there is none."""
         folder = _state_folder()
         state = folder / ("lab_session-%d" % port)
@@ -153,11 +157,11 @@ class Lab:
             self._keeper = _keep(state, ["roslaunch", "--wait", *self._command], log)
         self._wait(START_TIMEOUT_S)
 
-    def _wait(self, timeout_s):
+    def _wait(self, timeout_s: float) -> None:
         """Wait for the robot's topic; raises OSError, or LabError when a simulator of ours has died."""
         ours = self._keeper
         condition = startup.topic_published(self._topic)
-        met = Condition(condition.what, lambda: condition.is_met() or (ours and ours.poll() is not None),
+        met = Condition(condition.what, lambda: condition.is_met() or (ours is not None and ours.poll() is not None),
                         condition.explain)
         # The keeper knows whether our own simulator is still starting.
         wait_in_order([met], timeout_s, startup.LINE, (lambda: False) if ours else startup.simulator_is_coming())
@@ -172,7 +176,7 @@ _labs = {}
 _run_id = None
 
 
-def connect(name, *arguments):
+def connect(name: str, *arguments: str) -> Lab:
     """Return the :class:`Lab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS node.
 
     Uses the simulator on the master that ROS_MASTER_URI names; if there is none, starts one there, with further launch
@@ -198,7 +202,7 @@ def connect(name, *arguments):
     return lab
 
 
-def _find_or_start(lab):
+def _find_or_start(lab: Lab) -> None:
     if lab.is_ours:
         lab._wait(START_TIMEOUT_S)
         return
@@ -226,11 +230,11 @@ def _find_or_start(lab):
     lab._start(port, has_master=bool(lab.nodes))
 
 
-def _holds(state, lab):
+def _holds(state: Path, lab: Lab) -> bool:
     return keeper.is_held(state) and " ".join(lab._command) in state.read_text()
 
 
-def _become_node(name):
+def _become_node(name: str) -> None:
     """rospy.init_node, once in a process; its master must stay the same."""
     global _run_id
     run_id = rosgraph.Master("/lab_session").getParam("/run_id")  # roslaunch and roscore set it
@@ -242,14 +246,15 @@ def _become_node(name):
                        "kernel (Kernel > Restart Kernel)" % rosgraph.get_master_uri())
 
 
-def _published_topics():
+def _published_topics() -> list[str]:
     try:
-        return rosgraph.Master("/lab_session").getPublishedTopics("/")
+        found: Any = rosgraph.Master("/lab_session").getPublishedTopics("/")
+        return found
     except (OSError, rosgraph.MasterException):
         return []
 
 
-def _keep(state, command, log, after=None):
+def _keep(state: Path, command: list[str], log: IO[str], after: Path | None = None) -> subprocess.Popen[bytes]:
     environment = dict(os.environ)
     environment.pop("LAB_SESSION_AFTER", None)
     if after:
@@ -258,29 +263,29 @@ def _keep(state, command, log, after=None):
                             stdout=log, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
 
 
-def _closed(process):
+def _closed(process: subprocess.Popen[bytes] | None) -> None:
     """Let a keeper end its command, and wait for it; returns None, to replace the keeper's reference."""
     if process is not None:
         with contextlib.suppress(OSError):
-            process.stdin.close()
+            cast("IO[bytes]", process.stdin).close()
         process.wait(keeper.STOP_TIMEOUT_S + 10.0)
 
 
-def _state_folder():
+def _state_folder() -> Path:
     folder = Path(rospkg.get_ros_home())
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
 @contextlib.contextmanager
-def _only_one():
+def _only_one() -> Iterator[None]:
     """Two notebooks that connect to the same master at the same time do so one after the other."""
     with open(_state_folder() / ("lab_session-%d.lock" % _master_port()), "a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
 
-def _master_port():
+def _master_port() -> int:
     uri = rosgraph.get_master_uri()
     try:
         port = urlparse(uri).port
@@ -291,16 +296,16 @@ def _master_port():
     return port
 
 
-def _last_lines(log):
+def _last_lines(log: Path) -> str:
     lines = Path(log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
     return "\n".join("  | " + line for line in lines)
 
 
-def _say(text):
+def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
 @atexit.register
-def _end_labs():
+def _end_labs() -> None:
     for lab in _labs.values():
         lab.close()

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plot numbers of messages over time: in a window, or with --png into a file, for which no display is needed."""
+from __future__ import annotations
+
 import argparse
 import os
 import signal
 import sys
 import time
+from collections.abc import Callable
 
 import rosgraph
 import rospy
@@ -19,7 +22,7 @@ POLL_S = 0.2
 END_POLL_MS = 50
 
 
-def parse(name, arguments):
+def parse(name: str, arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog=name, description=__doc__,
         epilog="/joint_states/position[0], /odom/pose/pose/position/x:y, /a/data,/b/data: with : fields of the same "
@@ -42,7 +45,7 @@ def parse(name, arguments):
     return options
 
 
-def wait_for(done, deadline):
+def wait_for(done: Callable[[], object], deadline: float) -> bool:
     """Poll until done() or the deadline [s, time.monotonic]; return whether it was done. Returns early when the node
     ends."""
     while not done():
@@ -52,7 +55,7 @@ def wait_for(done, deadline):
     return True
 
 
-def subscribe_all(subscriptions, paths, deadline):
+def subscribe_all(subscriptions: Subscriptions, paths: list[str], deadline: float) -> None:
     """Raises PlotError for a topic that does not exist at the deadline."""
     while True:
         try:
@@ -66,7 +69,7 @@ def subscribe_all(subscriptions, paths, deadline):
             time.sleep(POLL_S)
 
 
-def save_picture(options):
+def save_picture(options: argparse.Namespace) -> None:
     """Record, draw, write, print a summary. Raises PlotError."""
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
     import pyqtgraph
@@ -74,13 +77,13 @@ def save_picture(options):
     from live_plot.graph import Graph
 
     recording = Recording()
-    problems = []
+    problems: list[str] = []
     subscriptions = Subscriptions(recording, problems.append)
     paths = [path for argument in options.topics for path in fields.expand(argument)]
     deadline = time.monotonic() + options.timeout
     subscribe_all(subscriptions, paths, deadline)
 
-    def silent():
+    def silent() -> list[str]:
         return [label for label, samples in recording.samples()[0].items() if not samples.size]
 
     if not wait_for(lambda: not silent() or problems, deadline) or problems:
@@ -102,12 +105,12 @@ def save_picture(options):
     print("written: %s" % options.png)
 
 
-def show_window(options):
+def show_window(options: argparse.Namespace) -> None:
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise fields.PlotError("there is no display (DISPLAY is not set); --png FILE --seconds N needs none")
     is_over = False
 
-    def end(*_):
+    def end(*_: object) -> None:
         nonlocal is_over
         is_over = True
 
@@ -135,7 +138,7 @@ def show_window(options):
     application.exec_()
 
 
-def main(name):
+def main(name: str) -> None:
     """The command ``name``: reads the command line; exits with a one-line error if it cannot continue."""
     options = parse(name, rospy.myargv()[1:])
     if not rosgraph.is_master_online():

@@ -3,9 +3,13 @@
 
 Message types are described by a function: type name -> {field: type}, types written as in .msg files.
 """
+from __future__ import annotations
+
 import difflib
 import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 NUMBERS = frozenset(
     "bool byte char int8 uint8 int16 uint16 int32 uint32 int64 uint64 float32 float64 time duration".split())
@@ -30,7 +34,7 @@ class Curve:
     label: str
     steps: tuple
 
-    def value(self, message):
+    def value(self, message: Any) -> float:
         """Return the number as float; raises PlotError if this message's array is too short."""
         for name, index in self.steps:
             message = getattr(message, name)
@@ -41,7 +45,7 @@ class Curve:
         return message.to_sec() if hasattr(message, "to_sec") else float(message)
 
 
-def expand(argument):
+def expand(argument: str) -> list[str]:
     """Return the paths of one argument: `/t/a:b,/u/c` is /t/a, /t/b and /u/c. Raises PlotError."""
     paths = []
     for part in filter(None, (part.strip() for part in argument.split(","))):
@@ -57,7 +61,7 @@ def expand(argument):
     return paths
 
 
-def split(path, topics):
+def split(path: str, topics: Iterable[str]) -> tuple[str, list[str]]:
     """Return (topic, field tokens) of a path; if several topics match, the longest one. Raises UnknownTopic.
 
     topics: names of all topics.
@@ -72,7 +76,7 @@ def split(path, topics):
     raise UnknownTopic("no topic begins '%s' so far; %s" % (path, hint))
 
 
-def curves(topic, tokens, type_name, fields_of):
+def curves(topic: str, tokens: Sequence[str], type_name: str, fields_of: Callable[..., Any]) -> list[Curve]:
     """Return the Curves for field tokens in messages of a type; a message means all its numbers.
 
     Raises PlotError, which lists the existing fields. fields_of: function from the name of a message type to {field:
@@ -99,13 +103,13 @@ def curves(topic, tokens, type_name, fields_of):
     return [Curve("%s/%s" % (label, name), (*steps, (name, None))) for name in numbers]
 
 
-def _fields(type_name, fields_of):
+def _fields(type_name: str, fields_of: Callable[[Any], Any]) -> dict[str, str]:
     if type_name in TIME_PARTS:
         return TIME_PARTS[type_name]
     return {} if type_name in NUMBERS or type_name == "string" else fields_of(type_name)
 
 
-def _element(label, declared, index):
+def _element(label: str, declared: str, index: int | None) -> str:
     """The type that a field of the declared type, with or without an index, has. Raises PlotError."""
     array = _ARRAY.fullmatch(declared)
     if array is None:
@@ -120,5 +124,5 @@ def _element(label, declared, index):
     return element
 
 
-def _listing(fields):
+def _listing(fields: dict[str, str]) -> str:
     return ", ".join("%s (%s)" % item for item in fields.items())

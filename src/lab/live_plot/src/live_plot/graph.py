@@ -1,6 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Curves over time, drawn by PyQtGraph: the picture in the window and in the file."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import pyqtgraph
+
+if TYPE_CHECKING:
+    import numpy as np
+    from PyQt5.QtGui import QPen
+
+    from live_plot.recording import Recording
 
 # Distinguishable on white, also for colour-blind readers; the seventh curve uses the first colour again, dashed.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#333333")
@@ -9,7 +19,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#333333")
 class Graph(pyqtgraph.PlotWidget):
     """draw() shows a recording; with `span_s` its last seconds, otherwise all of it, or the range chosen by mouse."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(background="w")
         self.showGrid(x=True, y=True, alpha=0.3)
         self.setLabel("bottom", "time [s]")
@@ -19,7 +29,7 @@ class Graph(pyqtgraph.PlotWidget):
             self.getAxis(side).setTextPen("k")
         self._lines = {}
 
-    def draw(self, recording, span_s=None):
+    def draw(self, recording: Recording, span_s: float | None = None) -> None:
         """Draw a Recording. span_s: time shown before the newest sample [s]; None keeps the view."""
         samples, begin_s = recording.samples(span_s)
         self._match_lines(samples)
@@ -31,14 +41,14 @@ class Graph(pyqtgraph.PlotWidget):
         if span_s is not None and end_s > begin_s:
             self.setXRange(max(0.0, end_s - begin_s - span_s), max(end_s - begin_s, span_s), padding=0)
 
-    def _match_lines(self, samples):
+    def _match_lines(self, samples: dict[str, np.ndarray]) -> None:
         for label in [label for label in self._lines if label not in samples]:
             self.removeItem(self._lines.pop(label))
         for label in samples:
             if label not in self._lines:
                 self._lines[label] = self.plot(name=label, pen=self._free_pen(), autoDownsample=True, clipToView=True)
 
-    def _free_pen(self):
+    def _free_pen(self) -> QPen:
         """The first unused combination of colour and dashes."""
         taken = {(line.opts["pen"].color().name(), line.opts["pen"].style()) for line in self._lines.values()}
         style = pyqtgraph.QtCore.Qt.PenStyle

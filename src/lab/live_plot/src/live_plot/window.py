@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The live window: entry of curves, autoscroll, pause, and the graph."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 from pyqtgraph.Qt import QtCore, QtWidgets
 
 from . import fields
 from .graph import Graph
+
+if TYPE_CHECKING:
+    from live_plot.recording import Recording
 
 REDRAW_MS = 50
 # Drawing a whole long recording is slow, so it is drawn less often.
@@ -19,7 +27,8 @@ class PlotWindow(QtWidgets.QWidget):
 
     problem = QtCore.Signal(str)  # may be emitted from any thread
 
-    def __init__(self, recording, subscribe, unsubscribe, span_s):
+    def __init__(self, recording: Recording, subscribe: Callable[[str], list[str]], unsubscribe: Callable[[str], None],
+                 span_s: float) -> None:
         super().__init__()
         self._recording, self._subscribe, self._unsubscribe = recording, subscribe, unsubscribe
         self._span_s = span_s
@@ -57,7 +66,7 @@ class PlotWindow(QtWidgets.QWidget):
         for timer in (self._redraw_timer, self._retry_timer):
             timer.start()
 
-    def add(self, argument):
+    def add(self, argument: str) -> bool:
         """Add the curves of a command line argument. Return whether it succeeded; if not, the window shows why."""
         try:
             self._waiting += fields.expand(argument)
@@ -66,11 +75,11 @@ class PlotWindow(QtWidgets.QWidget):
             return False
         return self._retry()
 
-    def _add_entry(self):
+    def _add_entry(self) -> None:
         if self._entry.text() and self.add(self._entry.text()):
             self._entry.clear()
 
-    def _retry(self):
+    def _retry(self) -> bool:
         if not self._waiting:
             return True
         paths, self._waiting = self._waiting, []
@@ -86,7 +95,7 @@ class PlotWindow(QtWidgets.QWidget):
         self._status.setText("\n".join(problems))
         return not problems
 
-    def _fill_remove_menu(self):
+    def _fill_remove_menu(self) -> None:
         self._remove_menu.clear()
         labels = self._recording.labels
         for label in labels:
@@ -96,7 +105,7 @@ class PlotWindow(QtWidgets.QWidget):
         if len(labels) > 1:
             self._remove_menu.addAction("all", lambda: [self._unsubscribe(label) for label in labels])
 
-    def _redraw(self):
+    def _redraw(self) -> None:
         if self.pause.isChecked():
             return
         watch = QtCore.QElapsedTimer()
