@@ -7,6 +7,7 @@
 import ast
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 SHOWN = 10
@@ -23,7 +24,7 @@ def is_python(path: Path) -> bool:
     return first.startswith(b"#!") and b"python" in first
 
 
-def findings(folder: Path):
+def findings(folder: Path) -> Iterator[tuple[Path, int, str]]:
     """(path, line, error) of each file that Python 3 cannot parse."""
     for path in sorted(folder.rglob("*")):
         if ".git" in path.parts or not path.is_file() or not is_python(path):
@@ -36,7 +37,7 @@ def findings(folder: Path):
             yield path, getattr(error, "lineno", None) or 1, getattr(error, "msg", None) or str(error)
 
 
-def main(argv):
+def main(argv: list[str]) -> int:
     folder = Path(argv[0])
     found = list(findings(folder))
     for path, line, what in found[:SHOWN]:

@@ -4,6 +4,7 @@
 
 import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 # It also runs where nothing has been built yet.
@@ -20,7 +21,7 @@ QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "m
              "users_python": "your own Python"}
 
 
-def say_what_takes_long(names):
+def say_what_takes_long(names: Iterable[str]) -> None:
     named = ", ".join(QUESTIONS.get(name, "the " + name) for name in names)
     print(f"waiting for {named} ...", file=sys.stderr, flush=True)
 

@@ -15,9 +15,11 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+from typing import IO
 
-from catkin_pkg.package import InvalidPackage
+from catkin_pkg.package import InvalidPackage, Package
 from catkin_pkg.topological_order import topological_order
 
 # Files that a build reads; as in fingerprint() of environment.bash, plus compiled code, which only make can check.
@@ -26,7 +28,7 @@ ENDINGS = (".msg", ".srv", ".action", ".cfg", ".c", ".cc", ".cpp", ".cxx", ".h",
 LOG_LINES_SHOWN = 20
 
 
-def packages(root: Path, folders):
+def packages(root: Path, folders: Iterable[str]) -> list[tuple[Path, Package]]:
     """(path, package) in build order. Raises InvalidPackage, RuntimeError."""
     found = []
     for folder in folders:
@@ -38,7 +40,7 @@ def packages(root: Path, folders):
     by_name = {package.name: (path, package) for path, package in found}
     ordered, placed = [], set()
 
-    def place(name):
+    def place(name: str) -> None:
         if name not in by_name or name in placed:
             return
         placed.add(name)
@@ -52,7 +54,7 @@ def packages(root: Path, folders):
     return ordered
 
 
-def dependencies(package):
+def dependencies(package: Package) -> set[str]:
     return {one.name for kind in (package.build_depends, package.buildtool_depends, package.build_export_depends,
                                   package.exec_depends) for one in kind}
 
@@ -67,7 +69,7 @@ def state_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-def with_dependencies(ordered, names):
+def with_dependencies(ordered: list[tuple[Path, Package]], names: Iterable[str]) -> list[tuple[Path, Package]]:
     """The (path, package) of `names` and of all that they depend on, in the same order; of all, if `names` is empty."""
     wanted = set(names)
     for _, package in reversed(ordered):
@@ -76,7 +78,8 @@ def with_dependencies(ordered, names):
     return [(path, package) for path, package in ordered if not names or package.name in wanted]
 
 
-def build(root: Path, path: Path, package, output, configure: bool = True, jobs: str = ""):
+def build(root: Path, path: Path, package: Package, output: IO[str] | None, configure: bool = True,
+          jobs: str = "") -> None:
     """Build one package, configured before or not. Raises CalledProcessError.
 
     output: an open file, or None for the terminal. jobs: make's option, as "-j4"; one for each processor if empty.
@@ -103,7 +106,7 @@ def build(root: Path, path: Path, package, output, configure: bool = True, jobs:
                 file.write_bytes(content)
 
 
-def parsed(arguments) -> argparse.Namespace:
+def parsed(arguments: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     parser.add_argument("root", type=Path)
     parser.add_argument("folders", nargs="*")
@@ -113,7 +116,7 @@ def parsed(arguments) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def main(arguments) -> int:
+def main(arguments: list[str]) -> int:
     options = parsed(arguments)
     root = options.root
     logs = root / ".baxter" / "logs"

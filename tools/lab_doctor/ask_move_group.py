@@ -6,6 +6,7 @@ needs ROS and the workspace's packages, and the doctor must work without them.""
 import json
 import sys
 import time
+from typing import Any
 
 import rosgraph
 import rospy
@@ -21,11 +22,11 @@ JOINT_STATE = "sensor_msgs/JointState"
 FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
 
 
-def main():
+def main() -> None:
     node, namespace = sys.argv[1:3]
     rospy.init_node("lab_doctor_planning", anonymous=True, disable_signals=True, disable_rostime=True)
 
-    def parameter(name, usual):
+    def parameter(name: str, usual: Any) -> Any:
         return rospy.get_param(f"{node}/{name}", usual)
 
     description = rospy.resolve_name(parameter("robot_description", "robot_description"), namespace + "x")
@@ -61,14 +62,14 @@ def main():
     rospy.signal_shutdown("done")
 
 
-def joint_topic_of(node, master, subscribers):
+def joint_topic_of(node: str, master: rosgraph.Master, subscribers: list[tuple[str, list[str]]]) -> str:
     """The topic of joint states that a node subscribes to: it may have been remapped."""
     types = dict(master.getTopicTypes())
     found = [topic for topic, nodes in subscribers if node in nodes and types.get(topic) == JOINT_STATE]
     return found[0] if found else "/joint_states"
 
 
-def listen(joint_topic, joints, sensors):
+def listen(joint_topic: str, joints: set[str], sensors: list[str]) -> tuple[dict[str, float], set[str]]:
     """Return ({joint: position}, topics of sensors) of the messages within LISTEN_S; returns early once all have
     arrived."""
     names, heard = {}, set()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From facts to findings: one function for each kind of problem in a lab. Pure: no clock, no network, no ROS."""
 
+from collections.abc import Iterator
 from urllib.parse import urlparse
 
 from lab_doctor import move_group_checks
@@ -35,16 +36,16 @@ def _entry(facts: Facts) -> str:
 _LATER = "not checked: set-up is running", "ask again when it has ended"
 
 
-def _busy(topic, what):
+def _busy(topic: str, what: str) -> Finding:
     """A question without an answer in time gives no other finding."""
     return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it is idle")
 
 
-def _is_setting_up(facts):
+def _is_setting_up(facts: Facts) -> bool:
     return facts.set_up is not None and facts.set_up.is_running
 
 
-def check_build(facts):
+def check_build(facts: Facts) -> Iterator[Finding]:
     if facts.set_up is not None:
         log = f"{facts.root}/.baxter/logs/{facts.set_up.step}.log"
     if facts.set_up is not None and facts.set_up.is_running:
@@ -73,7 +74,7 @@ def check_build(facts):
         yield Finding("build", Level.OK, f"{facts.root} is built and up to date")
 
 
-def check_python(facts):
+def check_python(facts: Facts) -> Iterator[Finding]:
     python = facts.python
     if facts.users_python:
         what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs started there find no rospy")
@@ -101,7 +102,7 @@ def check_python(facts):
         yield Finding("python", Level.OK, f"{expected}, numpy {numpy}")
 
 
-def check_network(facts):
+def check_network(facts: Facts) -> Iterator[Finding]:
     """ROS_MASTER_URI, ROS_HOSTNAME, ROS_IP: can other machines connect to the address that we announce?"""
     uri = facts.variables.get("ROS_MASTER_URI", "")
     parts = urlparse(uri)
@@ -142,7 +143,7 @@ def check_network(facts):
         yield Finding("network", Level.OK, f"{variable}={announced} is this machine")
 
 
-def check_master(facts):
+def check_master(facts: Facts) -> Iterator[Finding]:
     uri = facts.variables.get("ROS_MASTER_URI", "")
     if not master_host(facts):
         return  # check_network says so
@@ -161,7 +162,7 @@ def check_master(facts):
             yield Finding("master", Level.NOTE, what, f"ROS_MASTER_URI={labs[0]} ./baxter.sh sim")
 
 
-def _master_fix(facts):
+def _master_fix(facts: Facts) -> str:
     host = master_host(facts)
     if is_loopback(host):
         others = sorted(facts.other_masters, key=lambda other: not other.has_simulator)
@@ -173,11 +174,11 @@ def _master_fix(facts):
     return f"is {host} on, and does `ping {host}` answer? For the simulator on this machine: ./baxter.sh sim"
 
 
-def _master_answers(facts):
+def _master_answers(facts: Facts) -> bool:
     return facts.master is not None and not facts.master.error
 
 
-def check_clock(facts):
+def check_clock(facts: Facts) -> Iterator[Finding]:
     if not _master_answers(facts):
         return
     offset = facts.master.clock_offset_s
@@ -205,7 +206,7 @@ def check_clock(facts):
         yield Finding("clock", Level.OK, "wall time")
 
 
-def check_simulators(facts):
+def check_simulators(facts: Facts) -> Iterator[Finding]:
     if not _master_answers(facts):
         return
     for topic in SIMULATOR_TOPICS:
@@ -221,13 +222,13 @@ def check_simulators(facts):
         yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
 
 
-def check_nodes(facts):
+def check_nodes(facts: Facts) -> Iterator[Finding]:
     for node in facts.deaf_nodes:
         what = f"{node} runs and takes no connections any more: no new subscriber, no call of a service"
         yield Finding("nodes", Level.WRONG, what, f"rosnode kill {node}, then start it, or the lab, again")
 
 
-def check_troubles(facts):
+def check_troubles(facts: Facts) -> Iterator[Finding]:
     """Errors that the lab survived: a failed plugin is stopped; a dropped message, or a thread that was restarted, does
     no harm."""
     if facts.topics is None:
@@ -239,7 +240,7 @@ def check_troubles(facts):
         yield Finding("simulator", level, f"{name}: {message}", fix)
 
 
-def check_robot(facts):
+def check_robot(facts: Facts) -> Iterator[Finding]:
     if not _master_answers(facts):
         return
     if "topics" in facts.timed_out:
@@ -273,7 +274,7 @@ def check_robot(facts):
         yield Finding("robot", Level.OK, "enabled")
 
 
-def check_move_group(facts):
+def check_move_group(facts: Facts) -> Iterator[Finding]:
     if "move_group" in facts.timed_out:
         yield _busy("move_group", "move_group, or a service of it, has not answered")
     if facts.move_group is not None and facts.move_group.error and _is_setting_up(facts):
@@ -282,7 +283,7 @@ def check_move_group(facts):
         yield from move_group_checks.examine(facts.move_group)
 
 
-def check_ports(facts):
+def check_ports(facts: Facts) -> Iterator[Finding]:
     """Only if everything should stay on this machine; a robot must be able to reach us."""
     if not is_loopback(master_host(facts)):
         return
@@ -300,7 +301,7 @@ def check_ports(facts):
     yield Finding("ports", Level.NOTE, what)
 
 
-def check_display(facts):
+def check_display(facts: Facts) -> Iterator[Finding]:
     if not facts.display:
         what = "DISPLAY is not set: rviz cannot start, and the lab goes on without its window"
         yield Finding("display", Level.NOTE, what, "work in a desktop session, or log in with ssh -X")

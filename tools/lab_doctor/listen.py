@@ -5,6 +5,7 @@ It is a separate process, because it needs ROS and the doctor must work without 
 
 import json
 import threading
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState
@@ -17,26 +18,26 @@ SIMULATOR_STATUS = "gazebo: "  # prefix of the names of the simulator's statuses
 THREADS_STATUS = ": threads"  # ending of the name of every node's status of its threads
 
 
-def main():
+def main() -> None:
     # Time from /clock may stand still, so use wall time.
     rospy.init_node("lab_doctor", anonymous=True, disable_signals=True, disable_rostime=True)
     clock, state, statuses = [], [], {}
     everything = threading.Event()
 
-    def heard():
+    def heard() -> None:
         simulator = any(name.startswith(SIMULATOR_STATUS) for name in statuses)
         if state and simulator and len(clock) > 1 and clock[-1] > clock[0]:
             everything.set()
 
-    def on_clock(message):
+    def on_clock(message: Any) -> None:
         clock.append(message.clock.to_sec())
         heard()
 
-    def on_state(message):
+    def on_state(message: Any) -> None:
         state.append({name: bool(getattr(message, name)) for name in STATE_FIELDS})
         heard()
 
-    def on_diagnostics(message):
+    def on_diagnostics(message: Any) -> None:
         statuses.update((status.name, (status.name, status.level, status.message)) for status in message.status
                         if status.name.startswith(SIMULATOR_STATUS) or status.name.endswith(THREADS_STATUS))
         heard()

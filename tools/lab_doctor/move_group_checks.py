@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Problems that keep a running move_group from planning or moving. Pure, like the other checks."""
 
+from collections.abc import Iterator, Sequence
+
 from lab_doctor.facts import MoveGroup
 from lab_doctor.findings import Finding, Level
 
@@ -22,7 +24,7 @@ def examine(move_group: MoveGroup) -> list[Finding]:
     return [Finding(TOPIC, Level.OK, what)]
 
 
-def _controllers(move_group):
+def _controllers(move_group: MoveGroup) -> Iterator[Finding]:
     if not move_group.executes:
         yield Finding(TOPIC, Level.NOTE, f"{move_group.node} only plans: allow_trajectory_execution is false",
                       "roslaunch its move_group.launch with allow_trajectory_execution:=true")
@@ -43,7 +45,7 @@ def _controllers(move_group):
                       f"enter the joints in controller_list of {move_group.node}")
 
 
-def _joint_states(move_group):
+def _joint_states(move_group: MoveGroup) -> Iterator[Finding]:
     silent = move_group.silent_joints
     if silent:
         what = f"no message on {move_group.joint_topic} has {_listed(silent)}: the robot's posture is unknown"
@@ -51,7 +53,7 @@ def _joint_states(move_group):
         yield Finding(TOPIC, Level.WRONG, what, fix)
 
 
-def _start_state(move_group):
+def _start_state(move_group: MoveGroup) -> Iterator[Finding]:
     for sentence in move_group.joints_out_of_bounds:
         what = f"no plan can start here: {sentence}"
         yield Finding(TOPIC, Level.WRONG, what, "move the joint back by hand or by a program")
@@ -63,7 +65,7 @@ def _start_state(move_group):
         yield Finding(TOPIC, Level.WRONG, what, fix)
 
 
-def _octomap(move_group):
+def _octomap(move_group: MoveGroup) -> Iterator[Finding]:
     for sensor in move_group.sensors:
         if not sensor.publishers:
             yield Finding(TOPIC, Level.WRONG, f"the octomap gets no data: no node publishes {sensor.topic}",
@@ -73,7 +75,7 @@ def _octomap(move_group):
                           f"{_listed(sensor.publishers)}", f"rostopic hz {sensor.topic}; check the camera's node")
 
 
-def _listed(names):
+def _listed(names: Sequence[str]) -> str:
     names = list(names)
     more = len(names) - SHOWN
     return ", ".join(names[:SHOWN]) + (f" and {more} more" if more > 0 else "")

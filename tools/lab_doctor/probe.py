@@ -11,8 +11,10 @@ import struct
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from email.utils import parsedate_to_datetime
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlparse
 
 import master_calls
@@ -99,7 +101,7 @@ def answer_all(questions, timeout_s, say=lambda names: None, patience_s=PATIENCE
     """
     answers, timed_out, ended = {}, set(), set()
 
-    def answer(name, question):
+    def answer(name: str, question: Callable[[], Any]) -> None:
         try:
             answers[name] = question()
         except (TimeoutError, subprocess.TimeoutExpired):
@@ -135,7 +137,7 @@ def users_python(variables: dict[str, str]) -> str:
     return "" if can_import else python
 
 
-def _outside(variables):
+def _outside(variables: dict[str, str]) -> dict[str, str]:
     return {name: value for name, value in variables.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
 
 
@@ -202,7 +204,7 @@ def ask_master(uri: str) -> Master:
     )
 
 
-def _node_state(master, node):
+def _node_state(master: Any, node: str) -> str:
     try:
         _, _, node_uri = master.lookupNode(CALLER_ID, node)
         master_calls.proxy(node_uri, CALL_TIMEOUT_S).getPid(CALLER_ID)
@@ -226,7 +228,7 @@ def find_deaf_nodes(uri: str, patience_s: float = DEAF_S) -> list[str]:
     return [node for node in questions if answers.get(node) == "deaf"]
 
 
-def _greet(uri, node, service, patience_s):
+def _greet(uri: str, node: str, service: str, patience_s: float) -> str | None:
     """ "deaf", or None where the node answers, or is not there, or is too slow in all."""
     master = master_calls.proxy(uri, CALL_TIMEOUT_S)
     address = urlparse(master.lookupService(CALLER_ID, service)[2])
@@ -378,7 +380,7 @@ def list_listeners() -> list[Listener]:
     return parse_listeners(done.stdout, _command_line)
 
 
-def _command_line(pid):
+def _command_line(pid: int) -> str:
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
     except OSError:
