@@ -23,6 +23,8 @@ from moveit_ros_move_group.convert.constraints import constraint_set_of
 
 # [s], if a request has none.
 _USUAL_TIME_S = 5.0
+# Polling period while the robot is being prepared [s].
+_LOOK_UP_S = 0.05
 # Remarks on planners that were logged already; each is logged once.
 _MAX_REMARKS = 1000
 
@@ -35,11 +37,14 @@ class Planner:
         self._context, self._industrial = context, industrial
         self._remarks = set()
         self._seeds = itertools.count()
+        self._prepared = threading.Event()
+        self._prepared.set()
 
     def plan(self, request, scene, stop=lambda: False):
         """Return a pipeline.Plan for a MotionPlanRequest from the state of ``scene``. Raises PlanningError."""
         context = self._context
         pipe = self._pipeline(request.pipeline_id)
+        self._wait_until_prepared(stop)
         if pipe.industrial:
             return self._limited(request, self._industrial.plan(request, scene, pipe, self._tools(stop)))
         query, remarks = self._query(request, scene, pipe)
@@ -93,6 +98,7 @@ class Planner:
         if other is not None:
             raise RequestError(MoveItErrorCodes.FAILURE, "pipeline '%s' plans no sequences; load "
                                "pilz_industrial_motion_planner and name it as pipeline_id" % other)
+        self._wait_until_prepared(stop)
         return self._industrial.plan_sequence(items, scene, pipes, self._tools(stop))
 
     def prepare(self, patience_s, done=lambda: None):
@@ -107,14 +113,21 @@ class Planner:
                 rospy.logerr("the robot could not be prepared for planning: %s: %s", type(error).__name__, error)
             else:
                 rospy.loginfo("the robot was prepared for planning in %.1f s", wall_clock() - begin)
+            self._prepared.set()
             done()
 
+        self._prepared.clear()
         thread = threading.Thread(target=work, daemon=True)
         thread.start()
         thread.join(patience_s)
         if thread.is_alive():
             rospy.logwarn("the robot is still being prepared for planning; the first time its links are covered by "
                           "spheres, which may take half a minute. Plans wait for that, everything else answers already")
+
+    def _wait_until_prepared(self, stop):
+        while not self._prepared.wait(_LOOK_UP_S):
+            if stop() or rospy.is_shutdown():
+                raise RequestError(MoveItErrorCodes.PREEMPTED, "stopped while the robot was prepared for planning")
 
     def _warm_up(self):
         context = self._context

@@ -77,8 +77,18 @@ def test_a_robot_that_takes_long_to_prepare_delays_nothing_but_plans(monkeypatch
     code, text = outcome(node.ask("compute_fk", good_requests(SIX)["compute_fk"]))
     assert code == MoveItErrorCodes.SUCCESS, text
     assert any("being prepared for planning" in line for line in node.logged) and not ended.is_set()
+    answers = []
+    plan = threading.Thread(target=lambda: answers.append(outcome(node.ask(
+        "plan_kinematic_path", good_requests(SIX)["plan_kinematic_path"]))), daemon=True)
+    plan.start()
+    # A goal that is cancelled does not wait on.
+    node.servers["move_group"].preempted.set()
+    code, text = outcome(node.ask("move_group", good_requests(SIX)["move_group"]))
+    assert code == MoveItErrorCodes.PREEMPTED and not answers
     may_end.set()
     assert ended.wait(PREPARED_S)
+    plan.join(PREPARED_S)
+    assert answers[0][0] == MoveItErrorCodes.SUCCESS, answers
 
 
 def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
