@@ -11,6 +11,8 @@ import numpy as np
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
 MARKS = ("success", "failure", "again")
 GRIPPER = ("open", "close")
+# Of a layout's "hold". ROS's parameters have no null.
+_NO_BUTTON = "none"
 # Beside a key's repetition by the terminal; after that it counts as released [s].
 _HELD_S = 0.15
 _SPEEDS = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
@@ -96,7 +98,7 @@ class Keyboard:
 class Gamepad:
     """Sticks and buttons by a layout: {motions: {x: {axis: 1, scale: 1.0} or {buttons: [plus, minus]}, ...},
     hold: button, open, close, hand, tool, success, failure, again: buttons, dead_zone: of the axes}. Nothing moves
-    unless ``hold`` is held; where it is null, as of a cap that returns to its middle, what is let go is at rest."""
+    unless ``hold`` is held; where it is "none", as of a cap that returns to its middle, what is let go is at rest."""
 
     def __init__(self, layout: dict[str, Any], hands: int = 1) -> None:
         """Raises LayoutError."""
@@ -113,7 +115,7 @@ class Gamepad:
             raise LayoutError("dead_zone is %r; expected a number from 0, less than 1" % (zone,))
         self._dead_zone = zone
         for name in ("hold", "hand", "tool", *GRIPPER, *MARKS):
-            if name in layout and not (name == "hold" and layout[name] is None):
+            if name in layout and not (name == "hold" and layout[name] == _NO_BUTTON):
                 self._buttons[name] = _index("button of " + name, layout[name])
         self._before: dict[str, bool] = {}
         self._hand, self._in_tool = 0, False

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keys and gamepads: what is held moves, what is let go does not."""
+import xmlrpc.client
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,12 @@ def test_the_other_keys():
 def pad(kind):
     layout = yaml.safe_load((CONFIG / ("gamepad_%s.yaml" % kind)).read_text())["layout"]
     return Gamepad(layout, 2), layout
+
+
+@pytest.mark.parametrize("file", sorted(CONFIG.glob("*.yaml")), ids=lambda file: file.stem)
+def test_a_layout_can_be_a_parameter(file):
+    # XML-RPC has no null.
+    assert xmlrpc.client.dumps((yaml.safe_load(file.read_text()),))
 
 
 def pressed(*numbers):
