@@ -30,8 +30,8 @@ _LEAD_RAD, _SAME_RAD = 0.12, 0.03
 _SPEED_AT_THRESHOLD = 0.4
 # Gaps are looked for up to this distance [m]; the fastest hand needs no more to stop.
 _REACH_M = 0.12
-# Spheres come no nearer than this [m].
-_CLEARANCE_M = 0.002
+# Spheres come no nearer than this [m]: an arm is some millimetres beside its set-points, sideways too.
+_CLEARANCE_M = 0.005
 # A pose counts as reached within these.
 _REACHED_M, _REACHED_RAD = 1e-4, 1e-3
 # Shares of a motion: what is lost less than the first is not worth a status; less than the second remains of a halt.
@@ -237,7 +237,7 @@ class Servo:
             wanted, metric, jacobian = np.array(command.joints, dtype=float), np.eye(len(q)), np.eye(len(q))
         wanted = wanted / max(1.0, float((np.abs(wanted) / self.limits.velocity).max()))
         low, high = self._box(q, measured)
-        slope, least, distance = self._gap_bounds(whole, velocity)
+        slope, least, distance = self._gap_bounds(whole, velocity, q - measured)
         found = np.empty(len(q))
         wanted, metric = np.ascontiguousarray(wanted), np.ascontiguousarray(metric)
         held = nearest_within(wanted, metric, slope, least, low, high, found)
@@ -259,8 +259,9 @@ class Servo:
         low = -np.minimum(speed_towards(q - limits.lower - margin, limits, lag), below)
         return low, high
 
-    def _gap_bounds(self, whole: np.ndarray, velocity: np.ndarray):
-        """(slope (m, k), least (m,), distance (m,)): slope @ x >= least keeps what is near from coming too near."""
+    def _gap_bounds(self, whole: np.ndarray, velocity: np.ndarray, lead: np.ndarray):
+        """(slope (m, k), least (m,), distance (m,)): slope @ x >= least keeps what is near from coming too near, where
+        the set-points are and where the joints are, which they ``lead`` (k,)."""
         settings = self.settings
         if self.surroundings is None or not settings.check_collisions:
             return np.empty((0, len(self.joints))), np.empty(0), np.empty(0)
@@ -271,9 +272,11 @@ class Servo:
         if settings.collision_check_type == STOP_DISTANCE:
             clearance, threshold = max(clearance, settings.min_allowable_collision_distance), 0.0
         time = np.maximum(settings.stopping_time, threshold / _SPEED_AT_THRESHOLD)
-        allowed = np.maximum(near.distance - clearance, 0.0) / time
+        slope = np.ascontiguousarray(near.slope[:, self._rows])
+        distance = near.distance - np.maximum(slope @ lead, 0.0)
+        allowed = np.maximum(distance - clearance, 0.0) / time
         least = np.minimum(0.0, -allowed - np.minimum(near.drift, 0.0))
-        return np.ascontiguousarray(near.slope[:, self._rows]), least, near.distance
+        return slope, least, distance
 
     def _open_cells(self, whole: np.ndarray, found: np.ndarray) -> np.ndarray:
         """``found``, shortened where it leads into postures at which links may touch that spheres cannot tell apart."""

@@ -216,7 +216,7 @@ def test_a_body_that_comes_nearer_leaves_less_of_the_approach(baxter):
         def near(self, *_):
             slope = np.zeros((1, len(baxter.groups["left_arm"])))
             slope[0, 0] = -1.0
-            return Near(np.array([0.022]), slope, np.array([self.drift]), np.array([True]), False)
+            return Near(np.array([0.025]), slope, np.array([self.drift]), np.array([True]), False)
 
         def closed(self, _):
             return False
