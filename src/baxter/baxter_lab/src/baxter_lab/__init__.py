@@ -16,6 +16,7 @@ from .cameras import Picture
 from .errors import LabError, MeshesMissing, NotReached
 from .lab import Lab, Options, Thing, pose
 from .robot import Arm, Baxter, CommandRefused, Event, Gripper, Mode, NoSolution, State
+from .tools import Tool
 
 __all__ = ["Arm", "Baxter", "BulletSimError", "CommandRefused", "Event", "Gripper", "Lab", "LabError", "MeshesMissing",
-           "Mode", "NoSolution", "NotReached", "Options", "Picture", "State", "Thing", "Which", "pose"]
+           "Mode", "NoSolution", "NotReached", "Options", "Picture", "State", "Thing", "Tool", "Which", "pose"]

@@ -41,6 +41,7 @@ from .meshes import MeshFinder, mesh_folder
 from .planning import FLOOR, Planning
 from .robot import MOVE_S, Baxter
 from .saving import SavedState
+from .tools import with_tools
 
 LOG = logging.getLogger("baxter_lab")
 STEP_S = 0.002
@@ -58,7 +59,8 @@ class _Log:
 class Options(NamedTuple):
     """left_gripper, right_gripper: "electric", "suction" or "none"; pedestal, kinect: whether there is one; pose: that
     the arms start in, by its name in `baxter_model`; which: whether it behaves as a physical one, and which one;
-    with_meshes: False puts boxes in the place of all of the robot's meshes, which loads faster and needs no files."""
+    with_meshes: False puts boxes in the place of all of the robot's meshes, which loads faster and needs no files;
+    tools: what is fixed to its hands, each a `Tool`."""
 
     left_gripper: str = "electric"
     right_gripper: str = "electric"
@@ -67,6 +69,7 @@ class Options(NamedTuple):
     pose: str = "neutral"
     which: Which = Which()
     with_meshes: bool = True
+    tools: tuple = ()
 
     def arguments(self) -> dict[str, str]:
         """Those of the robot's xacro file."""
@@ -130,7 +133,7 @@ class Lab:
         compiled.load()
         self.options, self._warn, self._hooks = options, warn, []
         self.find_mesh = MeshFinder(mesh_folder()) if options.with_meshes else lambda name: None
-        self.robot_urdf = baxter_urdf(options.arguments())
+        self.robot_urdf = with_tools(baxter_urdf(options.arguments()), options.tools)
         self.world = World(time_step_s=time_step_s, seed=seed, find_mesh=self.find_mesh,
                            warn=warn if options.with_meshes else lambda text: None)
         self.things: dict[str, Thing] = {}
@@ -197,7 +200,10 @@ class Lab:
             self.step()
 
     def save(self) -> SavedState:
-        """The state of everything, to ``restore``; bodies that rest stay awake from the first call on."""
+        """The state of everything, to ``restore``; bodies that rest stay awake from the first call on.
+
+        What follows is what follows each ``restore``, bit for bit; without the call it may differ in the last digits.
+        """
         return SavedState(self)
 
     def restore(self, state: SavedState) -> None:

@@ -88,6 +88,7 @@ class SavedState:
         self._world = {key: getattr(world, key) for key in _OF_WORLD}
         self._random = world.random.bit_generator.state
         self._logic = restorer(lab.robot.simulated)
+        self._forget_contacts()
         self._number = pybullet.saveState(physicsClientId=self._client)
 
     def restore(self) -> bool:
@@ -95,6 +96,7 @@ class SavedState:
         lab, world = self._lab, self._lab.world
         if {name: model for name, (model, *_) in self._models.items()} != world.models:
             return False
+        self._forget_contacts()
         pybullet.restoreState(self._number, physicsClientId=self._client)
         for key, value in self._world.items():
             setattr(world, key, value)
@@ -108,6 +110,19 @@ class SavedState:
         # Bullet's joint motors are no part of its states. The arms' are set in each tick.
         lab.robot.simulated.drive_again()
         return True
+
+    def _forget_contacts(self):
+        """The next step finds all contacts again.
+
+        Bullet keeps the points of contact that are there when a state returns, and its states have one patch of points
+        for two bodies; where several parts of one lie on the other there are more. So what follows a return would
+        depend on what was before.
+        """
+        for model, *_ in self._models.values():
+            if model.joint_names or not model.static:
+                for name, link in model.merged.links.items():
+                    if link.collisions:
+                        model.renew_contacts(name)
 
     def forget(self) -> None:
         """Free Bullet's copy."""

@@ -27,10 +27,10 @@ CONTROLS = {"joint_delta": 7, "joint_pos": 7, "osc_pose": 6}
 
 
 class ArmControl:
-    """One arm: `arm`, by `control`, one of CONTROLS."""
+    """One arm: `arm`, by `control`, one of CONTROLS. Without a gripper the last number of its actions does nothing."""
 
-    def __init__(self, arm: Arm, control: str):
-        self._arm, self._control = arm, control
+    def __init__(self, arm: Arm, control: str, has_gripper: bool = True):
+        self._arm, self._control, self._has_gripper = arm, control, has_gripper
         self.reset()
 
     def reset(self) -> None:
@@ -43,7 +43,7 @@ class ArmControl:
         wanted = self._wanted(action[:-1])
         self.target = np.clip(wanted, self._arm.chain.lower, self._arm.chain.upper)
         closes = action[-1] > 0.0
-        if closes is not self._closes and abs(action[-1]) > _STILL:
+        if self._has_gripper and closes is not self._closes and abs(action[-1]) > _STILL:
             self._arm.gripper.command("grip" if closes else "release")
             self._closes = closes
 

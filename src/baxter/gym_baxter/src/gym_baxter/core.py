@@ -59,10 +59,13 @@ class Core:
         self._stream_ticks = max(round(STREAM_S / choices.physics_step_s), 1)
         self.action_size = action_size(choices.control)  # before a world is made, as all refusals
         self.sides = SIDES[::-1] if choices.robosuite_order else SIDES
-        self.lab = Lab(choices.options, time_step_s=choices.physics_step_s)
+        options = TASKS[task].robot(choices.options)
+        self.lab = Lab(options, time_step_s=choices.physics_step_s)
         self.task = TASKS[task](self.lab)
         self._start_robot()
-        self._controls = [ArmControl(self.lab.robot.arms[side], choices.control) for side in self.sides]
+        self._controls = [ArmControl(self.lab.robot.arms[side], choices.control,
+                                     has_gripper=getattr(options, "%s_gripper" % side) != "none")
+                          for side in self.sides]
         self._start = self.lab.save()
 
     def _start_robot(self):
@@ -151,6 +154,6 @@ def _ticks(choices):
     rate, step = choices.control_freq, choices.physics_step_s
     ticks = 1.0 / (step * rate) if rate > 0 and step > 0 else 0.0
     if not 0.999 < ticks < math.inf or abs(ticks - round(ticks)) > 1e-6:
-        raise ValueError("control_freq is %r Hz with physics_step_s %r s; 1 / (control_freq * physics_step_s) must be a "
-                         "whole number" % (rate, step))
+        raise ValueError("control_freq is %r Hz with physics_step_s %r s; 1 / (control_freq * physics_step_s) must be "
+                         "a whole number" % (rate, step))
     return round(ticks)

@@ -66,6 +66,8 @@ def test_a_saved_state_goes_on_to_the_bit(made, task):
     state, found = core.save(), []
     for _ in range(2):
         found.append([core.step(action).observation["state"] for action in actions])
+        for _ in range(8):  # somewhere else, with other contacts
+            core.step(-actions[0])
         core.restore(state)
     np.testing.assert_array_equal(*found)
 
@@ -127,3 +129,45 @@ def test_an_action_of_another_size_is_refused(made):
             core.step(action)
     assert {control: action_size(control) for control in CONTROLS} == {
         "joint_delta": 16, "joint_pos": 16, "osc_pose": 14}
+
+
+def test_an_open_drawer_is_success(made):
+    core = made("Drawer")
+    core.reset(np.random.default_rng(0))
+    task, before = core.task, core.task.handle()
+    assert not task.succeeded() and task.reward() < 0.25
+    task.cabinet.model.set_joint_positions(task._joint, np.array([0.16]))
+    assert task.succeeded() and task.reward() > 0.75
+    assert np.linalg.norm(task.handle() - before) == pytest.approx(0.16, abs=1e-3)
+
+
+def test_the_peg_fits_as_in_robosuite(made):
+    """Figures of robosuite 1.5.2 without noise of the start, for a peg with a radius of 22.5 mm."""
+    core = made("TwoArmPegInHole")
+    core.reset(np.random.default_rng(0))
+    task = core.task
+    assert task._fit(*task._frames()) == pytest.approx((0.268690, 0.217048, 0.899488), abs=1e-5)
+    assert task.reward() == pytest.approx(0.620904, abs=1e-5)
+    for name, frames in (("in the hole", [np.eye(4), np.eye(4)]), ("before it", [np.eye(4), np.eye(4)])):
+        frames[1][:3, 3] = (0.1, 0.0, -0.1 if name == "in the hole" else -0.2)
+        assert task._is_in(*task._fit(*frames)) == (name == "in the hole")
+
+
+def test_the_tools_of_the_peg_weigh_and_touch(made):
+    model = made("TwoArmPegInHole").lab.robot.simulated.model
+    masses = {side: model.merged.links[model.merged.frames[tool].link].inertial.mass
+              for side, tool in (("left", "plate"), ("right", "peg"))}
+    assert masses["left"] - masses["right"] == pytest.approx(2.112 - 0.4135, abs=1e-3)
+
+
+def test_things_in_their_bins_are_success(made):
+    core = made("TwoArmTransport")
+    core.reset(np.random.default_rng(0))
+    task = core.task
+    for thing, name in ((task.trash, "trash_bin"), (task.hammer, "target_bin")):
+        assert not task.succeeded()
+        x, y, _ = task.bins[name].position
+        thing.put((x, y, TABLE_TOP_M + 0.05))
+        for _ in range(10):
+            core.step(np.zeros(core.action_size))
+    assert task.succeeded() and task.reward() == 1.0
