@@ -71,15 +71,15 @@ def observed(core: Core) -> dict[str, np.ndarray]:
 
 
 class Disturbance:
-    """Adds to the motions of actions, not to grippers, what an expert has to correct: smooth, in half of the time,
+    """Adds to the motions of `sides`, not to grippers, what an expert has to correct: smooth, in half of the time,
     and of another size in each episode, at most `level`, 0 to 1."""
 
-    def __init__(self, core: Core, seed: int, level: float):
+    def __init__(self, core: Core, sides: tuple[str, ...], seed: int, level: float):
         self._random = np.random.default_rng((seed, 1))
         names = [name for name, _ in action_names(core.choices.control, core.sides)]
-        sizes = [0.0 if "gripper" in name else _TURN_NOISE if name[-2:] in ("rx", "ry", "rz") else _NOISE
-                 for name in names]
-        self._sizes = level * self._random.uniform() * np.array(sizes)
+        sizes = [_TURN_NOISE if name[-2:] in ("rx", "ry", "rz") else _NOISE for name in names]
+        moved = [name.startswith(sides) and "gripper" not in name for name in names]
+        self._sizes = level * self._random.uniform() * np.array(sizes) * moved
         self._now, self._count, self._is_on = np.zeros(len(names)), 0, False
 
     def on(self, action: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any 
     sink: gets each frame as well, `SetWriter.frame` for pictures."""
     core.reset(np.random.default_rng(seed))
     expert.begin()
-    disturbance = Disturbance(core, seed, noise)
+    disturbance = Disturbance(core, expert.MOVED, seed, noise)
     rows: dict[str, list] = {}
     stepped = None
     for _ in range(min(core.steps, MAX_STEPS)):

@@ -19,6 +19,7 @@ from gym_baxter.core import Core
 #: The control that experts steer by.
 CONTROL = "osc_pose"
 OPEN, CLOSED = -1.0, 1.0
+_STAYS = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, OPEN))
 #: Share of the remaining way of one action; drives follow with some lag, and more overshoots.
 _GAIN = 0.35
 #: Most of one action [m], [rad].
@@ -86,6 +87,7 @@ class Expert:
     """Base of all experts. core: of the task, by CONTROL. `act` returns the action for the present state."""
 
     TASK = ""
+    MOVED: tuple[str, ...] = SIDES  # arms that have something to do; the others get no action, and no disturbance
 
     def __init__(self, core: Core):
         if core.choices.control != CONTROL:
@@ -99,15 +101,12 @@ class Expert:
     def act(self) -> np.ndarray:
         """(14,) the action for the present state."""
         hands = self.hands()
-        return np.concatenate([self._action(self.arms[side], hands.get(side) or self._at_rest(side))
+        return np.concatenate([self._action(self.arms[side], hands[side]) if side in hands else _STAYS
                                for side in self.core.sides])
 
     def hands(self) -> dict[str, Hand]:
-        """{side: where it should go now}; a hand without a place stays."""
+        """{side: where it should go now} of the arms in MOVED."""
         raise NotImplementedError
-
-    def _at_rest(self, side):
-        return Hand(self._rest[side][:3, 3], self._rest[side][:3, :3], OPEN)
 
     @staticmethod
     def _action(arm: Arm, hand: Hand):
@@ -133,7 +132,7 @@ class Expert:
 class ReachExpert(Expert):
     """The hand goes to the point."""
 
-    TASK = "Reach"
+    TASK, MOVED = "Reach", ("left",)
 
     def hands(self):
         """The left hand at the goal."""
@@ -143,7 +142,7 @@ class ReachExpert(Expert):
 class PickPlaceExpert(Expert):
     """Down onto the block, and over the mark."""
 
-    TASK = "PickPlace"
+    TASK, MOVED = "PickPlace", ("left",)
 
     def hands(self):
         """The left hand at the block, or with it at the mark."""
