@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,9 +13,6 @@ from sensor_renderer.best import best_renderer
 from sensor_renderer.following import WorldFollower
 from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import extent, looking_at, overview
-
-if TYPE_CHECKING:
-    pass
 
 FIELD_OF_VIEW_RAD = 0.75
 # Axes x, y, z as everywhere in ROS [red, green, blue].

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xmlrpc.client import Error
 
 import rosgraph.network
@@ -18,9 +18,6 @@ import master_calls
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType
 from web_bridge.foxglove.catalogue import GraphState
 from web_bridge.ros_graph import PROBE, RosGraph, address_of, handshake, message_class, service_class
-
-if TYPE_CHECKING:
-    pass
 
 #: Connecting to a publisher for its definition [s].
 _PROBE_S = 2.0
