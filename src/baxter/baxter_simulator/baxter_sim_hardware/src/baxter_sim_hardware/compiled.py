@@ -32,7 +32,7 @@ def load():
     parser = CommandParser(limits, limits.names)
     for mode in Mode:
         command = parser.parse(mode, limits.names, [0.0])
-    speeds = Speeds(bound, 1.0)
+    speeds = Speeds(bound, 1.0, bound)
     shares_in_step(command.index, command.values, points.position, speeds.numbers, 1.0)
     cruising_speeds(speeds.numbers, np.zeros(1, dtype=int), points.braking, here, points.speed)
 

@@ -81,9 +81,12 @@ def positive(rows, number, name):
 
 
 def per_joint(rows, number, names):
-    """(n,) the value of `number` for the joints `names`, such as left_s0. Raises HardwareError for what is missing."""
+    """(n,) the value of `number` for the joints `names`, such as left_s0: that of the joint itself, or else that of s0.
+
+    Raises HardwareError for what is missing.
+    """
     values = row(rows, number)
     try:
-        return np.array([values[name.rsplit("_", 1)[1]] for name in names], dtype=float)
+        return np.array([values[name if name in values else name.rsplit("_", 1)[1]] for name in names], dtype=float)
     except (KeyError, IndexError) as error:
         raise HardwareError("'%s' has no value for joint %s" % (number, error)) from None

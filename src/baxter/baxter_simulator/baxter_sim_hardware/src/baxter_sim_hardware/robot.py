@@ -7,7 +7,6 @@ import numpy as np
 
 from .arms.actuators import Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
-from .arms.effort_bounds import REACH_RAD
 from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
 
@@ -44,9 +43,8 @@ class Baxter:
         self.measured, self.actuators, self._dt = measured, actuators, dt
         # Angles, speeds, and inertias about their joints, of the links.
         self._links, self._inertia_due = np.zeros((3, len(measured.position))), 0
-        # Behind actuators the set-points run ahead, and these bring a joint back that was pushed.
         self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt,
-                         reach_rad=REACH_RAD if actuators is None else math.inf)
+                         free_speed=None if actuators is None else actuators.free_speed)
         self.arms.stop()
         self._sinks = disabled == "sink"
         self._speed_ratio = SPEED_RATIO[profile]

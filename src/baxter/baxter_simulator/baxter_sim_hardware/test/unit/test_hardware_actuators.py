@@ -120,6 +120,59 @@ def test_no_drive_exerts_more_than_its_limit(lagging):
     assert (most < 1.5 * limit).all(), most / limit
 
 
+def lift(seconds, from_rad=0.0, to_rad=-1.2, speed=2.0):
+    """Set-points of s1 at 100 Hz that rise from rest to `speed` at once, as in the recording, and end at once."""
+    return np.maximum(from_rad - speed * 0.01 * np.arange(1, round(seconds / 0.01) + 1), to_rad)
+
+
+def test_both_arms_are_lifted_at_two_radians_a_second_as_far_behind_as_at_one(lagging):
+    """Neither the description's 1.5 rad/s nor a bound of torque holds a raw set-point back that the robot follows."""
+    late = {}
+    for speed in (1.0, 2.0):
+        lab, start = lagging(), STRETCHED.copy()
+        start[[S1, 7 + S1]] = 0.0
+        lab.command(POSITION, start)
+        lab.run(4.0)
+        behind, fastest = [], 0.0
+        targets = lift(1.2 / speed + 0.8, speed=speed)
+        for target in targets:
+            start[[S1, 7 + S1]] = target
+            lab.command(RAW, start)
+            lab.run(0.01)
+            behind.append(lab.position[[S1, 7 + S1]])
+            fastest = max(fastest, -lab.velocity[S1])
+        behind = np.array(behind)
+        late[speed] = [0.01 * (np.argmax(arm < -0.8) - np.argmax(targets < -0.8)) for arm in behind.T]
+        assert 0.9 * speed < fastest < 1.6 * speed
+        assert behind.min() > -1.4
+    assert np.abs(np.subtract(late[2.0], late[1.0])).max() < 0.06, late
+    assert 0.15 < np.min(list(late.values())) and np.max(list(late.values())) < 0.26, late
+
+
+def test_no_motor_goes_on_pushing_beyond_its_free_speed(lagging):
+    """A raw set-point that jumps is followed as fast as motors turn, and no faster."""
+    lab = lagging()
+    lab.command(RAW, STRETCHED + np.tile([0.0, -1.5, 0.0, 2.0, 0.0, 0.0, 2.5], 2))
+    _, velocity, _ = lab.record(0.19)
+    assert (np.abs(velocity).max(axis=0) < 1.1 * lab.plugin._baxter.actuators.free_speed).all()
+
+
+def test_a_spring_that_is_stronger_than_known_lifts_an_arm_that_moves(lagging):
+    """At rest the integral has what the controller does not know of it; elsewhere that is too much or too little."""
+    lab = lagging()
+    rows = effects.read(effects.physical_robot())["lag"]
+    rows["counterbalance_excess"] = {**rows["counterbalance_excess"], "s1": 0.3, "right_s1": 0.0}
+    actuators = lab.plugin._baxter.actuators = Actuators(rows, NAMES)
+    lab.run(0.5)
+    assert np.abs(lab.position - STRETCHED).max() < 0.002
+    extra = actuators.counterbalance(lab.position) - actuators.known_counterbalance(lab.position)
+    assert extra[S1] == pytest.approx(0.3 * (37.3 - 2.43), abs=0.1) and abs(extra[7 + S1]) < 1e-9
+    lab.command(POSITION, STRETCHED + np.tile([0.0, -0.9, 0.0, 0.0, 0.0, 0.0, 0.0], 2))
+    lab.run(1.6)
+    # There the spring carries 6.5 Nm less of that.
+    assert lab.position[S1] > lab.position[7 + S1] + 0.01
+
+
 @pytest.mark.parametrize("mode", [TORQUE, VELOCITY])
 def test_changing_the_mode_does_not_jump(lagging, mode):
     lab = lagging()

@@ -52,7 +52,7 @@ def test_brakes_to_its_stopping_point_in_one_go():
 def fast_points(count):
     """Set-points at zero that may go anywhere in a tick."""
     points = SetPoints(count)
-    points.speed[:] = points.acceleration[:] = points.stopping[:] = 1e9
+    points.speed[:] = points.acceleration[:] = points.stopping[:] = points.stream_acceleration[:] = 1e9
     return points
 
 

@@ -5,10 +5,14 @@ Each joint is a series elastic actuator. Its controller sees the motor, not the 
 
     motor:  J w' = clip(T, limit) - spring - Coulomb friction,   T = ff + kp (r - m) + I - kd (w - w_ff)
     spring: k (m - q) + d (w - v), which is what drives the link beside its counterbalance
+    limit = the torque limit; beyond the motor's speed W it falls, to 0 at 1.5 W, for torque in the direction of motion
     r = filtered set-point + ff / k, ff = torque that balances gravity, as far as the controller knows it
 
 m, w: angle and speed of the motor, seen at the joint; q, v: of the link. So a load that the controller does not know
 bends the spring for good, and the error of the motor itself goes away by I, which acts at rest only.
+
+The counterbalance may be stronger than the controller knows, by a share of itself (`counterbalance_excess`). How far that
+bends the spring is measured, so an arm at rest is where it should be; the torque has to come from I, which is late.
 
 Effort is told from how far the spring is bent, with hysteresis: after a way of some `hysteresis_way` in one direction
 all of `effort_hysteresis` is added to it, in that direction.
@@ -32,9 +36,13 @@ PARTS = 4
 REST_SPEED = 0.03
 NUMBERS = ("spring_stiffness", "spring_damping", "motor_inertia", "proportional_gain", "motor_damping", "friction",
            "set_point_filter", "position_mode_filter", "integral_rate", "integral_deadband", "torque_limit",
-           "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis", "hysteresis_way")
-_LIMIT, _OFFSET, _STIFFNESS, _HYSTERESIS = (NUMBERS.index(name) for name in (
-    "torque_limit", "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis"))
+           "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis", "hysteresis_way", "motor_speed",
+           "counterbalance_excess")
+_LIMIT, _OFFSET, _STIFFNESS, _HYSTERESIS, _SPEED, _EXCESS = (NUMBERS.index(name) for name in (
+    "torque_limit", "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis", "motor_speed",
+    "counterbalance_excess"))
+# Without load a motor turns faster than with its full torque, by this factor.
+FREE_SPEED = 1.5
 
 
 class Wanted(NamedTuple):
@@ -61,7 +69,7 @@ class Actuators:
 
     def __init__(self, rows, names):
         self._numbers = np.array([effects.per_joint(rows, number, names) for number in NUMBERS])
-        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6)):
+        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6), ("motor_speed", 0.1)):
             values = self._numbers[NUMBERS.index(number)]
             if values.min() < least:
                 raise effects.HardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))
@@ -85,12 +93,16 @@ class Actuators:
         """(n,) [Nm] what drives the links in this tick, the counterbalance among it; 0 for joints that are not driven.
 
         links: (3, n), their angles [rad], speeds [rad/s], and inertias about their joints, at least [kg m^2]; dt [s]. A
-        joint that was not driven begins with its spring in balance with the known load.
+        joint that was not driven begins with its spring in balance with the known load and the counterbalance.
         """
-        return _turn(self._state, self._begun, self._numbers, wanted, links, dt)
+        return turn(self._state, self._begun, self._numbers, wanted, links, dt)
 
     def counterbalance(self, position):
         """(n,) [Nm] what springs beside the actuators take off them at `position` (n,) [rad]."""
+        return self.known_counterbalance(position) * (1.0 + self._numbers[_EXCESS])
+
+    def known_counterbalance(self, position):
+        """(n,) [Nm] the same as the controllers know it."""
         return self._numbers[_OFFSET] + self._numbers[_STIFFNESS] * position
 
     def bounded(self, torque, position, joints):
@@ -98,6 +110,11 @@ class Actuators:
         position (n,) [rad]."""
         carried, limit = self.counterbalance(position)[joints], self._numbers[_LIMIT][joints]
         return np.minimum(np.maximum(torque, -limit - carried), limit - carried)
+
+    @property
+    def free_speed(self):
+        """(n,) [rad/s] of motors without load."""
+        return FREE_SPEED * self._numbers[_SPEED]
 
     @property
     def hysteresis_share(self):
@@ -117,7 +134,7 @@ class Actuators:
 
 
 @_compiled
-def _turn(state, begun, numbers, wanted, links, dt):
+def turn(state, begun, numbers, wanted, links, dt):
     motor, speed, filtered, integral, last = state[0], state[1], state[2], state[3], state[4]
     torques = np.zeros(links.shape[1])
     share, added = state[5], state[6]
@@ -131,14 +148,17 @@ def _turn(state, begun, numbers, wanted, links, dt):
         stiffness, damping, inertia, gain, motor_damping, friction = (
             numbers[0, j], numbers[1, j], numbers[2, j], numbers[3, j], numbers[4, j], numbers[5, j])
         q, v, target, pace = links[0, j], links[1, j], wanted.position[j], wanted.velocity[j]
-        balance = numbers[11, j] + numbers[12, j] * q
-        known = wanted.known_load[j] + balance
+        known = wanted.known_load[j] + numbers[11, j] + numbers[12, j] * q
+        excess = (numbers[11, j] + numbers[12, j] * q) * numbers[16, j]
+        balance = numbers[11, j] + numbers[12, j] * q + excess
         if not begun[j]:
             begun[j] = True
-            motor[j], speed[j], filtered[j], integral[j], last[j] = q + known / stiffness, v, q, 0.0, target
+            # It was at rest there: the integral has what the controller does not know of the counterbalance.
+            integral[j] = excess
+            motor[j], speed[j], filtered[j], last[j] = q + (known + excess) / stiffness, v, q, target
         lag = numbers[6, j] + (numbers[7, j] if wanted.in_position_mode[j] else 0.0)
         filtered[j] += (target - filtered[j]) * (1.0 - math.exp(-dt / lag) if lag > 0.0 else 1.0)
-        reference = filtered[j] + pace * lag + known / stiffness
+        reference = filtered[j] + pace * lag + (known + excess) / stiffness
         rests = abs(target - last[j]) < REST_SPEED * dt
         last[j] = target
         limit = min(numbers[10, j], wanted.effort[j])
@@ -146,10 +166,12 @@ def _turn(state, begun, numbers, wanted, links, dt):
         total = 0.0
         for _ in range(PARTS):
             ahead = stiffness * (motor[j] - q - dt * v) + damping * (speed[j] - v)
-            spring = (ahead + yields * known) / (1.0 + yields)
+            spring = (ahead + yields * (known + excess)) / (1.0 + yields)
             error = reference - motor[j]
             asked = known + gain * error + integral[j] - motor_damping * (speed[j] - pace)
-            torque = min(max(asked, -limit), limit)
+            ahead_of_free = (FREE_SPEED * numbers[15, j] - abs(speed[j])) / ((FREE_SPEED - 1.0) * numbers[15, j])
+            driving = limit * min(max(ahead_of_free, 0.0), 1.0)
+            torque = min(max(asked, -driving if speed[j] < 0.0 else -limit), driving if speed[j] > 0.0 else limit)
             if rests and torque == asked and abs(speed[j]) < REST_SPEED and abs(error) > numbers[9, j]:
                 integral[j] += numbers[8, j] * gain * error * part
             free = speed[j] + part * (torque - spring) / inertia

@@ -8,7 +8,8 @@ Each tick turns new commands and the measured joint state into set-points of the
   tuck_arms needs this: it ends as soon as the shoulder is folded, and the elbow must have arrived by then.
 - VELOCITY is the same profile towards the joint limit ahead, cruising at the commanded speed; so it brakes in time.
 - RAW_POSITION follows a stream of set-points directly, without smoothing, braking at its end or a speed ratio:
-  set-points are passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
+  set-points are passed on, bounded by the velocity limit and by the acceleration that ideal drives can follow. Behind
+  a physical robot's actuators the motors are the bound; set-points go no faster than a motor turns without load.
 - TORQUE adds the command to the torque that balances gravity.
 
 In every mode, and in a stop, the effort of a drive stays within the model's limit, including the part that carries the
@@ -21,6 +22,8 @@ other joints continue with their last command; a command in another mode makes t
 A set-point never runs away from its joint: while a joint is pushed or blocked, its set-point stays near, so the arm
 returns at the speed of its mode, without a jump.
 """
+import math
+
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
@@ -54,6 +57,7 @@ ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1"
 STOP_ACCELERATION_FACTOR = 3.0
 MIN_STOP_FACTOR, MAX_STOP_FACTOR = 0.1, 16.0
 
+UNBOUNDED = 1e9  # [rad/s^2] acceleration of a stream of raw set-points before actuators: they pass in a tick
 MIN_SHARE = 0.05  # of its speed that a joint keeps that moves in step with others; so it returns when pushed away
 SMOOTHING_S = 0.02  # see setpoint.MovingAverage
 AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
@@ -81,12 +85,16 @@ class Arms:
 
     limbs: sequence of baxter_model.description.LimbModel; limits: JointLimits of all their joints, which fixes the
     order of every array here; measured: `Measured`, which the caller renews before each tick; speed_ratio: 0..1 at
-    start; dt: length of a tick [s]; reach_rad: by how much a set-point may lead its joint.
+    start; dt: length of a tick [s]; free_speed: (n,) [rad/s] of the motors of a physical robot's actuators without
+    load, or None for ideal drives, which a set-point leads by REACH_RAD at most.
     """
 
-    def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002, reach_rad=REACH_RAD):
+    def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002, free_speed=None):
         self.limits = limits
-        self._measured, self._reach_rad = measured, reach_rad
+        is_ideal = free_speed is None
+        stream_speed = limits.velocity if is_ideal else free_speed
+        # Behind actuators the set-points run ahead, and these bring a joint back that was pushed.
+        self._measured, self._reach_rad = measured, REACH_RAD if is_ideal else math.inf
         self._limbs = {limb.side: _Limb(limb, limits) for limb in limbs}
         self._dt = dt
         count = len(limits.names)
@@ -94,10 +102,11 @@ class Arms:
         points = self._points = SetPoints(count)
         points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
         points.stopping[:] = points.acceleration
-        self._speeds = Speeds(limits.velocity, speed_ratio)
+        points.stream_acceleration[:] = points.acceleration if is_ideal else UNBOUNDED
+        self._speeds = Speeds(limits.velocity, speed_ratio, stream_speed)
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), measured.position)
         self._modes = JointModes(count)
-        self._stream = RawStream(limits, dt)
+        self._stream = RawStream(limits, stream_speed, dt)
         self._efforts = EffortBounds(limits.effort)
         self._is_settled = False  # every set-point rests on its target, until the next command or push
         self.reset()

@@ -11,11 +11,11 @@ FEED_FORWARD_S = 0.05  # time that a feed-forward velocity belongs to the raw co
 class RawStream:
     """The times of the last raw set-points, and their velocities, for n joints.
 
-    limits: JointLimits; dt: length of a tick [s].
+    limits: JointLimits; speed: (n,) [rad/s] how fast set-points may go; dt: length of a tick [s].
     """
 
-    def __init__(self, limits, dt):
-        self._limits, self._dt = limits, dt
+    def __init__(self, limits, speed, dt):
+        self._limits, self._speed, self._dt = limits, speed, dt
         count = len(limits.names)
         # Of the newest command, and of the newest one at an earlier time.
         self._stamp, self._earlier = np.full(count, -np.inf), np.full(count, -np.inf)
@@ -27,8 +27,8 @@ class RawStream:
         self._stamp[:] = self._earlier[:] = self._velocity_stamp[:] = -np.inf
 
     def feed_forward(self, index, velocities, time_s):
-        """At time_s [s] the set-points of joints `index` move at velocities [rad/s], clipped to the limits."""
-        limit = self._limits.velocity[index]
+        """At time_s [s] the set-points of joints `index` move at velocities [rad/s], clipped to the bounds."""
+        limit = self._speed[index]
         self._velocity[index] = np.clip(velocities, -limit, limit)
         self._velocity_stamp[index] = time_s
 
@@ -46,7 +46,7 @@ class RawStream:
         gap = np.maximum(time_s - earlier, self._dt)
         goes_on = (mode[index] == RAW_POSITION) & (gap <= STREAM_GAP_S)
         points.target[index] = np.where(goes_on, points.target[index], command.values)
-        limit = self._limits.velocity[index]
+        limit = self._speed[index]
         # With a feed-forward velocity, the goal is the predicted next command.
         is_fresh = goes_on & (time_s - self._velocity_stamp[index] <= FEED_FORWARD_S)
         ahead = np.where(is_fresh, self._velocity[index] * np.minimum(gap, STREAM_GAP_S), 0.0)

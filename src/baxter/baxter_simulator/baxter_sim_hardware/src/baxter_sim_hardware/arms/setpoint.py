@@ -56,9 +56,9 @@ class SetPoints:
     """
 
     def __init__(self, count):
-        self.numbers, self.flags = np.zeros((11, count)), np.zeros((2, count), dtype=bool)
+        self.numbers, self.flags = np.zeros((12, count)), np.zeros((2, count), dtype=bool)
         (self.position, self.velocity, self.target, self.speed, self.acceleration, self.stopping, self.goal, self.pace,
-         self.output, self.output_rate, self.output_change) = self.numbers
+         self.output, self.output_rate, self.output_change, self.stream_acceleration) = self.numbers
         self.braking, self.streams = self.flags
 
 
@@ -74,9 +74,9 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
     Returns whether every set-point rests on its target; whether some were braking when the tick began; whether some are
     too far from their joints.
     """
-    position, velocity, target, speed, acceleration, stopping, goal, pace, output, output_rate, output_change = (
+    position, velocity, target, speed, acceleration, stopping, goal, pace, output, output_rate, output_change, hard = (
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
-        numbers[9], numbers[10])
+        numbers[9], numbers[10], numbers[11])
     braking, streams = flags[0], flags[1]
     rests, braked, leads = True, False, False
     for i in range(len(position)):
@@ -85,7 +85,7 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
             ahead = goal[i] - target[i]
             rate = math.copysign(min(abs(pace[i]), abs(ahead) / dt), ahead)
             offset, velocity[i] = _approach(
-                position[i] - target[i], velocity[i] - rate, 0.0, speed[i] - abs(rate), bound, dt)
+                position[i] - target[i], velocity[i] - rate, 0.0, speed[i] - abs(rate), hard[i], dt)
             target[i] += rate * dt
             position[i] = target[i] + offset
             velocity[i] += rate
@@ -136,13 +136,13 @@ class Speeds:
 
     limit: of the joints [rad/s]; share, ratio: of it, in position mode, which a joint needs to move in step with
     others, and which its limb may use; slowing: of its speed that collision avoidance leaves to its limb; nominal: its
-    speed if nothing slows the limb [rad/s].
+    speed if nothing slows the limb [rad/s]; stream: bound of a stream of raw set-points [rad/s].
     """
 
-    def __init__(self, limit, ratio):
-        self.numbers = np.ones((5, len(limit)))
-        self.limit, self.share, self.ratio, self.slowing, self.nominal = self.numbers
-        self.limit[:], self.ratio[:] = limit, ratio
+    def __init__(self, limit, ratio, stream):
+        self.numbers = np.ones((6, len(limit)))
+        self.limit, self.share, self.ratio, self.slowing, self.nominal, self.stream = self.numbers
+        self.limit[:], self.ratio[:], self.stream[:] = limit, ratio, stream
 
 
 @_compiled
@@ -170,13 +170,15 @@ def cruising_speeds(speeds, mode, braking, value, speed):
     mode: (n,) ints of `Mode`; braking: (n,) bool; value: (n,) [rad/s] commanded in velocity mode. Nothing slows a
     set-point in raw position mode or one that brakes.
     """
-    limit, share, ratio, slowing, nominal = speeds[0], speeds[1], speeds[2], speeds[3], speeds[4]
+    limit, share, ratio, slowing, nominal, stream = speeds[0], speeds[1], speeds[2], speeds[3], speeds[4], speeds[5]
     for i in range(len(limit)):
         nominal[i] = limit[i]
         if mode[i] == POSITION and not braking[i]:
             nominal[i] = share[i] * limit[i] * ratio[i]
         elif mode[i] == VELOCITY:
             nominal[i] = abs(value[i])
+        elif mode[i] == RAW_POSITION and not braking[i]:
+            nominal[i] = stream[i]
         speed[i] = nominal[i]
         if mode[i] != RAW_POSITION and not braking[i]:
             speed[i] *= slowing[i]
