@@ -2,29 +2,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gripper of every kind against the fake gripper, fault by fault."""
 import errno
+import functools
 import json
 import unittest
 from unittest import mock
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand
-from std_srvs.srv import Trigger
 
 from baxter_dataflow import wait_for
 from baxter_interface import CHECK_VERSION, Gripper, VersionMismatch
+from lab_testing import knobs
 
 DEADLINE_S = 5.0
 SUCTION, ELECTRIC, CUSTOM = 1, 2, 3
 
 
-def set_knobs(**knobs):
-    """Set the fake gripper's knobs, all others to their defaults; in force when this returns."""
-    if rospy.has_param("/fake_gripper"):
-        rospy.delete_param("/fake_gripper")
-    for name, value in knobs.items():
-        rospy.set_param("/fake_gripper/" + name, value)
-    rospy.wait_for_service("/fake_gripper/reload", DEADLINE_S)
-    rospy.ServiceProxy("/fake_gripper/reload", Trigger)()
+set_knobs = functools.partial(knobs.set_knobs, "/fake_gripper")
 
 
 def gripper_of(kind, **knobs):

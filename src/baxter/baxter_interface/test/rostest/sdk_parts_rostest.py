@@ -2,35 +2,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """DigitalIO, AnalogIO, Navigator and Head against the fake parts, fault by fault."""
 import errno
+import functools
 import time
 import unittest
 from unittest import mock
 
 import rospy
 from bullet_sim_msgs.srv import Press, PressRequest
-from std_srvs.srv import Trigger
 
 from baxter_dataflow import wait_for
 from baxter_interface import HEAD_PAN_ANGLE_TOLERANCE, AnalogIO, DigitalIO, Head, Navigator
+from lab_testing import knobs
 
 DEADLINE_S = 60.0
 
 
-def set_knobs(**knobs):
-    """Set the fake parts' knobs, all others to their defaults; in force when this returns."""
-    if rospy.has_param("/fake_parts"):
-        rospy.delete_param("/fake_parts")
-    for name, value in knobs.items():
-        rospy.set_param("/fake_parts/" + name, value)
-    rospy.wait_for_service("/fake_parts/reload", DEADLINE_S)
-    rospy.ServiceProxy("/fake_parts/reload", Trigger)()
+set_knobs = functools.partial(knobs.set_knobs, "/fake_parts")
 
 
 def enable_robot(enabled):
     """Enable or disable the fake robot; in force when this returns."""
     rospy.set_param("/fake_robot/enabled", enabled)
-    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
-    rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+    knobs.reload("/fake_robot")
 
 
 class Fingers:

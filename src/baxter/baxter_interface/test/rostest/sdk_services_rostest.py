@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """CameraController, RobustController and Limb.ik against the fake services, fault by fault."""
 import errno
+import functools
 import time
 import unittest
 
@@ -13,16 +14,13 @@ from geometry_msgs.msg import Pose, PoseStamped
 from baxter_dataflow import wait_for
 from baxter_interface import CameraController, Limb, NoIKSolution, RobustController
 from baxter_interface.services import call_service
+from lab_testing.knobs import set_only
 
 DEADLINE_S = 60.0
 
 
-def set_knobs(**knobs):
-    """Set the fake services' knobs, all others to their defaults; they are read at every request."""
-    if rospy.has_param("/fake_services"):
-        rospy.delete_param("/fake_services")
-    for name, value in knobs.items():
-        rospy.set_param("/fake_services/" + name, value)
+# They are read at every request.
+set_knobs = functools.partial(set_only, "/fake_services")
 
 
 class ServicesTest(unittest.TestCase):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """enable_robot.py as users call it: its output and its exit status."""
+import functools
 import os
 import pathlib
 import signal
@@ -8,8 +9,8 @@ import subprocess
 import unittest
 
 import rospy
-from std_srvs.srv import Trigger
 
+from lab_testing import knobs
 from lab_testing.waiting import stretched
 from processes.ports import free_port
 
@@ -23,13 +24,7 @@ def enable_robot(*options, **environment):
                           timeout=DEADLINE_S, env=dict(os.environ, **environment))
 
 
-def set_knobs(**knobs):
-    if rospy.has_param("/fake_robot"):
-        rospy.delete_param("/fake_robot")
-    for name, value in knobs.items():
-        rospy.set_param("/fake_robot/" + name, value)
-    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
-    rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+set_knobs = functools.partial(knobs.set_knobs, "/fake_robot")
 
 
 class EnableRobotTest(unittest.TestCase):

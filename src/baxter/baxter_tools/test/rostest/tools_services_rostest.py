@@ -7,21 +7,15 @@ import unittest
 import rospy
 from baxter_core_msgs.msg import AssemblyState
 from baxter_core_msgs.srv import OpenCamera
-from std_srvs.srv import Trigger
+
+from lab_testing.knobs import set_knobs, set_only
 
 DEADLINE_S = 60.0
 
 
-def set_knobs(node, **knobs):
-    if rospy.has_param(node):
-        rospy.delete_param(node)
-    for name, value in knobs.items():
-        rospy.set_param("%s/%s" % (node, name), value)
-
-
 class ToolsTest(unittest.TestCase):
     def setUp(self):
-        set_knobs("/fake_services")
+        set_only("/fake_services")
         rospy.set_param("/rethink/software_version", "1.2.0.57")
 
     def expect(self, command, status, *texts):
@@ -62,8 +56,6 @@ class ArmProcedureTest(ToolsTest):
 
     def set_gripper(self, **knobs):
         set_knobs("/fake_gripper", **knobs)
-        rospy.wait_for_service("/fake_gripper/reload", DEADLINE_S)
-        rospy.ServiceProxy("/fake_gripper/reload", Trigger)()
 
     def assert_disabled(self):
         self.assertFalse(rospy.wait_for_message("/robot/state", AssemblyState, DEADLINE_S).enabled)
@@ -74,7 +66,7 @@ class ArmProcedureTest(ToolsTest):
             self.assert_disabled()
 
     def test_failure_of_the_procedure(self):
-        set_knobs("/fake_services", procedure_fails=True)
+        set_only("/fake_services", procedure_fails=True)
         self.expect(["tare.py", "-l", "left"], 1, "/robustcontroller/left/Tare", "ARM_MOVED")
         self.assert_disabled()
 
