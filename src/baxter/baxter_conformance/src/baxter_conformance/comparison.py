@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compares each item of a physical robot's interface with the observed interface. No ROS needed."""
+from __future__ import annotations
+
 from collections import defaultdict
 from dataclasses import dataclass, field
 from enum import Enum
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
 
 from baxter_model.interface import group_of
 
 from .contents import wrong_with_message, wrong_with_parameter
+
+if TYPE_CHECKING:
+    from baxter_model.interface import Interface
 
 # A physical robot powers two of its three cameras; which ones are open is up to programs.
 ANY_OF = {"/cameras/right_hand_camera": "/cameras/*_camera"}
@@ -52,7 +58,7 @@ class Seen:
     heard: dict = field(default_factory=dict)
 
 
-def alternatives(name, topics):
+def alternatives(name: str, topics: dict[str, str]) -> list[str]:
     """The observed topics that count as `name`."""
     for fixed, pattern in ANY_OF.items():
         if name.startswith(fixed + "/"):
@@ -60,16 +66,16 @@ def alternatives(name, topics):
     return [name] if name in topics else []
 
 
-def may_be_silent(topic):
+def may_be_silent(topic: str) -> bool:
     """Whether a topic may have no messages."""
     return any(fnmatchcase(topic, pattern) for pattern in MAY_BE_SILENT)
 
 
-def compare(robot, seen):
+def compare(robot: Interface, seen: Seen) -> list[Finding]:
     """Return a Finding for each item of `robot` (baxter_model.interface.Interface); seen is a Seen."""
     findings = []
 
-    def add(group, name, kind, problem):
+    def add(group: str, name: str, kind: str | None, problem) -> None:
         verdict, reason = problem or (Verdict.MET, "")
         findings.append(Finding(group, name, verdict, robot.is_public(kind), reason))
 
@@ -87,7 +93,7 @@ def compare(robot, seen):
     return findings
 
 
-def _topic(name, kind, topics, nobody):
+def _topic(name: str, kind: str, topics: dict[str, str], nobody: str) -> Any:
     found = alternatives(name, topics)
     if not found:
         return Verdict.MISSING, nobody
@@ -97,7 +103,7 @@ def _topic(name, kind, topics, nobody):
     return None
 
 
-def _silence(name, seen):
+def _silence(name: str, seen: Seen) -> Any:
     if name not in seen.heard or may_be_silent(name):
         return None
     message = seen.heard[name]
@@ -107,7 +113,7 @@ def _silence(name, seen):
     return (Verdict.OTHER, wrong) if wrong else None
 
 
-def _service(name, kind, services):
+def _service(name: str, kind: str | None, services: dict[str, str]) -> tuple[Verdict, str] | None:
     if name not in services:
         return Verdict.MISSING, "not registered"
     if services[name] is None:
@@ -117,14 +123,14 @@ def _service(name, kind, services):
     return None
 
 
-def _parameter(name, kind, parameters):
+def _parameter(name: str, kind: str, parameters: dict[str, Any]) -> tuple[Verdict, str] | None:
     if name not in parameters:
         return Verdict.MISSING, "not set"
     wrong = wrong_with_parameter(name, kind, parameters[name])
     return (Verdict.OTHER, wrong) if wrong else None
 
 
-def scores(findings):
+def scores(findings: list[Finding]) -> Any:
     """Return {group: (met, all)} of the public items, in alphabetical order."""
     table = defaultdict(lambda: [0, 0])
     for one in findings:
@@ -134,13 +140,13 @@ def scores(findings):
     return {group: tuple(table[group]) for group in sorted(table)}
 
 
-def totals(findings, is_public):
+def totals(findings: list[Finding], is_public: bool) -> tuple[int, int]:
     """Return (met, all) of the public items, or of the others."""
     chosen = [one.verdict is Verdict.MET for one in findings if one.is_public == is_public]
     return sum(chosen), len(chosen)
 
 
-def report(findings):
+def report(findings: list[Finding]) -> list[str]:
     """The lines of the report: scores by group, missing and different items, the total score."""
     by_group = scores(findings)
     width = max(map(len, by_group))

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads a master: its tables, a message of each topic, tf. Looks only; it calls no service and publishes nothing."""
+from __future__ import annotations
+
 import http.client
 import time
 import xml.etree.ElementTree as ElementTree
 import xmlrpc.client
+from typing import TYPE_CHECKING, Any
 
 import rosgraph
 import roslib.message
@@ -13,13 +16,16 @@ from tf2_msgs.msg import TFMessage
 
 from .comparison import Seen, alternatives, may_be_silent
 
+if TYPE_CHECKING:
+    from baxter_model.interface import Interface
+
 BATCH = 40  # topics listened to at a time: a robot's nodes get no more new connections than that at once
 POLL_S = 0.02
 #: Errors of :func:`read` where the master, or a node that was just asked, is gone.
 NO_ANSWER = (rosgraph.MasterException, rospy.ROSException, OSError, xmlrpc.client.Error, http.client.HTTPException)
 
 
-def read(robot, timeout_s):
+def read(robot: Interface, timeout_s: float):
     """Return a Seen. robot: the Interface of which the topics are listened to. timeout_s: how long to wait for them.
 
     Call after rospy.init_node(). Raises one of NO_ANSWER where the master does not answer.
@@ -43,11 +49,11 @@ def read(robot, timeout_s):
     return seen
 
 
-def _with_types(table, types, own):
+def _with_types(table: Any, types, own):
     return {name: types.get(name, "") for name, nodes in table if set(nodes) - {own}}
 
 
-def _service_type(name):
+def _service_type(name: str):
     try:
         return rosservice.get_service_type(name)
     except (rosservice.ROSServiceException, OSError):
@@ -62,11 +68,11 @@ def _links(description):
         return ()
 
 
-def _frames(expected, timeout_s):
+def _frames(expected, timeout_s: float):
     """Names of the frames in tf; returns early when all the expected ones are there."""
     frames = set()
 
-    def collect(message):
+    def collect(message: Any) -> None:
         for transform in message.transforms:
             frames.update((transform.header.frame_id.lstrip("/"), transform.child_frame_id.lstrip("/")))
 
@@ -77,7 +83,7 @@ def _frames(expected, timeout_s):
     return frames
 
 
-def _listen(topics, timeout_s):
+def _listen(topics: dict[str, str], timeout_s: float):
     """{topic: newest message, or None}. topics: {name: type}; those of types that are not installed are left out."""
     heard = {}
     classes = {name: roslib.message.get_message_class(kind) for name, kind in topics.items()}
@@ -93,7 +99,7 @@ def _listen(topics, timeout_s):
     return heard
 
 
-def _wait(condition, timeout_s):
+def _wait(condition, timeout_s: float) -> None:
     """Wait by the wall clock: simulated time may stand still."""
     deadline = time.monotonic() + timeout_s
     while not condition() and time.monotonic() < deadline and not rospy.is_shutdown():

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Send goals to an action server and wait for its verdict."""
+from __future__ import annotations
+
 import errno
 
 import actionlib
@@ -22,7 +24,7 @@ class ActionClient:
     `hint` is the command that starts its server. Raises ProgramFailed if there is none.
     """
 
-    def __init__(self, name, kind, hint):
+    def __init__(self, name: str, kind, hint) -> None:
         self._name = name
         self._client = actionlib.SimpleActionClient(name, kind)
         startup.wait_for_start([])
@@ -32,15 +34,15 @@ class ActionClient:
             raise ProgramFailed("there is no action server for %s: start it with: %s"
                                 % (rospy.resolve_name(name), hint), errno.ETIMEDOUT)
 
-    def send(self, goal):
+    def send(self, goal) -> None:
         """Send a goal without waiting."""
         self._client.send_goal(goal)
 
-    def is_done(self):
+    def is_done(self) -> bool:
         """Tell whether the last goal has its verdict."""
         return self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE)
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float):
         """Wait for the last goal's verdict, `timeout_s` [ROS time] at most, and return its result.
 
         A goal without verdict by then is cancelled. Raises ProgramFailed unless it succeeded.
@@ -59,7 +61,7 @@ class ActionClient:
             raise ProgramFailed("%s: %s: %s" % (self._name, _STATES.get(state, state), reason))
         return result
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Cancel the last goal if it has no verdict yet."""
         if not self.is_done():
             self._client.cancel_goal()

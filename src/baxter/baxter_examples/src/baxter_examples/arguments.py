@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Options that several examples have."""
+from __future__ import annotations
+
 import argparse
+from typing import Any
 
 import rospy
 
@@ -14,28 +17,28 @@ def new_parser(description):
                                    epilog="Exit status: 0 done, 1 failed, 2 wrong options, 130 after Ctrl-C.")
 
 
-def add_limb(parser, text="the arm"):
+def add_limb(parser, text: str = "the arm") -> None:
     """Add -l/--limb, required."""
     parser.add_argument("-l", "--limb", required=True, choices=SIDES, help=text)
 
 
-def add_joystick(parser):
+def add_joystick(parser) -> None:
     """Add -j/--joystick, required."""
     parser.add_argument("-j", "--joystick", required=True, choices=list(CONTROLLERS), help="the kind of joystick")
 
 
-def add_file(parser, text):
+def add_file(parser, text: str) -> None:
     """Add -f/--file, required."""
     parser.add_argument("-f", "--file", required=True, metavar="PATH", help=text)
 
 
-def add_component(parser, default):
+def add_component(parser, default) -> None:
     """Add -c/--component; see component()."""
     parser.add_argument("-c", "--component", default=default, help="channel's name (default: %(default)s); the "
                                                                    "parameter ~component_id overrides it")
 
 
-def component(arguments):
+def component(arguments: Any):
     """Return the channel that -c or the parameter ~component_id names; call it as an initialised node."""
     return rospy.get_param("~component_id", arguments.component)
 

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The buttons at an arm's cuff open and close its gripper; squeezing the cuff lights the arm's navigator."""
+from __future__ import annotations
+
 import queue
+from collections.abc import Callable
+from typing import Any
 
 from baxter_interface import DigitalIO, Navigator
 
@@ -14,7 +18,7 @@ class CuffControl:
     by default.
     """
 
-    def __init__(self, side, lights=True, say=lambda text: None, gripper=None):
+    def __init__(self, side: str, lights: bool = True, say=lambda text: None, gripper=None) -> None:
         self._side = side
         self._say = say
         # Callbacks only note: switching a light waits until it follows, which callbacks must not.
@@ -27,28 +31,28 @@ class CuffControl:
         self._close.state_changed.connect(self._on_close)
         self._cuff.state_changed.connect(self._on_cuff)
 
-    def work(self):
+    def work(self) -> None:
         """Execute the requests. Raises OSError if a light does not follow."""
         while not self._asked.empty():
             self._asked.get()()
 
-    def _on_open(self, pressed):
+    def _on_open(self, pressed) -> None:
         if pressed:
             self._command("open")
 
-    def _on_close(self, pressed):
+    def _on_close(self, pressed) -> None:
         if pressed:
             self._command("close")
 
-    def _command(self, action):
+    def _command(self, action: Callable[..., Any]) -> None:
         self._say("%s gripper: %s" % (self._side, action))
         if self._gripper:
             self._asked.put(getattr(self._gripper, action))
 
-    def _on_cuff(self, squeezed):
+    def _on_cuff(self, squeezed) -> None:
         self._say("%s cuff: %s" % (self._side, "squeezed" if squeezed else "let go"))
         if self._navigator:
             self._asked.put(lambda: self._light(squeezed))
 
-    def _light(self, on):
+    def _light(self, on) -> None:
         self._navigator.inner_led = self._navigator.outer_led = on

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Move single joints by small steps."""
+from __future__ import annotations
+
 from baxter_interface import Limb
 from baxter_model import SIDES
 
@@ -9,13 +11,13 @@ STEP_RAD = 0.1
 class Jogging:
     """Both arms, joint by joint."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._limbs = {side: Limb(side) for side in SIDES}
         # Steps add to the last command, not to the measured angle: the arm is still moving, and quick keys would be
         # lost.
         self._targets = {}
 
-    def step(self, side, joint, step_rad):
+    def step(self, side: str, joint: str, step_rad) -> None:
         """Move the joint (short name, such as "s0") by `step_rad`."""
         limb, name = self._limbs[side], "%s_%s" % (side, joint)
         here = limb.joint_angle(name)

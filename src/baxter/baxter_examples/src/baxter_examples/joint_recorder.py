@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write both arms' joint angles and grippers to a file while they move."""
+from __future__ import annotations
+
 import rospy
 
 from baxter_dataflow.ros_clock import RosClock
@@ -18,7 +20,7 @@ class JointRecorder:
     Raises as Limb; ValueError for a bad rate.
     """
 
-    def __init__(self, filename, rate):
+    def __init__(self, filename, rate) -> None:
         self._rate_hz = require_number(rate, "the rate [Hz]")
         if self._rate_hz <= 0.0:
             raise ValueError("the rate [Hz] must be above 0, got %r" % rate)
@@ -27,7 +29,7 @@ class JointRecorder:
         self._limbs = {side: Limb(side) for side in SIDES}
         self.grippers = mounted_grippers(SIDES)
 
-    def stop(self):
+    def stop(self) -> None:
         """End the recording."""
         self._done = True
 
@@ -37,7 +39,7 @@ class JointRecorder:
             self.stop()
         return self._done
 
-    def record(self, beats=None):
+    def record(self, beats=None) -> None:
         """Record until stop() or ROS's end. `beats`: an iterator to keep time by, ending the recording when it ends.
 
         Raises OSError if the file cannot be written.
@@ -59,7 +61,7 @@ class JointRecorder:
                 elif next(beats, self) is self:
                     return
 
-    def _row(self, time_s):
+    def _row(self, time_s: float):
         row = [time_s]
         for side, limb in self._limbs.items():
             angles = limb.joint_angles()

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Steer the robot with a joystick until Ctrl-C."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
 from .key_table import KeyTable
 
 RATE_HZ = 100.0
@@ -11,18 +16,18 @@ HELP_BUTTONS = ("function1", "function2")
 class JoystickTable:
     """The actions of the controls of `joystick`; `title` goes above their list."""
 
-    def __init__(self, title, joystick):
+    def __init__(self, title: str, joystick) -> None:
         self._joystick = joystick
         self._table = KeyTable(title)
         self._buttons, self._sticks = [], []
         self._turn = 0
 
-    def on_down(self, button, text, action, *arguments):
+    def on_down(self, button, text: str, action: Callable[..., Any], *arguments) -> None:
         """Call `action(*arguments)` when the button goes down."""
         self._table.add(button, text, action, *arguments)
         self._buttons.append(button)
 
-    def while_held(self, stick, text, action, step):
+    def while_held(self, stick, text: str, action: Callable[..., Any], step) -> None:
         """Call `action(step)`, or with -step, ten times a second while the stick is held to a side."""
         # In the table for its help only.
         self._table.add(stick, text, lambda: None)
@@ -32,7 +37,7 @@ class JoystickTable:
         """Return the list of controls as text."""
         return self._table.help()
 
-    def work(self):
+    def work(self) -> None:
         """Execute the controls' present actions; call it RATE_HZ times a second."""
         for button in (*self._buttons, *HELP_BUTTONS):
             if self._joystick.button_down(button):
@@ -45,7 +50,7 @@ class JoystickTable:
                     action(step if value > 0.0 else -step)
 
 
-def joystick_loop(table, robot):
+def joystick_loop(table: Any, robot) -> None:
     """Work on `table` (a JoystickTable) while `robot` (an EnabledRobot) is there. Raises RobotLost."""
     print("%s\n  %s: this help\n  Ctrl-C: quit" % (table.help(), ", ".join(HELP_BUTTONS)), flush=True)
     for _ in robot.beats(RATE_HZ):

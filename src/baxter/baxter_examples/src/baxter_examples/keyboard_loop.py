@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Steer the robot by keys until Esc or Ctrl-C."""
+from __future__ import annotations
+
+from typing import Any
+
 from baxter_external_devices.getch import CTRL_C, ESCAPE, Keyboard
 
 RATE_HZ = 100.0
 
 
-def keyboard_loop(table, robot):
+def keyboard_loop(table: Any, robot) -> None:
     """Press typed keys on `table` (a KeyTable) while `robot` (an EnabledRobot) is there. Raises RobotLost."""
     print(table.help() + "\n  Esc or Ctrl-C: quit", flush=True)
     with Keyboard() as keyboard:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grippers that this robot carries."""
+from __future__ import annotations
+
 import rospy
 
 from baxter_interface import CHECK_VERSION, Gripper
@@ -7,7 +9,7 @@ from baxter_interface.gripper_link import NoGripper
 from baxter_model import CUSTOM, ELECTRIC
 
 
-def mounted_grippers(sides, calibrate=False):
+def mounted_grippers(sides, calibrate: bool = False):
     """Return {side: Gripper} of the `sides` whose arm carries one that can be commanded; the log names the others.
 
     With `calibrate`, electric ones that are not calibrated yet are. Raises OSError.

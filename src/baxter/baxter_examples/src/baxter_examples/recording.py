@@ -3,15 +3,21 @@
 
 The first line names the columns: time [s], then for each side its joints [rad] and its gripper [%].
 """
+from __future__ import annotations
+
 import bisect
 import csv
 import io
 import math
+from typing import TYPE_CHECKING, Any, TextIO
 
 from baxter_interface.joint_checks import limb_joint_names
 from baxter_model import SIDES
 from command_line.options import counted
 from command_line.user_files import PIPE_WAIT_S, read_text
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: An hour of both arms at 100 Hz has a quarter of it.
 MAX_BYTES = 200_000_000
@@ -28,20 +34,20 @@ class Recording:
     Attributes: names: of the columns but time; times_s: rising; rows: dicts of name to value, one for each time.
     """
 
-    def __init__(self, names, times_s, rows):
+    def __init__(self, names: list[str], times_s: list[float], rows: list[dict[str, float]]) -> None:
         self.names, self.times_s, self.rows = names, times_s, rows
 
     @property
-    def duration_s(self):
+    def duration_s(self) -> float:
         """The last row's time [s]."""
         return self.times_s[-1]
 
-    def side(self, side):
+    def side(self, side: str) -> tuple[list[str], bool]:
         """Split off one side: (names of its joints, whether it has a gripper)."""
         joints = [name for name in self.names if name in limb_joint_names(side)]
         return joints, side + "_gripper" in self.names
 
-    def at(self, time_s):
+    def at(self, time_s: float) -> dict[str, float]:
         """Return the values at `time_s`, interpolated linearly between the rows; beyond the ends, those of the end
         rows."""
         after = bisect.bisect_right(self.times_s, time_s)
@@ -55,13 +61,13 @@ class Recording:
         return {name: before[name] + share * (behind[name] - before[name]) for name in self.names}
 
 
-def write_row(stream, values):
+def write_row(stream: TextIO, values: list[Any]) -> None:
     """Write one row of the file: the column names, or numbers."""
     csv.writer(stream, lineterminator="\n").writerow(
         ["%.6f" % value if isinstance(value, float) else value for value in values])
 
 
-def read(path):
+def read(path: str | Path) -> Recording:
     """Read a recording. Raises BadRecording, OSError."""
     try:
         text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
@@ -70,7 +76,7 @@ def read(path):
     return parse(io.StringIO(text, newline=""), path)
 
 
-def parse(stream, path):
+def parse(stream: TextIO, path: str) -> Recording:
     """The recording in a stream of lines; ``path`` names it in errors. Raises BadRecording."""
     try:
         lines = list(csv.reader(stream))

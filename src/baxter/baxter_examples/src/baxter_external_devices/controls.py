@@ -4,6 +4,8 @@
 Where the buttons and sticks are in a joy message differs between controllers; CONTROLLERS lists those we know, as their
 Linux drivers number them. For sticks, left and up are positive.
 """
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 
@@ -13,7 +15,7 @@ class Button:
 
     index: int
 
-    def read(self, axes, buttons):
+    def read(self, axes: list[float], buttons: list[int]) -> bool:
         return bool(buttons[self.index])
 
 
@@ -24,7 +26,7 @@ class AxisButton:
     index: int
     threshold: float
 
-    def read(self, axes, buttons):
+    def read(self, axes: list[float], buttons: list[int]) -> bool:
         value = axes[self.index]
         return value > self.threshold if self.threshold > 0.0 else value < self.threshold
 
@@ -35,7 +37,7 @@ class Stick:
 
     index: int
 
-    def read(self, axes, buttons):
+    def read(self, axes: list[float], buttons: list[int]):
         return axes[self.index]
 
 
@@ -47,16 +49,16 @@ class Controller:
     sticks: dict
 
 
-def _buttons(**indices):
+def _buttons(**indices: int) -> dict[str, Button]:
     return {name: Button(index) for name, index in indices.items()}
 
 
-def _sticks(left_horizontal, left_vertical, right_horizontal, right_vertical):
+def _sticks(left_horizontal: int, left_vertical: int, right_horizontal: int, right_vertical: int) -> dict[str, Stick]:
     return {"leftStickHorz": Stick(left_horizontal), "leftStickVert": Stick(left_vertical),
             "rightStickHorz": Stick(right_horizontal), "rightStickVert": Stick(right_vertical)}
 
 
-def _pad(horizontal, vertical):
+def _pad(horizontal: int, vertical: int) -> dict[str, AxisButton]:
     """A directional pad that reports as two axes."""
     return {"dPadUp": AxisButton(vertical, 0.5), "dPadDown": AxisButton(vertical, -0.5),
             "dPadLeft": AxisButton(horizontal, 0.5), "dPadRight": AxisButton(horizontal, -0.5)}
@@ -81,21 +83,21 @@ CONTROLLERS = {
 class ButtonEvents:
     """A button's state, and its changes since the last query."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.is_down = False
         self._went_down = self._went_up = False
 
-    def update(self, is_down):
+    def update(self, is_down: bool) -> None:
         self._went_down |= is_down and not self.is_down
         self._went_up |= self.is_down and not is_down
         self.is_down = is_down
 
-    def take_down(self):
+    def take_down(self) -> bool:
         """Tell whether it has gone down since the last call."""
         self._went_down, happened = False, self._went_down
         return happened
 
-    def take_up(self):
+    def take_up(self) -> bool:
         """Tell whether it has gone up since the last call."""
         self._went_up, happened = False, self._went_up
         return happened
@@ -104,15 +106,15 @@ class ButtonEvents:
 class StickEvents:
     """A stick's value = scale * raw + offset, 0 where the raw value is within `deadband`; and its moves."""
 
-    def __init__(self, scale, offset, deadband):
+    def __init__(self, scale: float, offset: float, deadband: float) -> None:
         self.value = 0.0
         self._scale, self._offset, self._deadband = scale, offset, deadband
         self._last = 0.0
 
-    def update(self, raw):
+    def update(self, raw: float) -> None:
         self.value = 0.0 if abs(raw) < self._deadband else self._scale * raw + self._offset
 
-    def take_move(self):
+    def take_move(self) -> float:
         """Return its signed movement since the last call."""
         self._last, before = self.value, self._last
         return self.value - before

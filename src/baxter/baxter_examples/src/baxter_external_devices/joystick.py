@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joysticks on the topic /joy (sensor_msgs/Joy)."""
+from __future__ import annotations
+
 import threading
+from typing import Any
 
 import rospy
 from sensor_msgs.msg import Joy
@@ -21,7 +24,7 @@ class Joystick:
 
     CONTROLLER = None
 
-    def __init__(self, scale=1.0, offset=0.0, deadband=0.1):
+    def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.1) -> None:
         if self.CONTROLLER is None:
             raise TypeError("a Joystick is one of XboxController, LogitechController and PS3Controller")
         self._lock = threading.Lock()
@@ -29,38 +32,38 @@ class Joystick:
         self._sticks = {name: StickEvents(scale, offset, deadband) for name in self.CONTROLLER.sticks}
         self._subscriber = rospy.Subscriber("/joy", Joy, self._on_joy, queue_size=10)
 
-    def button_down(self, name):
+    def button_down(self, name: str):
         """Tell whether the button has gone down since the last call."""
         with self._lock:
             return self._buttons[name].take_down()
 
-    def button_up(self, name):
+    def button_up(self, name: str):
         """Tell whether the button has gone up since the last call."""
         with self._lock:
             return self._buttons[name].take_up()
 
-    def stick_value(self, name):
+    def stick_value(self, name: str):
         """Return the stick's value."""
         with self._lock:
             return self._sticks[name].value
 
-    def stick_changed(self, name):
+    def stick_changed(self, name: str) -> bool:
         """Tell whether the stick has moved since the last call."""
         return self._move(name) != 0.0
 
-    def stick_inc(self, name):
+    def stick_inc(self, name: str) -> bool:
         """Tell whether the stick's value is greater than at the last call."""
         return self._move(name) > 0.0
 
-    def stick_dec(self, name):
+    def stick_dec(self, name: str) -> bool:
         """Tell whether the stick's value is less than at the last call."""
         return self._move(name) < 0.0
 
-    def _move(self, name):
+    def _move(self, name: str):
         with self._lock:
             return self._sticks[name].take_move()
 
-    def _on_joy(self, message):
+    def _on_joy(self, message: Any) -> None:
         with self._lock:
             try:
                 for controls, events in ((self.CONTROLLER.buttons, self._buttons),
@@ -79,7 +82,7 @@ class XboxController(Joystick):
 
     CONTROLLER = CONTROLLERS["xbox"]
 
-    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+    def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.5) -> None:
         super().__init__(scale, offset, deadband)
 
 
@@ -88,7 +91,7 @@ class LogitechController(Joystick):
 
     CONTROLLER = CONTROLLERS["logitech"]
 
-    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+    def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.5) -> None:
         super().__init__(scale, offset, deadband)
 
 
@@ -97,7 +100,7 @@ class PS3Controller(Joystick):
 
     CONTROLLER = CONTROLLERS["ps3"]
 
-    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+    def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.5) -> None:
         super().__init__(scale, offset, deadband)
 
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS time as a clock to wait on."""
+from __future__ import annotations
+
 import time
 
 import rosgraph
@@ -19,20 +21,20 @@ class RosClock:
     `gives_up()` is called several times a second and ends a sleep when it is true; by default at shutdown.
     """
 
-    def __init__(self, gives_up=rospy.is_shutdown):
+    def __init__(self, gives_up=rospy.is_shutdown) -> None:
         self._gives_up = gives_up
 
-    def now(self):
+    def now(self) -> float:
         """Read the time [s]; under simulated time 0 until the first /clock message.
 
         Raises rospy.ROSInitException before rospy.init_node.
         """
         return rospy.get_time()
 
-    def is_shutdown(self):
+    def is_shutdown(self) -> bool:
         return rospy.is_shutdown()
 
-    def sleep(self, duration_s):
+    def sleep(self, duration_s: float) -> None:
         """Sleep for `duration_s` of ROS time. Returns early when `gives_up()` is true; time that jumps back is not
         an error."""
         if rospy.rostime.is_wallclock():
@@ -51,7 +53,7 @@ class RosClock:
                 moved_at_s = time.monotonic()
 
 
-def _log_silence(time_s):
+def _log_silence(time_s: float) -> None:
     """Log that simulated time stands still at `time_s`; shut this node down if there is a new master.
 
     A node registers once; a restarted master does not know it, and would never connect it to anything.

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Signals, whose connections hold weak references to their slots."""
+from __future__ import annotations
+
 import threading
 import weakref
+from collections.abc import Callable
+from typing import Any
 
 
 class Signal:
@@ -11,24 +15,24 @@ class Signal:
     and a slot that has gone is skipped. (So keep a reference to a lambda, or it is dropped at once.)
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._references = []
         self._lock = threading.Lock()
 
-    def connect(self, slot):
+    def connect(self, slot: Callable[..., Any] | str) -> None:
         """Call `slot` from now on. Connecting it a second time changes nothing."""
         reference = _weak_reference(slot)
         with self._lock:
             if reference not in self._references:
                 self._references.append(reference)
 
-    def disconnect(self, slot):
+    def disconnect(self, slot: Callable[..., Any]) -> None:
         """Stop calling `slot`. It does no harm if it was not connected."""
         reference = _weak_reference(slot)
         with self._lock:
             self._references = [known for known in self._references if known != reference]
 
-    def __call__(self, *args, **kwargs):
+    def __call__(self, *args: int, **kwargs) -> None:
         """Call the slots in the order of their connection; errors of a slot reach the caller."""
         with self._lock:
             self._references = [reference for reference in self._references if reference() is not None]
@@ -40,7 +44,7 @@ class Signal:
                 slot(*args, **kwargs)
 
 
-def _weak_reference(slot):
+def _weak_reference(slot: Callable[..., Any] | str) -> weakref.ReferenceType | weakref.WeakMethod:
     if not callable(slot):
         raise TypeError("a slot is a function or a bound method, not %r" % (slot,))
     # A plain weak reference to a bound method would be dead at once: each access makes a new method object.

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wait until a condition holds."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
 from .ros_clock import RosClock
 from .waiting import wait_on
 
 
-def wait_for(test, timeout=1.0, raise_on_error=True, rate=100, timeout_msg="timeout expired", body=None):
+def wait_for(test: Any, timeout: float = 1.0, raise_on_error: bool = True, rate: int = 100,
+             timeout_msg: str = "timeout expired", body: Callable[[], Any] | None = None) -> bool:
     """Wait until `test()` is true, calling `body()` between the tries.
 
     `test` is checked first and `body` is called only after it failed: a condition that holds costs nothing and

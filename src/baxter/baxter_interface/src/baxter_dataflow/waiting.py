@@ -3,8 +3,12 @@
 
 A clock has `now()` [s], `sleep(duration_s)` and `is_shutdown()`.
 """
+from __future__ import annotations
+
 import errno
 import math
+from collections.abc import Callable
+from typing import Any
 
 
 class Stopwatch:
@@ -14,11 +18,11 @@ class Stopwatch:
     reset: neither step is time that passed, and neither is counted.
     """
 
-    def __init__(self, now_s):
+    def __init__(self, now_s: float) -> None:
         self._last_s = now_s
         self._elapsed_s = 0.0
 
-    def elapsed_s(self, now_s):
+    def elapsed_s(self, now_s: float) -> float:
         """Read the stopwatch at clock reading `now_s` [s]."""
         step_s = now_s - self._last_s
         if self._last_s > 0.0 and step_s > 0.0:
@@ -26,7 +30,7 @@ class Stopwatch:
         self._last_s = now_s
         return self._elapsed_s
 
-    def _counted_s(self, step_s):
+    def _counted_s(self, step_s: float) -> float:
         """How much of a step between two readings counts."""
         return step_s
 
@@ -42,11 +46,11 @@ class LoopStopwatch(Stopwatch):
     that is always slow keeps up with the clock.
     """
 
-    def __init__(self, now_s, period_s):
+    def __init__(self, now_s: float, period_s: float) -> None:
         super().__init__(now_s)
         self._period_s = self._usual_s = period_s
 
-    def _counted_s(self, step_s):
+    def _counted_s(self, step_s: float) -> float:
         counted_s = min(step_s, max(_MAX_PERIODS * self._period_s, _MAX_USUAL_STEPS * self._usual_s))
         self._usual_s += _WEIGHT * (counted_s - self._usual_s)
         return counted_s
@@ -55,14 +59,14 @@ class LoopStopwatch(Stopwatch):
 class Ticker:
     """A steady beat on a clock: the sleep is shortened by the time of the work between two beats."""
 
-    def __init__(self, clock, rate_hz):
+    def __init__(self, clock: Any, rate_hz: float) -> None:
         if not rate_hz > 0.0:
             raise ValueError("rate must be greater than 0 Hz, got %r" % (rate_hz,))
         self._clock = clock
         self._period_s = 1.0 / rate_hz
         self._next_s = clock.now() + self._period_s
 
-    def sleep(self):
+    def sleep(self) -> None:
         """Sleep until the next beat. Missed beats, also after a jump of the clock, are not caught up."""
         now_s = self._clock.now()
         remaining_s = self._next_s - now_s
@@ -85,12 +89,13 @@ def require_timeout(timeout: object) -> float:
     return seconds
 
 
-def is_unlimited(timeout_s):
+def is_unlimited(timeout_s: float) -> bool:
     """Tell whether a time-out means for ever: negative or infinite."""
     return timeout_s < 0.0 or math.isinf(timeout_s)
 
 
-def wait_on(clock, test, timeout_s, raise_on_error, rate_hz, timeout_msg, body):
+def wait_on(clock: Any, test: Callable[[], bool], timeout_s: Any, raise_on_error: bool, rate_hz: int, timeout_msg: str,
+            body: Callable[[], None] | None) -> bool:
     """Wait on `clock` until `test()` is true; see `baxter_dataflow.wait_for`, which is this on ROS time."""
     timeout_s = require_timeout(timeout_s)
     watch = Stopwatch(clock.now())
@@ -106,7 +111,7 @@ def wait_on(clock, test, timeout_s, raise_on_error, rate_hz, timeout_msg, body):
     return True
 
 
-def _failed(raise_on_error, number, text):
+def _failed(raise_on_error: bool, number: int, text: str) -> bool:
     if raise_on_error:
         raise OSError(number, text)
     return False

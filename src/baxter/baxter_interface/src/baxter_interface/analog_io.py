@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One analogue channel of the robot: a range sensor, a wheel, the fan."""
+from __future__ import annotations
+
+from typing import Any
+
 from baxter_core_msgs.msg import AnalogIOState, AnalogOutputCommand
 
 from .io_channel import IOChannel
@@ -15,15 +19,15 @@ class AnalogIO(IOChannel):
 
     KIND, ADJECTIVE, STATE, COMMAND = "analog", "analogue", AnalogIOState, AnalogOutputCommand
 
-    def state(self):
+    def state(self) -> float:
         """Return the channel's last reported value (float), in the unit of the channel."""
         return self._value(self._last)
 
-    def is_output(self):
+    def is_output(self) -> bool:
         """Tell whether the channel can be set."""
         return self._is_output
 
-    def set_output(self, value, timeout=2.0):
+    def set_output(self, value: float, timeout: float = 2.0) -> None:
         """Set the channel to a whole number, 0 to 65535, and wait until it reports that number.
 
         With `timeout` 0 [s, ROS time] it does not wait.
@@ -34,5 +38,5 @@ class AnalogIO(IOChannel):
         self._set(require_count(value, 65535, "the value of %s" % self._id), timeout)
 
     @staticmethod
-    def _value(message):
+    def _value(message: Any):
         return message.value

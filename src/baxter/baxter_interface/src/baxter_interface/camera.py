@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One of the robot's cameras: open it, close it, set it."""
+from __future__ import annotations
+
 import errno
 import os
+from collections.abc import Sequence
 
 from baxter_core_msgs.msg import CameraControl
 from baxter_core_msgs.msg import CameraSettings as CameraSettingsMessage
@@ -22,7 +25,7 @@ class UnknownCamera(AttributeError, ValueError):
     """A camera that the robot does not have, or that has no power."""
 
 
-def list_cameras(timeout_s=LIST_TIMEOUT_S):
+def list_cameras(timeout_s: float = LIST_TIMEOUT_S) -> list[str]:
     """List the names of the cameras that have power. Raises ServiceUnavailable (an OSError and a ROSException)."""
     startup.wait_for_start([])
     return list(call_service("/cameras/list", ListCameras, timeout_s=timeout_s).cameras)
@@ -41,7 +44,7 @@ class CameraController:
     MODES = list(MODES)
     CONTROL_AUTO = AUTO
 
-    def __init__(self, name):
+    def __init__(self, name: str) -> None:
         self._id = name
         names = list_cameras()
         if name not in names:
@@ -54,28 +57,28 @@ class CameraController:
         self._settings = CameraSettings()
 
     @property
-    def resolution(self):
+    def resolution(self) -> tuple[int, int]:
         """Width and height [pixels], one of MODES. Raises ValueError, AttributeError for something that is not a
         pair."""
         return self._settings.resolution
 
     @resolution.setter
-    def resolution(self, resolution):
+    def resolution(self, resolution: Sequence[int]) -> None:
         self._settings.set_resolution(resolution)
         self.open()
 
     @property
-    def fps(self):
+    def fps(self) -> float:
         """Pictures per second. Raises ValueError."""
         return self._settings.fps
 
     @fps.setter
-    def fps(self, fps):
+    def fps(self, fps: float) -> None:
         self._settings.set_fps(fps)
         self.open()
 
     @property
-    def window(self):
+    def window(self) -> tuple[int, int]:
         """Left upper corner (x, y) [pixels] of the part of the sensor that is shown; (-1, -1) if never set.
 
         Raises AttributeError for something that is not a pair, ValueError for one outside the sensor.
@@ -83,11 +86,11 @@ class CameraController:
         return self._settings.get("window_x"), self._settings.get("window_y")
 
     @window.setter
-    def window(self, window):
+    def window(self, window: tuple[int, ...]) -> None:
         self._settings.set_window(window)
         self.open()
 
-    def open(self):
+    def open(self) -> None:
         """Open the camera with its present settings, or bring them to one that is open. Raises OSError."""
         values = dict(self._settings.values)
         if self._id == TURNED_CAMERA:
@@ -97,22 +100,22 @@ class CameraController:
             CameraControl(id=CONTROLS[name].id, value=value) for name, value in values.items()])
         self._check(call_service("/cameras/open", OpenCamera, self._id, message).err, "open")
 
-    def close(self):
+    def close(self) -> None:
         """Close the camera; it does no harm if it is not open. Raises OSError."""
         error = call_service("/cameras/close", CloseCamera, self._id).err
         if error != errno.EINVAL:
             self._check(error, "close")
 
-    def _check(self, error, verb):
+    def _check(self, error, verb: str) -> None:
         if error:
             raise OSError(error, "failed to %s the %s: %s" % (verb, self._id, os.strerror(abs(error))))
 
 
-def _control_property(name, doc, kind=int):
+def _control_property(name: str, doc: str, kind: type = int) -> property:
     def read(self):
         return kind(self._settings.get(name))
 
-    def write(self, value):
+    def write(self, value) -> None:
         self._settings.set(name, value)
         self.open()
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The settings of the robot's cameras. Free of ROS."""
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 # Pictures that the cameras can make, width and height in pixels; the largest is the whole sensor.
@@ -43,11 +46,11 @@ class CameraSettings:
     fps: float = DEFAULT_FPS
     values: dict = field(default_factory=dict)
 
-    def get(self, name):
+    def get(self, name: str) -> int:
         """Return the control's value (int), its default if it was never set."""
         return self.values.get(name, CONTROLS[name].default)
 
-    def set(self, name, value):
+    def set(self, name: str, value: float | bool) -> None:
         """Set the control to `value`. Raises ValueError."""
         lowest = min(CONTROLS[name].default, 0)
         number = _whole(value, "camera %s" % name.replace("_", " "))
@@ -56,7 +59,7 @@ class CameraSettings:
                 name.replace("_", " "), CONTROLS[name].largest, ", or -1 for automatic" if lowest < 0 else "", value))
         self.values[name] = number
 
-    def set_resolution(self, resolution):
+    def set_resolution(self, resolution: Sequence[int]) -> None:
         """Set width and height [pixels]. Raises AttributeError for something that is not a pair, ValueError."""
         if len(resolution) != 2:
             raise AttributeError("a camera's resolution is a pair (width, height), got %r" % (resolution,))
@@ -65,13 +68,13 @@ class CameraSettings:
                 ", ".join("%dx%d" % mode for mode in MODES), *resolution))
         self.resolution = tuple(resolution)
 
-    def set_fps(self, fps):
+    def set_fps(self, fps: float) -> None:
         """Set the pictures per second. Raises ValueError."""
         if not 0.0 < fps < float("inf"):
             raise ValueError("a camera's pictures per second must be above 0, got %r" % (fps,))
         self.fps = float(fps)
 
-    def set_window(self, window):
+    def set_window(self, window: tuple[int, ...]) -> None:
         """Set the left upper corner of the part of the sensor that is shown, x and y [pixels].
 
         Raises AttributeError for something that is not a pair, ValueError.
@@ -85,13 +88,13 @@ class CameraSettings:
                              % (*largest, *window))
         self.values["window_x"], self.values["window_y"] = corner
 
-    def largest_window(self):
+    def largest_window(self) -> tuple[int, int]:
         """Return the largest x and y of the window [pixels]: half resolution reads a sensor of half the size."""
         return tuple(whole // (1 + self.get("half_resolution")) - part
                      for whole, part in zip(MODES[0], self.resolution, strict=True))
 
 
-def _whole(value, what):
+def _whole(value: float | bool, what: str) -> int:
     number = int(value)
     if number != value:
         raise ValueError("%s must be a whole number, got %r" % (what, value))

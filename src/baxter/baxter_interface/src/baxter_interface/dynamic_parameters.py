@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters that change at run time: dynamic_reconfigure's server, with values checked against their ranges."""
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import rospy
 from dynamic_reconfigure.server import Server
@@ -11,7 +14,7 @@ _KINDS = {"double": (int, float), "int": (int,), "bool": (bool,), "str": (str,)}
 _GROUPS = "groups"
 
 
-def check(values, table):
+def check(values: dict[str, Any], table: Any) -> None:
     """Raise ValueError for values that must not get into a configuration.
 
     values: {name: value}; table: a dynamic_reconfigure type with `min`, `max` and `type`, {name: ...} each. Values
@@ -37,7 +40,7 @@ class ParameterServer(Server):
     for invalid values on the ROS parameter server.
     """
 
-    def _clamp(self, config):
+    def _clamp(self, config: dict[str, float]) -> None:
         # Called with every configuration before it is accepted.
         check(config, self.type)
         super()._clamp(config)

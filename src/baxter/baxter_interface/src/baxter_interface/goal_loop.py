@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The loop of an action server: one goal at a time, a step of its work 20 times a second."""
+from __future__ import annotations
+
 import io
 import threading
 import time
 import traceback
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import actionlib
 import rospy
@@ -49,7 +51,7 @@ class GoalLoop:
     (actionlib's own SimpleActionServer refuses every goal for a while after a simulation was restarted.)
     """
 
-    def __init__(self, name, action, robot, label, begin):
+    def __init__(self, name: str, action, robot, label, begin) -> None:
         self._robot = robot
         self._label = label
         self._begin = begin
@@ -63,13 +65,13 @@ class GoalLoop:
         start(self._server)
         self._thread.start()
 
-    def clean_shutdown(self, timeout_s=2.0):
+    def clean_shutdown(self, timeout_s: float = 2.0) -> None:
         """End the goal, if there is one, and wait for that, `timeout_s` [s, wall] at most."""
         self._ending = True
         self._goals.close()
         self._thread.join(timeout_s)
 
-    def _run(self):
+    def _run(self) -> None:
         while not self._ending and not rospy.is_shutdown():
             handle = self._goals.take(_LOOK_UP_S)
             if handle is None:
@@ -86,7 +88,7 @@ class GoalLoop:
             self._goals.done()
             end(result, text)
 
-    def _carry_out(self, handle):
+    def _carry_out(self, handle: Any):
         """Returns how the goal ends: the handle's method, the result, and a text."""
         self._resets_before = self._resets.count
         work = self._begin(handle)
@@ -114,7 +116,7 @@ class GoalLoop:
         rospy.logerr("%s: goal aborted: %s", self._label, why)
         return handle.set_aborted, work.make_result(), why
 
-    def _stop_after_reset(self, work):
+    def _stop_after_reset(self, work) -> None:
         """Stop a motion whose command was sent before the reset and received after it.
 
         The stop commands the measured position, which must be one from after the reset; so time has to pass.
@@ -127,7 +129,7 @@ class GoalLoop:
     def _is_unwanted(self):
         return self._goals.is_cancelled or self._goals.has_next
 
-    def _trouble(self, since_reset=False):
+    def _trouble(self, since_reset: bool = False):
         """Why nothing can be moved now, or "". since_reset: ignore a reset in the meantime."""
         if self._ending or rospy.is_shutdown():
             return "the action server was shut down"
@@ -138,7 +140,7 @@ class GoalLoop:
         return why_not_ready(self._robot.state())
 
 
-def can_be_answered(goal_id):
+def can_be_answered(goal_id: Any) -> bool:
     """Whether an actionlib_msgs/GoalID can be sent back; logs the reason if not.
 
     genpy reads stamps that it cannot write. With such an id in the status list, no status could be sent, and a partial
@@ -152,7 +154,7 @@ def can_be_answered(goal_id):
     return True
 
 
-def start(server):
+def start(server: Any) -> None:
     """Start an actionlib.ActionServer whose status goes on when simulated time goes back, as at a restart.
 
     actionlib's own timer would end then. Errors of the timer while Ctrl-C closes the topic are ignored. Goals and
@@ -160,19 +162,19 @@ def start(server):
     """
     take_goal, take_cancel = server.internal_goal_callback, server.internal_cancel_callback
 
-    def on_goal(goal):
+    def on_goal(goal: Any) -> None:
         # A server that receives its goals as bytes checks the id itself.
         if not hasattr(goal, "goal_id") or can_be_answered(goal.goal_id):
             take_goal(goal)
 
-    def on_cancel(goal_id):
+    def on_cancel(goal_id: Any) -> None:
         if can_be_answered(goal_id):
             take_cancel(goal_id)
 
     # Done before the server subscribes to its topics.
     server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
 
-    def publish_status(event):
+    def publish_status(event) -> None:
         try:
             server.publish_status_async(event)
         except rospy.ROSException:

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The wire to one gripper: its state and properties, and commands that it acknowledges."""
+from __future__ import annotations
+
 import errno
 import json
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
@@ -32,7 +36,7 @@ class NoGripper(OSError):
 class GripperLink:
     """The link that the classes of gripper_types use; waits for the gripper as startup.wait_for_part does."""
 
-    def __init__(self, side):
+    def __init__(self, side: str) -> None:
         self.name = "%s_gripper" % side
         self.state = self.properties = None
         self.parameters = {}
@@ -63,14 +67,15 @@ class GripperLink:
         startup.wait_for_subscribers(self._publisher)
 
     @property
-    def details(self):
+    def details(self) -> dict[str, int]:
         """The JSON object in the state, empty if there is none that can be read."""
         try:
             return read_object(self.state.state)
         except JsonRefused:
             return {}
 
-    def command(self, command, block=False, test=None, timeout_s=0.0, args=None, delay_s=0.0):
+    def command(self, command, block: bool = False, test: Callable[[], bool] | None = None, timeout_s: float = 0.0,
+                args: dict[str, Any] | None = None, delay_s: float = 0.0) -> bool:
         """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.
 
         Repeats it at 100 Hz until the gripper acknowledges it, and calls `test` only from `delay_s` later. Ends early
@@ -104,11 +109,11 @@ class GripperLink:
                 "; the gripper reports an error, which reset() clears" if self.state.error == 1 else ""))
         return done
 
-    def configure(self):
+    def configure(self) -> None:
         """Send the parameters."""
         self.command("configure", args=self.parameters)
 
-    def override(self, topic, message, test, timeout_s):
+    def override(self, topic: str, message: Any, test: Callable[[], bool], timeout_s: float):
         """Publish `message` on rsdk/`topic` until `test()`; return whether it came true."""
         publisher = rospy.Publisher(self._prefix + "rsdk/" + topic, type(message), queue_size=10)
         try:
@@ -116,22 +121,22 @@ class GripperLink:
         finally:
             publisher.unregister()
 
-    def sleep(self, duration_s):
+    def sleep(self, duration_s: float) -> None:
         RosClock().sleep(duration_s)
 
-    def warn(self, text):
+    def warn(self, text: str) -> None:
         rospy.logwarn("%s: %s", self.name, text)
 
-    def unregister(self):
+    def unregister(self) -> None:
         for end in (*self._subscribers, self._publisher):
             end.unregister()
 
-    def _acknowledges(self, message):
+    def _acknowledges(self, message: Any) -> bool:
         # A robot that does not count commands reports 0.
         return (self.state.command_sender == message.sender
                 and self.state.command_sequence in (message.sequence, 0))
 
-    def _on_properties(self, message):
+    def _on_properties(self, message: Any) -> None:
         before, self.properties = self.kind, message
         kind = TYPES.get(message.ui_type)
         if kind is None:
@@ -142,7 +147,7 @@ class GripperLink:
             if before is not None:
                 self.on_type_changed(kind.name)
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         before, self.state = self.state, message
         if why := self._ignored.heard(time.monotonic(), NOT_ENABLED if message.enabled == 0 else ""):
             self._refusal = why

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The head: it turns, and it nods."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 from std_msgs.msg import Bool
@@ -19,7 +23,7 @@ class Head:
     Raises OSError with errno ETIMEDOUT if it does not report, rospy.ROSInitException before rospy.init_node.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._last = None
         self._pan_publisher = rospy.Publisher("/robot/head/command_head_pan", HeadPanCommand, queue_size=10)
         self._nod_publisher = rospy.Publisher("/robot/head/command_head_nod", Bool, queue_size=10)
@@ -34,19 +38,19 @@ class Head:
         startup.wait_for_subscribers(self._pan_publisher)
         startup.wait_for_subscribers(self._nod_publisher)
 
-    def pan(self):
+    def pan(self) -> float:
         """Return the head's angle [rad]."""
         return self._last.pan
 
-    def nodding(self):
+    def nodding(self) -> bool:
         """Tell whether the head is nodding."""
         return self._last.isNodding
 
-    def panning(self):
+    def panning(self) -> bool:
         """Tell whether the head is turning."""
         return self._last.isTurning
 
-    def set_pan(self, angle, speed=1.0, timeout=10.0, scale_speed=False):
+    def set_pan(self, angle: float, speed: float = 1.0, timeout: float = 10.0, scale_speed: bool = False) -> None:
         """Turn the head and wait until it is within HEAD_PAN_ANGLE_TOLERANCE of `angle` [rad], -pi/2 to pi/2.
 
         Parameters:
@@ -66,7 +70,7 @@ class Head:
                             lambda: self._pan_publisher.publish(command),
                             "the head, which turns from -1.57 to 1.57 rad, did not turn to %.3f rad" % angle)
 
-    def command_nod(self, timeout=5.0):
+    def command_nod(self, timeout: float = 5.0) -> None:
         """Nod once and wait for its end; `timeout` [s, ROS time] applies to its start, and again to its end.
 
         With `timeout` 0 the command is sent once and not waited for. Raises OSError with errno ETIMEDOUT.
@@ -78,5 +82,5 @@ class Head:
             wait_for(lambda: not self.nodding(), timeout, rate=100, body=lambda: self._nod_publisher.publish(False),
                      timeout_msg="the head did not end its nod within %.1f s" % timeout)
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         self._last = message

@@ -4,9 +4,12 @@
 These come 100 times a second each. Listening all the time would cost each program more than its own work, so they are
 read only while something does not move.
 """
+from __future__ import annotations
+
 import errno
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, CollisionAvoidanceState, CollisionDetectionState, DigitalIOState
@@ -51,7 +54,7 @@ def ask_what_holds(side: str, is_kept_away: bool) -> str:
     return COLLIDES if detection is not None and detection.collision_state else ""
 
 
-def newest(topic: str, kind: type) -> object:
+def newest(topic: str, kind: type) -> Any:
     """The next message of a topic, or its latched one; None where nobody publishes it."""
     if not startup.topic_published(rospy.resolve_name(topic)).is_met():
         return None
@@ -160,12 +163,12 @@ class ArmHindrance:
             self._subscribers.pop().unregister()
         self._forget()
 
-    def _on_avoidance(self, message):
+    def _on_avoidance(self, message: Any) -> None:
         self._near, self._by_other_arm = list(message.collision_object), message.other_arm
 
-    def _on_detection(self, message):
+    def _on_detection(self, message: Any) -> None:
         # One is enough: the arm stops for a while, and takes commands again.
         self._collides = self._collides or message.collision_state
 
-    def _on_cuff(self, message):
+    def _on_cuff(self, message: Any) -> None:
         self._cuff = message.state == DigitalIOState.PRESSED

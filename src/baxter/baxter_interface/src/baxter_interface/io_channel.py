@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Base of digital and analogue channels: find a channel, and set it until it reports the value."""
+from __future__ import annotations
+
 import errno
 import re
+from typing import Any
 
 import rospy
 
@@ -32,7 +35,7 @@ class IOChannel:
 
     KIND = ADJECTIVE = STATE = COMMAND = None
 
-    def __init__(self, component_id):
+    def __init__(self, component_id) -> None:
         self._id = present_name(component_id)
         if self._id != component_id:
             rospy.logwarn("the %s channel %r of SDK 1.0 is now called %r", self.ADJECTIVE, component_id, self._id)
@@ -51,19 +54,19 @@ class IOChannel:
             startup.wait_for_subscribers(self._publisher)
 
     @staticmethod
-    def _value(message):
+    def _value(message: Any):
         """The value in a message of state."""
         raise NotImplementedError
 
-    def _on_change(self, value):
+    def _on_change(self, value: float) -> None:
         """Called when the reported value differs from the last one."""
 
-    def _require_output(self):
+    def _require_output(self) -> None:
         """Raise OSError with errno EACCES if the channel is an input."""
         if not self._is_output:
             raise OSError(errno.EACCES, "the %s channel %s is an input: it cannot be set" % (self.ADJECTIVE, self._id))
 
-    def _set(self, value, timeout):
+    def _set(self, value: float, timeout: float) -> None:
         """Set the channel and wait until it reports `value`; with `timeout` 0 [s, ROS time] do not wait.
 
         Raises OSError with errno ETIMEDOUT if it did not follow.
@@ -76,7 +79,7 @@ class IOChannel:
                      timeout_msg="the %s channel %s was set to %s, but did not report that within %.1f s"
                                  % (self.ADJECTIVE, self._id, value, timeout))
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         before, self._last = self._last, message
         if before is not None and self._value(before) != self._value(message):
             self._on_change(self._value(message))

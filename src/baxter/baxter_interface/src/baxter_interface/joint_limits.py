@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Position and velocity limits of the robot's joints, from its description."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import rospy
 
@@ -16,7 +19,7 @@ class JointLimit(NamedTuple):
     velocity: float = math.inf
 
 
-def read_joint_limits(names):
+def read_joint_limits(names: Sequence[str]) -> Any:
     """{joint name: JointLimit} for `names`, from the parameter robot_description.
 
     Without a readable description, no joint has limits, and one line is logged.

@@ -8,6 +8,8 @@ ends at rest, is the same at any loop rate, ends exactly on the target at a know
 straight line in joint space. Only a call that ends before such a curve does is filtered, as by the vendor's SDK:
 programs repeat it at a steady rate to move the arm, and a curve that begins from rest at each call would not move it.
 """
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -43,12 +45,12 @@ STILL_S, MAKING_ROOM_S = 0.75, 5.0
 class SmoothPath:
     """Joint angles over time from `start` to `target` (dicts of joint name to rad, same names)."""
 
-    def __init__(self, start, target):
+    def __init__(self, start: dict[str, float], target: dict[str, float]) -> None:
         self._start = {name: start[name] for name in target}
         self._target = dict(target)
         self.duration_s = max((_duration_s(name, target[name] - start[name]) for name in target), default=0.0)
 
-    def angles(self, time_s):
+    def angles(self, time_s: float) -> dict[str, float]:
         """Angles [rad] at `time_s` after the start; exactly the target from `duration_s` on."""
         if time_s >= self.duration_s:
             return dict(self._target)
@@ -108,7 +110,7 @@ def is_far(angles: dict[str, float], goal: dict[str, float]) -> bool:
     return any(abs(angle - angles[name]) > FAR_RAD for name, angle in goal.items())
 
 
-def _duration_s(name, distance_rad):
+def _duration_s(name: str, distance_rad: float) -> float:
     """Shortest time [s] that keeps one joint's speed and acceleration under their peaks."""
     distance = abs(distance_rad)
     by_speed = _PEAK_SLOPE * distance / PEAK_SPEED_RAD_S[name[-2:]]
@@ -129,7 +131,7 @@ class Step:
     halt: bool = False
 
     @property
-    def is_last(self):
+    def is_last(self) -> bool:
         return self.arrived or bool(self.failure)
 
 
@@ -142,7 +144,8 @@ class Move:
     With less time than the curve takes it follows a FilteredPath.
     """
 
-    def __init__(self, start, target, timeout_s, threshold_rad=JOINT_ANGLE_TOLERANCE):
+    def __init__(self, start: dict[str, float], target: dict[str, float], timeout_s: float,
+                 threshold_rad: float = JOINT_ANGLE_TOLERANCE) -> None:
         self._target = dict(target)
         smooth = SmoothPath(start, target)
         self._duration_s = smooth.duration_s
@@ -155,7 +158,8 @@ class Move:
         self._near_since_s = None
         self._disabled_since_s = None
 
-    def step(self, elapsed_s, angles, speeds, refusal="", aborted=False, interrupted="", hindrance=NO_HINDRANCE):
+    def step(self, elapsed_s: float, angles: dict[str, float], speeds: dict[str, float], refusal: str = "",
+             aborted: bool = False, interrupted: str = "", hindrance: Hindrance = NO_HINDRANCE) -> Step:
         """Decide at `elapsed_s` after the start.
 
         Parameters: measured `angles` [rad] and `speeds` [rad/s] by joint name (more joints than the target's do no
@@ -182,7 +186,7 @@ class Move:
             text += ". A gentle move takes %.1f s" % self._duration_s
         return Step(command, failure=". ".join(filter(None, (text, hindrance.text))))
 
-    def _is_there(self, elapsed_s, here, speeds):
+    def _is_there(self, elapsed_s: float, here: dict[str, float], speeds: dict[str, float]) -> bool:
         near = all(abs(self._target[name] - here[name]) < self._threshold_rad for name in here)
         if self._passes_by:
             return near
@@ -195,7 +199,7 @@ class Move:
         out_of_time = self._timeout_s is not None and elapsed_s >= self._timeout_s
         return at_rest or out_of_time or elapsed_s - self._near_since_s >= SETTLE_TIME_S
 
-    def _lost_power(self, elapsed_s, powered):
+    def _lost_power(self, elapsed_s: float, powered: bool) -> bool:
         if powered:
             self._disabled_since_s = None
             return False
@@ -203,7 +207,7 @@ class Move:
             self._disabled_since_s = elapsed_s
         return elapsed_s - self._disabled_since_s >= DISABLED_GRACE_S
 
-    def _worst(self, here):
+    def _worst(self, here: dict[str, float]) -> str:
         name = max(here, key=lambda joint: abs(self._target[joint] - here[joint]))
         return "%s is %.4f rad from its target %.4f rad (threshold %.4f rad)" % (
             name, abs(self._target[name] - here[name]), self._target[name], self._threshold_rad)

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One arm: its state, and commands to it."""
+from __future__ import annotations
+
 import collections
 import copy
 import importlib
 import math
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
@@ -60,7 +64,7 @@ class Limb:
     Point = collections.namedtuple("Point", ["x", "y", "z"])
     Quaternion = collections.namedtuple("Quaternion", ["x", "y", "z", "w"])
 
-    def __init__(self, limb):
+    def __init__(self, limb: str) -> None:
         self.name = require_side(limb)
         self._joint_names = limb_joint_names(limb)
         self._lock = threading.Lock()
@@ -95,67 +99,67 @@ class Limb:
             raise
         startup.wait_for_subscribers(self._command_publisher)
 
-    def joint_names(self):
+    def joint_names(self) -> list[str]:
         """List the names of the seven joints from shoulder to wrist."""
         return list(self._joint_names)
 
-    def joint_angle(self, joint):
+    def joint_angle(self, joint: str) -> float:
         """Return one joint's angle [rad]. Raises UnknownNameError."""
         return self._reading(self._angles_by_name, joint)
 
-    def joint_angles(self):
+    def joint_angles(self) -> dict[str, float]:
         """Return all joint angles as a dict of name to rad."""
         return self._angles_by_name()
 
-    def joint_velocity(self, joint):
+    def joint_velocity(self, joint: str) -> float:
         """Return one joint's speed [rad/s]. Raises UnknownNameError."""
         return self._reading(self.joint_velocities, joint)
 
-    def joint_velocities(self):
+    def joint_velocities(self) -> dict[str, float]:
         """Return all joint speeds as a dict of name to rad/s."""
         with self._lock:
             return dict(self._velocities)
 
-    def joint_effort(self, joint):
+    def joint_effort(self, joint: str) -> float:
         """Return one joint's torque [Nm]. Raises UnknownNameError."""
         return self._reading(self.joint_efforts, joint)
 
-    def joint_efforts(self):
+    def joint_efforts(self) -> dict[str, float]:
         """Return all joint torques as a dict of name to Nm."""
         with self._lock:
             return dict(self._efforts)
 
-    def endpoint_pose(self):
+    def endpoint_pose(self) -> dict[str, Any]:
         """Return the end-point's pose in `base`: {'position': Point [m], 'orientation': Quaternion}."""
         pose = self._endpoint_state().pose
         return {"position": self._point(pose.position),
                 "orientation": self.Quaternion(*(getattr(pose.orientation, axis) for axis in "xyzw"))}
 
-    def endpoint_velocity(self):
+    def endpoint_velocity(self) -> dict[str, Any]:
         """Return the end-point's twist in `base`: {'linear': Point [m/s], 'angular': Point [rad/s]}."""
         twist = self._endpoint_state().twist
         return {"linear": self._point(twist.linear), "angular": self._point(twist.angular)}
 
-    def endpoint_effort(self):
+    def endpoint_effort(self) -> dict[str, Any]:
         """Return the wrench at the end-point: {'force': Point [N], 'torque': Point [Nm]}."""
         wrench = self._endpoint_state().wrench
         return {"force": self._point(wrench.force), "torque": self._point(wrench.torque)}
 
-    def set_command_timeout(self, timeout):
+    def set_command_timeout(self, timeout: float) -> None:
         """Set the time without commands after which the robot leaves velocity, torque and raw mode [s] (0.2 at
         start)."""
         self._timeout_publisher.publish(Float64(data=require_number(timeout, "the command time-out [s]")))
 
-    def exit_control_mode(self, timeout=0.2):
+    def exit_control_mode(self, timeout: float = 0.2) -> None:
         """Go back to holding the present joint angles in position mode, with the command time-out `timeout` [s]."""
         self.set_command_timeout(timeout)
         self.set_joint_positions(self.joint_angles())
 
-    def set_joint_position_speed(self, speed):
+    def set_joint_position_speed(self, speed: float) -> None:
         """Scale the speed of position mode by `speed`, 0.0 to 1.0; the robot clips it and keeps it."""
         self._speed_publisher.publish(Float64(data=require_number(speed, "the speed ratio")))
 
-    def set_joint_positions(self, positions, raw=False):
+    def set_joint_positions(self, positions: dict[str, float], raw: bool = False) -> None:
         """Command joint angles once, and return at once.
 
         Parameters:
@@ -170,32 +174,34 @@ class Limb:
         if not raw:
             self._warn_if_hindered(is_far(self._angles_by_name(), sent))
 
-    def set_joint_velocities(self, velocities):
+    def set_joint_velocities(self, velocities: dict[str, float]) -> None:
         """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises the same
         errors."""
         sent = self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
         self._warn_if_hindered(any(abs(speed) > MIN_SPEED_RAD_S for speed in sent.values()))
 
-    def set_joint_torques(self, torques):
+    def set_joint_torques(self, torques: dict[str, float]) -> None:
         """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises the same
         errors."""
         self._command(JointCommand.TORQUE_MODE, torques, "Nm")
 
-    def halt(self):
+    def halt(self) -> None:
         """Stop the joints at any speed, and hold them there."""
         # A zero velocity command expires into position mode; it needs no known angles.
         self.set_joint_velocities(dict.fromkeys(self._joint_names, 0.0))
 
     @property
-    def resets(self):
+    def resets(self) -> int:
         """Number of resets of the simulation so far; a reset ends all moves."""
         return self._resets.count
 
-    def move_to_neutral(self, timeout=15.0):
+    def move_to_neutral(self, timeout: float = 15.0) -> bool:
         """Move to the neutral pose and wait; `timeout` [s] and result as of move_to_joint_positions."""
         return self.move_to_joint_positions(poses().angles("neutral", self.name), timeout)
 
-    def move_to_joint_positions(self, positions, timeout=15.0, threshold=settings.JOINT_ANGLE_TOLERANCE, test=None):
+    def move_to_joint_positions(self, positions: dict[str, float], timeout: float = 15.0,
+                                threshold: float = settings.JOINT_ANGLE_TOLERANCE,
+                                test: Callable[[], bool] | None = None) -> bool:
         """Move smoothly to joint angles, in position mode, and wait until they are reached.
 
         Parameters:
@@ -249,7 +255,7 @@ class Limb:
             ticker.sleep()
         raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
 
-    def ik(self, pose, seed=None, timeout=IK_TIMEOUT_S):
+    def ik(self, pose: Any, seed: dict[str, float] | None = None, timeout: float = IK_TIMEOUT_S) -> Any:
         """Ask the robot for joint angles that put the end-point at `pose`; the arm does not move.
 
         Parameters:
@@ -288,7 +294,7 @@ class Limb:
             return ""
         return next((verdict.detail for verdict in verdicts if verdict.target == target), "")
 
-    def _command(self, mode, values, unit):
+    def _command(self, mode, values, unit: str):
         """Send one command; returns its values by joint name."""
         values = require_joint_values(values, self._joint_names, unit)
         if not values:
@@ -298,16 +304,16 @@ class Limb:
         self._send(mode, values)
         return values
 
-    def _send(self, mode, values):
+    def _send(self, mode, values) -> None:
         self._command_publisher.publish(
             JointCommand(mode=mode, names=list(values), command=list(values.values())))
 
-    def _warn_if_hindered(self, is_far_from_goal):
+    def _warn_if_hindered(self, is_far_from_goal) -> None:
         hindrance = self._hindrance.look(rospy.get_time(), is_far_from_goal, self._angles_by_name())
         if hindrance.text:
             self._warn("hindered", hindrance.text)
 
-    def _warn(self, reason, text):
+    def _warn(self, reason, text: str) -> None:
         """Log `text`, and the same `reason` again after REPEAT_S: programs repeat their commands."""
         now_s = time.monotonic()
         if now_s - self._warned_at_s.get(reason, -math.inf) >= REPEAT_S:
@@ -318,7 +324,7 @@ class Limb:
         with self._lock:
             return dict(self._angles)
 
-    def _reading(self, read_all, joint):
+    def _reading(self, read_all, joint: str) -> float:
         require_joint(joint, self._joint_names)
         return read_all()[joint]
 
@@ -334,11 +340,11 @@ class Limb:
         with self._lock:
             return why_not_ready(self._robot_state) if self._robot_state is not None else ""
 
-    def _has_joint_states(self):
+    def _has_joint_states(self) -> bool:
         with self._lock:
             return all(name in self._angles for name in self._joint_names)
 
-    def _on_joint_states(self, message):
+    def _on_joint_states(self, message: Any) -> None:
         # Others may publish here too (a gripper's driver, a tool with positions only): take only this arm's joints.
         index = {name: i for i, name in enumerate(message.name)}
         indices = {name: index[name] for name in self._joint_names if name in index}
@@ -348,23 +354,23 @@ class Limb:
                 if len(values) == len(message.name):
                     readings.update((name, values[i]) for name, i in indices.items())
 
-    def _on_endpoint_state(self, message):
+    def _on_endpoint_state(self, message: Any) -> None:
         with self._lock:
             self._endpoint = message
 
-    def _on_robot_state(self, message):
+    def _on_robot_state(self, message: Any) -> None:
         with self._lock:
             self._robot_state = message
         if why := self._ignored.heard(time.monotonic(), why_not_ready(message)):
             self._warn("ignored", "a command has no effect: %s" % why)
 
-    def _unregister(self):
+    def _unregister(self) -> None:
         for end in (*self._subscribers, self._resets, self._speed_publisher, self._timeout_publisher,
                     self._command_publisher):
             end.unregister()
 
 
-def _pose_stamped(pose):
+def _pose_stamped(pose: Any):
     """Return a pose in any of the forms that Limb.ik takes as a PoseStamped. Raises TypeError, ValueError."""
     if isinstance(pose, PoseStamped):
         stamped = copy.deepcopy(pose)

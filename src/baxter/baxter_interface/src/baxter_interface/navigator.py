@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One of the four navigators: a wheel, three buttons and two lights on an arm or on the torso."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from baxter_core_msgs.msg import NavigatorState
 
@@ -28,7 +32,7 @@ class Navigator:
     rospy.ROSInitException before rospy.init_node.
     """
 
-    def __init__(self, location):
+    def __init__(self, location) -> None:
         if location not in LOCATIONS:
             raise AttributeError("there is no navigator %r: the navigators are %s"
                                  % (location, ", ".join(map(repr, LOCATIONS))))
@@ -49,44 +53,44 @@ class Navigator:
             raise
 
     @property
-    def wheel(self):
+    def wheel(self) -> int:
         """The wheel's counter, 0 to 255; it wraps."""
         return self._last.wheel
 
     @property
-    def button0(self):
+    def button0(self) -> bool:
         """Whether the wheel is pressed."""
         return self._last.buttons[0]
 
     @property
-    def button1(self):
+    def button1(self) -> bool:
         """Whether the button above the wheel is pressed."""
         return self._last.buttons[1]
 
     @property
-    def button2(self):
+    def button2(self) -> bool:
         """Whether the button below the wheel is pressed."""
         return self._last.buttons[2]
 
     @property
-    def inner_led(self):
+    def inner_led(self) -> bool:
         """Whether the inner light is on. Assigning waits until it follows; raises as DigitalIO.set_output."""
         return self._last.lights[INNER]
 
     @inner_led.setter
-    def inner_led(self, enabled):
+    def inner_led(self, enabled: bool) -> None:
         self._inner.set_output(enabled)
 
     @property
-    def outer_led(self):
+    def outer_led(self) -> bool:
         """Whether the outer light is on. Assigning waits until it follows; raises as DigitalIO.set_output."""
         return self._last.lights[OUTER]
 
     @outer_led.setter
-    def outer_led(self, enabled):
+    def outer_led(self, enabled: bool) -> None:
         self._outer.set_output(enabled)
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         if len(message.buttons) < BUTTON_COUNT or len(message.lights) <= OUTER:
             rospy.logwarn_throttle(5.0, "navigator %s: a state with %s and %s is ignored: 3, 2 are due"
                                         % (self._id, counted(len(message.buttons), "button"),

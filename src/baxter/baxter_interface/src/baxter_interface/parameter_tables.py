@@ -3,6 +3,9 @@
 
 Free of ROS and of the rest of the package: it is loaded while the workspace is being built.
 """
+from __future__ import annotations
+
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from baxter_model import ELECTRIC, SIDES, SUCTION, joint_names
@@ -18,7 +21,8 @@ class Parameter(NamedTuple):
     highest: float
 
 
-def trajectory_parameters(goal_time, stopped_velocity, path, goal, highest, gains=False):
+def trajectory_parameters(goal_time: float, stopped_velocity: float, path: float, goal: float, highest: float,
+                          gains: bool = False) -> Iterator[Parameter]:
     """Parameters of the trajectory server in one mode.
 
     goal_time [s], stopped_velocity [rad/s], path, goal [rad]: defaults; highest: of the tolerances' range;
@@ -61,7 +65,7 @@ HEAD = (
 )
 
 
-def generate(table, name):
+def generate(table, name: str) -> None:
     """Write the dynamic_reconfigure type `name` for a table of parameters, as a *.cfg file has to."""
     from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator, double_t
 

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Wait for several conditions in order, in wall time, with one line of progress. Free of ROS."""
+from __future__ import annotations
+
 import difflib
 import errno
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from command_line.waiting_line import WaitingLine
 
 # A wait that is shorter than this prints nothing [s].
 FIRST_NOTICE_S = 1.0
@@ -15,7 +21,7 @@ REASON_AFTER_S = 5.0
 LOOK_EVERY_S = 1.0
 
 
-def others_than(name: str, known: Iterable[str]) -> str:
+def others_than(name: str, known: Any) -> Any:
     """The text after "there is no topic" (or service) `name`: those of the `known` names that may have been meant.
 
     Names that differ in one part are of the same kind, such as the channels of a robot. Of others, the most similar.
@@ -49,8 +55,9 @@ class Condition:
     explain: Callable[[], str]
 
 
-def wait_in_order(conditions, timeout_s, line=None, is_coming=lambda: False, is_shutdown=lambda: False,
-                  now=time.monotonic, sleep=time.sleep):
+def wait_in_order(conditions: list[Condition], timeout_s: float, line: WaitingLine | None = None,
+                  is_coming: Callable[[], bool] = lambda: False, is_shutdown: Callable[[], bool] = lambda: False,
+                  now: Callable[[], float] = time.monotonic, sleep: Callable[[float], None] = time.sleep) -> None:
     """Wait until each of `conditions` has been met, in their order, for `timeout_s` in all.
 
     Parameters:

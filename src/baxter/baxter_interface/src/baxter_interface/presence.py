@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tell whether a topic still has a live publisher; a paused one counts."""
+from __future__ import annotations
+
 import threading
 import time
 import xmlrpc.client
@@ -22,7 +24,7 @@ class Presence:
     A paused simulation is silent too, but not gone: its node answers. Cheap, callable from any thread.
     """
 
-    def __init__(self, topic, silence_s):
+    def __init__(self, topic: str, silence_s) -> None:
         self._topic = topic
         self._silence_s = silence_s
         self._lock = threading.Lock()
@@ -43,7 +45,7 @@ class Presence:
         return self._gone
 
 
-def _has_living_publisher(topic):
+def _has_living_publisher(topic: str) -> bool:
     master = rosgraph.Master(rospy.get_name())
     try:
         nodes = dict(master.getSystemState()[0]).get(topic, [])

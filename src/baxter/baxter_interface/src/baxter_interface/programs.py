@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shared by the robot's command-line programs: start and end, an enabled robot, and a loop that detects its loss."""
+from __future__ import annotations
+
 import errno
 import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
 
 import rospy
 
@@ -26,7 +31,7 @@ LAST_WORD_S = 5.0
 class ProgramFailed(OSError):
     """A program did not reach its aim; the text says which and why."""
 
-    def __init__(self, text, number=errno.EIO):
+    def __init__(self, text: str, number: int = errno.EIO) -> None:
         super().__init__(number, text)
 
 
@@ -34,7 +39,7 @@ class RobotLost(ProgramFailed):
     """The robot was disabled, stopped or restarted, or has stopped publishing, while a program worked with it."""
 
 
-def run(node_name, body, **options):
+def run(node_name: str, body: Callable[[], None], **options) -> int:
     """Run a program: wait for the robot, become the node `node_name`, call `body()`; return the exit status.
 
     `options` go to rospy.init_node. The status is 0 after success, 1 after an OSError, a ValueError or a ROSException,
@@ -59,7 +64,7 @@ def run(node_name, body, **options):
         rospy.signal_shutdown("the program has ended")
 
 
-def expect(done, text):
+def expect(done: Any, text: str) -> None:
     """Raise ProgramFailed with `text` unless `done`: for moves, which return whether they succeeded."""
     if not done:
         raise ProgramFailed(text)
@@ -72,16 +77,16 @@ class EnabledRobot:
     others before.
     """
 
-    def __init__(self, versioned=CHECK_VERSION):
+    def __init__(self, versioned: bool = CHECK_VERSION) -> None:
         self.switch = RobotEnable(versioned)
         self._was_enabled = self.switch.state().enabled
         self._disabled_since_s = None
 
-    def __enter__(self):
+    def __enter__(self) -> EnabledRobot:
         self.switch.enable()
         return self
 
-    def __exit__(self, kind, error, traceback):
+    def __exit__(self, kind: type | None, error: Any, traceback: TracebackType | None) -> None:
         if rospy.is_shutdown() or isinstance(error, RobotLost):
             return
         if isinstance(error, OSError) and not self.is_enabled():
@@ -90,7 +95,7 @@ class EnabledRobot:
             return
         failures = []
 
-        def disable():
+        def disable() -> None:
             try:
                 self.switch.disable()
             except OSError as failure:
@@ -105,12 +110,12 @@ class EnabledRobot:
         elif failures and error is None:
             raise failures[0]
 
-    def is_enabled(self):
+    def is_enabled(self) -> bool:
         """Tell whether the robot is enabled now."""
         state = self.switch.state()
         return state.enabled and not state.stopped
 
-    def beats(self, rate_hz):
+    def beats(self, rate_hz: float):
         """Yield `rate_hz` times a second of ROS time until ROS shuts down, while the robot is present and enabled.
 
         Waits for a paused or absent simulation, with log lines. Raises RobotLost.
@@ -122,7 +127,7 @@ class EnabledRobot:
             ticker.sleep()
             self._check(clock.now())
 
-    def _check(self, now_s):
+    def _check(self, now_s: float) -> None:
         if self.switch.silence_s() > LOST_AFTER_S and rospy.rostime.is_wallclock():
             raise RobotLost("lost the robot: it has reported nothing for %.0f s" % LOST_AFTER_S)
         if self.is_enabled():
@@ -132,6 +137,6 @@ class EnabledRobot:
         elif now_s - self._disabled_since_s >= DISABLED_GRACE_S:
             raise self._loss()
 
-    def _loss(self):
+    def _loss(self) -> RobotLost:
         what = "stopped" if self.switch.state().stopped else "disabled, or restarted"
         return RobotLost("lost the robot: it was %s; enable it, and start this program again: %s" % (what, ENABLE))

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Count resets of the simulation, which move the robot: commands from before a reset are invalid."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from std_msgs.msg import UInt32
 
@@ -12,18 +16,18 @@ class Resets:
     on_reset: function that is called each time, in a thread of rospy's.
     """
 
-    def __init__(self, on_reset=lambda: None):
+    def __init__(self, on_reset=lambda: None) -> None:
         #: How often so far.
         self.count = 0
         self._on_reset = on_reset
         self._last = None
         self._subscriber = rospy.Subscriber("robot/sim/resets", UInt32, self._on_number, queue_size=10)
 
-    def unregister(self):
+    def unregister(self) -> None:
         """Unsubscribe."""
         self._subscriber.unregister()
 
-    def _on_number(self, message):
+    def _on_number(self, message: Any) -> None:
         # Latched: the first message only gives the start of the count, and a new connection repeats the last one.
         before, self._last = self._last, message.data
         if before not in (None, message.data):

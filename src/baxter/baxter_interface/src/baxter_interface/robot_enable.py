@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Enable, disable, stop and reset the robot."""
+from __future__ import annotations
+
 import copy
 import errno
 import threading
 import time
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState
@@ -35,7 +38,7 @@ class RobotEnable:
     versions do not fit, rospy.ROSInitException before rospy.init_node.
     """
 
-    def __init__(self, versioned=False):
+    def __init__(self, versioned: bool = False) -> None:
         self._lock = threading.Lock()
         self._state = None
         self._heard_at_s = None
@@ -51,12 +54,12 @@ class RobotEnable:
             self._subscriber.unregister()
             raise
 
-    def state(self):
+    def state(self) -> Any:
         """Return the last state that the robot reported, as a copy (baxter_core_msgs/AssemblyState)."""
         with self._lock:
             return copy.copy(self._state)
 
-    def close(self):
+    def close(self) -> None:
         """Listen to the robot's state no longer: for programs that need the switch only now and then. Not in the
         vendor's SDK."""
         self._subscriber.unregister()
@@ -66,7 +69,7 @@ class RobotEnable:
         with self._lock:
             return time.monotonic() - self._heard_at_s
 
-    def enable(self):
+    def enable(self) -> None:
         """Switch the motors on; a stopped robot is reset first.
 
         Raises OSError: errno ETIMEDOUT if it is not enabled within 2 s, EREMOTEIO if its stop button is pressed.
@@ -77,12 +80,12 @@ class RobotEnable:
         self._request("robot/set_super_enable", Bool(data=True), ENABLE_TIMEOUT_S,
                       lambda state: state.enabled, "enable")
 
-    def disable(self):
+    def disable(self) -> None:
         """Switch the motors off. Raises OSError with errno ETIMEDOUT if they are not off within 5 s."""
         self._request("robot/set_super_enable", Bool(data=False), DISABLE_TIMEOUT_S,
                       lambda state: not state.enabled, "disable")
 
-    def reset(self):
+    def reset(self) -> bool:
         """Clear a stop and errors; the robot is disabled afterwards.
 
         Returns True, or False if only an error flag could not be cleared: such an error does not keep a robot from
@@ -103,11 +106,11 @@ class RobotEnable:
             raise
         return True
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop the robot as its stop button would. Raises OSError with errno ETIMEDOUT if it has not within 3 s."""
         self._request("robot/set_super_stop", Empty(), STOP_TIMEOUT_S, lambda state: state.stopped, "stop")
 
-    def version_check(self):
+    def version_check(self) -> bool:
         """Compare the robot's software version with this SDK's: True if they fit; otherwise log why, return False."""
         try:
             _require_version()
@@ -116,12 +119,12 @@ class RobotEnable:
             return False
         return True
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         with self._lock:
             self._state = message
             self._heard_at_s = time.monotonic()
 
-    def _request(self, topic, message, timeout_s, is_done, verb):
+    def _request(self, topic: str, message: Any, timeout_s: float, is_done, verb: str) -> None:
         """Publish `message` at 100 Hz until `is_done(state)`. Raises OSError with errno ETIMEDOUT or ESHUTDOWN."""
         if is_done(self.state()):
             return
@@ -153,16 +156,16 @@ class RobotEnable:
                           *("the %s arm: %s" % (side, why) for side, why in holds.items() if why)])
 
 
-def _is_clear(state):
+def _is_clear(state) -> bool:
     return not (state.enabled or state.stopped or state.error or state.estop_button or state.estop_source)
 
 
-def _brief(state):
+def _brief(state) -> str:
     return "enabled: %s, stopped: %s, error: %s, estop_button: %d, estop_source: %d" % (
         state.enabled, state.stopped, state.error, state.estop_button, state.estop_source)
 
 
-def _require_version():
+def _require_version() -> None:
     version = rospy.get_param(VERSION_PARAMETER, None)
     if version is None:
         raise VersionMismatch(

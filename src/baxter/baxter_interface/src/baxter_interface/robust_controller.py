@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run a procedure of the robot, such as taring or calibrating an arm, and wait for its end."""
+from __future__ import annotations
+
+from typing import Any
+
 import rospy
 from baxter_core_msgs.msg import RobustControllerStatus
 
@@ -26,7 +30,7 @@ class RobustController:
     STATE_RUNNING = int(State.RUNNING)
     STATE_STOPPING = int(State.STOPPING)
 
-    def __init__(self, namespace, enable_msg, disable_msg, timeout=60):
+    def __init__(self, namespace, enable_msg, disable_msg, timeout: int = 60) -> None:
         self._namespace = namespace
         self._messages = {True: enable_msg, False: disable_msg}
         self._timeout_s = timeout
@@ -37,11 +41,11 @@ class RobustController:
                                             queue_size=10)
 
     @property
-    def state(self):
+    def state(self) -> int:
         """One of the STATE_ constants."""
         return int(self._dialogue.state if self._dialogue else State.IDLE)
 
-    def run(self):
+    def run(self) -> None:
         """Run the procedure and wait for its end.
 
         Raises OSError: errno EIO if the robot reports a failure, ENOMSG if it ended without saying how, ETIMEDOUT,
@@ -73,6 +77,6 @@ class RobustController:
             number, text = dialogue.failure
             raise OSError(number, "%s: %s" % (self._namespace, text))
 
-    def _on_status(self, message):
+    def _on_status(self, message: Any) -> None:
         self._report = Report(message.isEnabled, message.complete,
                               tuple(code for code in (*message.errorCodes, *message.labels) if code))

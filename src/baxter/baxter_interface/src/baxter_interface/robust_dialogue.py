@@ -4,6 +4,8 @@
 The procedure runs while the request is repeated, at least once a second, and reports when it has begun and how it
 ended.
 """
+from __future__ import annotations
+
 import enum
 import errno
 from dataclasses import dataclass
@@ -46,14 +48,14 @@ class Dialogue:
         failure: (errno, text) of the failure, None without one.
     """
 
-    def __init__(self, timeout_s):
+    def __init__(self, timeout_s: float) -> None:
         self.state = State.STARTING
         self.failure = None
         self._timeout_s = timeout_s
         self._stopping_since_s = None
         self._next_request_s = 0.0
 
-    def step(self, elapsed_s, report):
+    def step(self, elapsed_s: float, report: Report | None) -> bool | None:
         """Take the latest Report (None as long as there is none) and return the request due now: True for "run",
         False for "stop", None for none."""
         if self.state is State.STARTING:
@@ -67,17 +69,17 @@ class Dialogue:
         self._next_request_s = elapsed_s + REQUEST_EVERY_S
         return self.state is not State.STOPPING
 
-    def abort(self, elapsed_s):
+    def abort(self, elapsed_s: float) -> None:
         """Abort the run: request the procedure to stop."""
         self._end(elapsed_s, (errno.ECONNABORTED, "broken off"))
 
-    def _start(self, elapsed_s, report):
+    def _start(self, elapsed_s: float, report: Report | None) -> None:
         if report is not None and report.is_enabled:
             self.state = State.RUNNING
         elif elapsed_s >= min(ANSWER_TIMEOUT_S, self._timeout_s):
             self._end(elapsed_s, (errno.ETIMEDOUT, "it did not begin within %.0f s" % elapsed_s))
 
-    def _run(self, elapsed_s, report):
+    def _run(self, elapsed_s: float, report: Report) -> None:
         errors = ": " + ", ".join(report.errors) if report.errors else ""
         if report.complete == Completion.SUCCESS:
             self._end(elapsed_s, None)
@@ -89,12 +91,12 @@ class Dialogue:
         elif elapsed_s >= self._timeout_s:
             self._end(elapsed_s, (errno.ETIMEDOUT, "it was not complete after %.0f s" % elapsed_s))
 
-    def _end(self, elapsed_s, failure):
+    def _end(self, elapsed_s: float, failure: tuple[int, str] | None) -> None:
         self.state = State.STOPPING
         self.failure = failure
         self._stopping_since_s = self._next_request_s = elapsed_s
 
-    def _stop(self, elapsed_s, report):
+    def _stop(self, elapsed_s: float, report: Report | None) -> None:
         if elapsed_s <= self._stopping_since_s:
             return  # send one stop request, whatever it reports
         if report is None or not report.is_enabled:

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Calls a service of the robot with a time limit; an error has one line with the reason."""
+from __future__ import annotations
+
 import errno
 import threading
+from typing import Any
 
 import rosgraph
 import rospy
@@ -15,11 +18,11 @@ class ServiceUnavailable(OSError, rospy.ROSException):
     Also a ROSException, which the original SDK raised then.
     """
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         OSError.__init__(self, errno.ETIMEDOUT, text)
 
 
-def wait_for_service(name, timeout_s):
+def wait_for_service(name: str, timeout_s: float) -> None:
     """Wait until the service `name` (absolute) answers, `timeout_s` [s, wall] at most. Raises ServiceUnavailable."""
     try:
         rospy.wait_for_service(name, timeout_s)
@@ -36,7 +39,7 @@ def _services() -> list[str]:
         return []
 
 
-def call_service(name, kind, *arguments, timeout_s=5.0):
+def call_service(name: str, kind, *arguments, timeout_s: float = 5.0) -> Any:
     """Call the service `name` of type `kind`, waiting for it and then for its answer, `timeout_s` [s, wall] each.
 
     Raises ServiceUnavailable, OSError with errno EIO if the service refused the call.
@@ -44,7 +47,7 @@ def call_service(name, kind, *arguments, timeout_s=5.0):
     wait_for_service(name, timeout_s)
     answers, failures = [], []
 
-    def call():
+    def call() -> None:
         try:
             answers.append(rospy.ServiceProxy(name, kind)(*arguments))
         except Exception as failure:  # raised in the caller's thread below

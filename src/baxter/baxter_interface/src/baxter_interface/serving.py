@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shared by the action servers' programs: serve until Ctrl-C, and detect a restart of the ROS master."""
+from __future__ import annotations
+
 import time
+from typing import Any
 
 import rosgraph
 import rospy
@@ -10,7 +13,7 @@ from .programs import ProgramFailed
 _CHECK_EVERY_S = 2.0
 
 
-def serve(factories, what):
+def serve(factories: Any, what: str) -> None:
     """Make the servers, one by each of `factories`, and let them serve until the node ends or is interrupted.
 
     Each server has `clean_shutdown()`, which is called while ROS still runs. `what` names them for the log.
@@ -29,7 +32,7 @@ def serve(factories, what):
             server.clean_shutdown()
 
 
-def _require_known_to_master():
+def _require_known_to_master() -> None:
     if rospy.is_shutdown():
         return
     try:

@@ -3,11 +3,15 @@
 
 Everything here waits in wall time, since ROS time may not run yet.
 """
+from __future__ import annotations
+
 import http.client
 import os
 import socket
 import xml.parsers.expat
 import xmlrpc.client
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import urlparse
 
 import rosgraph
@@ -36,7 +40,7 @@ _MASTER_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.p
                   rosgraph.MasterException, rospy.ROSException)
 
 
-def init_node(name, topic="robot/state", **options):
+def init_node(name: str, topic: str = "robot/state", **options) -> None:
     """Wait for the master and for a publisher of `topic`, then call rospy.init_node(name, **options).
 
     The order matters when a program starts together with roslaunch: rospy.init_node reads /use_sim_time once, and
@@ -50,7 +54,7 @@ def init_node(name, topic="robot/state", **options):
     rospy.init_node(name, **options)
 
 
-def wait_for_start(conditions, timeout_s=None):
+def wait_for_start(conditions: list[Condition], timeout_s: float | None = None) -> None:
     """Wait, as an initialised node, for the master, for `conditions` in their order, and for the clock to run.
 
     Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S; it does not run while a simulator is starting.
@@ -63,7 +67,7 @@ def wait_for_start(conditions, timeout_s=None):
                   LINE, simulator_is_coming(), rospy.is_shutdown)
 
 
-def simulator_is_coming():
+def simulator_is_coming() -> Callable[[], bool]:
     """Return a function that returns whether a simulator is starting at this master.
 
     The function raises SimulatorDied, an OSError, if a simulator that it has seen is gone.
@@ -72,7 +76,7 @@ def simulator_is_coming():
     return lambda: bool(watch.look())
 
 
-def wait_for_part(topic, has_arrived):
+def wait_for_part(topic: str, has_arrived: Callable[[], bool]) -> None:
     """Wait for a robot that is still starting, then for `has_arrived()`, set by a subscriber of `topic` (resolved).
 
     Raises as wait_for_start.
@@ -84,7 +88,7 @@ def wait_for_part(topic, has_arrived):
     wait_for_start([message_arrives(topic, has_arrived)], PART_TIMEOUT_S)
 
 
-def master_answers():
+def master_answers() -> Any:
     """Condition: a ROS master answers where ROS_MASTER_URI points."""
     uri = rosgraph.get_master_uri()
     url = urlparse(uri)
@@ -96,7 +100,7 @@ def master_answers():
         raise ValueError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
     last_error = []
 
-    def is_met():
+    def is_met() -> bool:
         try:
             # XML-RPC has no time-out, so first check whether the port accepts connections.
             connect(host, port)
@@ -106,29 +110,29 @@ def master_answers():
             return False
         return True
 
-    def explain():
+    def explain() -> str:
         return "%s. ROS_MASTER_URI says %s: %s" % (last_error[0], uri, _LAUNCH_HINT)
 
     return Condition("a ROS master at %s" % uri, is_met, explain)
 
 
-def connect(host, port):
+def connect(host: str, port: int) -> None:
     """Check whether a TCP port accepts connections; raises OSError if not."""
     socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S).close()
 
 
-def topic_published(topic):
+def topic_published(topic: str) -> Condition:
     """Condition: the master knows a publisher of `topic` (a resolved name)."""
     return Condition("%s from %s" % (topic, rosgraph.get_master_uri()),
                      lambda: bool(_publishers(topic)), lambda: _explain_topic(topic))
 
 
-def message_arrives(topic, has_arrived):
+def message_arrives(topic: str, has_arrived: Callable[[], bool]) -> Condition:
     """Condition: `has_arrived()`, set by a subscriber of `topic` (a resolved name)."""
     return Condition("%s from %s" % (topic, rosgraph.get_master_uri()), has_arrived, lambda: _explain_topic(topic))
 
 
-def parameter_set(name):
+def parameter_set(name: str) -> Condition:
     """Condition: the parameter `name` (a resolved name) has a value."""
     def is_met():
         try:
@@ -140,16 +144,16 @@ def parameter_set(name):
                      lambda: "it is not set; %s" % _LAUNCH_HINT)
 
 
-def clock_runs():
+def clock_runs() -> Condition:
     """Condition: ROS time runs. Under /use_sim_time, makes this node follow /clock if it does not yet."""
-    def is_met():
+    def is_met() -> bool:
         try:
             follow_simulated_time()
         except _MASTER_ERRORS:
             return False
         return rospy.get_time() > 0.0
 
-    def explain():
+    def explain() -> str:
         publishers = _publishers("/clock")
         if not publishers:
             return ("the parameter /use_sim_time is true, but nobody publishes /clock. Start the simulator, or, "
@@ -160,7 +164,7 @@ def clock_runs():
     return Condition("simulated time on /clock", is_met, explain)
 
 
-def follow_simulated_time():
+def follow_simulated_time() -> None:
     """Follow /clock if /use_sim_time is true and this node, started before it was set, runs on wall time."""
     if not rospy.rostime.is_wallclock() or not rospy.get_param("/use_sim_time", False):
         return
@@ -168,7 +172,7 @@ def follow_simulated_time():
     rospy.impl.simtime.init_simtime()
 
 
-def wait_for_subscribers(publisher, timeout=1.0, enough=None):
+def wait_for_subscribers(publisher: rospy.Publisher, timeout: float = 1.0, enough: int | None = None) -> None:
     """Wait until all nodes that the master lists as subscribers of `publisher` have connected to it, if there are any.
 
     Subscribers that have not connected yet lose the first messages of a new publisher. Returns after
@@ -188,7 +192,7 @@ def wait_for_subscribers(publisher, timeout=1.0, enough=None):
                        publisher.get_num_connections(), expected, timeout)
 
 
-def _caller():
+def _caller() -> str:
     # Before init_node there is no node name; the master only needs some caller id.
     return "/baxter_interface_%d" % os.getpid()
 
@@ -197,19 +201,19 @@ def _master():
     return rosgraph.Master(_caller())
 
 
-def _nodes_of(topic, subscribers=False):
+def _nodes_of(topic: str, subscribers: bool = False):
     published, subscribed, _services = _master().getSystemState()
     return dict(subscribed if subscribers else published).get(topic, [])
 
 
-def _publishers(topic):
+def _publishers(topic: str):
     try:
         return _nodes_of(topic)
     except _MASTER_ERRORS:
         return []
 
 
-def _explain_topic(topic):
+def _explain_topic(topic: str) -> str:
     """Explain from the master's data why no message of `topic` came."""
     try:
         published = dict(_master().getSystemState()[0])

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Check that this SDK fits the robot's software. Free of ROS."""
+from __future__ import annotations
+
 import errno
 import re
+from typing import Any
 
 
 class VersionMismatch(OSError):
@@ -11,11 +14,11 @@ class VersionMismatch(OSError):
     it ends a program with exit status 1, as in the original SDK.
     """
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__(errno.EPROTO, text)
 
 
-def require_compatible(robot_version, sdk_version, robots_by_sdk):
+def require_compatible(robot_version: Any, sdk_version: str, robots_by_sdk: dict[str, list[str]]) -> None:
     """Check the text of the robot's software version against a table of those that each SDK works with.
 
     Only the first three numbers count: "1.2.0", "1.2.0.57" and "1.2.0-rc1" are the same robot software. Raises

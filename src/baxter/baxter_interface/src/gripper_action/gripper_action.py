@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server that moves a gripper: robot/end_effector/<gripper>/gripper_action."""
+from __future__ import annotations
+
 import errno
 import math
+from typing import Any
 
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
@@ -30,7 +33,7 @@ class GripperActionServer:
     OSError if that fails, or if the gripper is neither electric nor a suction cup.
     """
 
-    def __init__(self, gripper, reconfig_server):
+    def __init__(self, gripper, reconfig_server) -> None:
         self._gripper = Gripper(gripper, CHECK_VERSION)
         self._config = reconfig_server
         name, kind = self._gripper.name, self._gripper.type()
@@ -42,11 +45,11 @@ class GripperActionServer:
         self._loop = GoalLoop("robot/end_effector/%s/gripper_action" % name, GripperCommandAction, RobotEnable(), name,
                               self._begin)
 
-    def clean_shutdown(self):
+    def clean_shutdown(self) -> None:
         """End the goal, if there is one."""
         self._loop.clean_shutdown()
 
-    def _prepare(self):
+    def _prepare(self) -> None:
         if self._gripper.error():
             self._gripper.reset(block=True)
         if self._gripper.error():
@@ -57,7 +60,7 @@ class GripperActionServer:
                 raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled (%s)?"
                               % (self._gripper.name, ENABLE))
 
-    def _begin(self, handle):
+    def _begin(self, handle: Any):
         command = handle.get_goal().command
         position, effort = command.position, command.max_effort
         settings = {name[len(self._gripper.name) + 1:]: value for name, value in self._config.config.items()
@@ -68,7 +71,7 @@ class GripperActionServer:
         action = self._actions(self._gripper, settings, position, effort)
         result = GripperCommandResult()
 
-        def step():
+        def step() -> bool:
             result.position, result.effort, result.stalled, result.reached_goal = action.observe()
             handle.publish_feedback(GripperCommandFeedback(result.position, result.effort, result.stalled,
                                                            result.reached_goal))
@@ -84,13 +87,13 @@ class GripperActionServer:
             make_result=lambda: result, timeout_s=settings["timeout"], refusal=refusal)
 
 
-def _effort(asked, default):
+def _effort(asked: float, default: float) -> float:
     """The force [%] for a goal's max_effort."""
     return default if asked == 0.0 else 100.0 if asked == -1.0 else clip_percent(asked)
 
 
 class _Electric:
-    def __init__(self, gripper, settings, position, effort):
+    def __init__(self, gripper, settings: dict[str, float], position: float, effort: float) -> None:
         self._gripper = gripper
         self._position = clip_percent(position)
         self._dead_zone = settings["goal"]
@@ -99,7 +102,7 @@ class _Electric:
                         "holding_force": settings["holding_force"], "dead_zone": self._dead_zone}
         self._pushes = 0
 
-    def observe(self):
+    def observe(self) -> tuple[float, float, bool, bool]:
         """(position [%], force [%], stalled, reached)."""
         position, force = self._gripper.position(), self._gripper.force()
         closes = self._position < position
@@ -107,7 +110,7 @@ class _Electric:
         stalled = held and self._pushes >= STEPS_TO_BEGIN and not self._gripper.moving()
         return position, force, stalled, abs(position - self._position) < self._dead_zone
 
-    def push(self):
+    def push(self) -> None:
         self._pushes += 1
         if {name: self._gripper.parameters().get(name) for name in self._wanted} != self._wanted:
             self._gripper.set_parameters(self._wanted)
@@ -115,7 +118,7 @@ class _Electric:
 
 
 class _Suction:
-    def __init__(self, gripper, settings, position, effort):
+    def __init__(self, gripper, settings: dict[str, float], position: float, effort: float) -> None:
         self._gripper = gripper
         self._opens = position >= OPEN
         self._timeout_s = settings["timeout"] if settings["timeout"] >= 0.0 else LONG_SUCTION_S
@@ -123,13 +126,13 @@ class _Suction:
                         "blow_off_seconds": settings["blow_off"]}
         self._pushed = False
 
-    def observe(self):
+    def observe(self) -> tuple[float, float, bool, bool]:
         """(position [%], vacuum [%], stalled, reached)."""
         reached = self._pushed and (not (self._gripper.sucking() or self._gripper.blowing()) if self._opens
                                     else self._gripper.gripping())
         return self._gripper.position(), self._gripper.vacuum_sensor(), False, reached
 
-    def push(self):
+    def push(self) -> None:
         if self._pushed:
             return
         self._pushed = True

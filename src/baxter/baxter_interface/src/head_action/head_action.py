@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server that turns the head: robot/head/head_action."""
+from __future__ import annotations
+
 import math
+from typing import Any
 
 import rospy
 from control_msgs.msg import SingleJointPositionAction, SingleJointPositionFeedback, SingleJointPositionResult
@@ -22,22 +25,22 @@ class HeadActionServer:
     preempted; when it is not reached the head stops where it is. Waits for the robot, and raises, as Head does.
     """
 
-    def __init__(self, reconfig_server):
+    def __init__(self, reconfig_server) -> None:
         self._config = reconfig_server
         self._head = Head()
         self._limit = read_joint_limits([HEAD_JOINT])[HEAD_JOINT]
         self._loop = GoalLoop(ACTION_NAME, SingleJointPositionAction, RobotEnable(), "head", self._begin)
 
-    def clean_shutdown(self):
+    def clean_shutdown(self) -> None:
         """End the goal, if there is one."""
         self._loop.clean_shutdown()
 
-    def _begin(self, handle):
+    def _begin(self, handle: Any):
         goal = handle.get_goal()
         tolerance, timeout_s = self._config.config["goal"], self._config.config["timeout"]
         last = [rospy.get_time(), self._head.pan()]
 
-        def step():
+        def step() -> bool:
             now_s, pan = rospy.get_time(), self._head.pan()
             velocity = (pan - last[1]) / (now_s - last[0]) if now_s > last[0] else 0.0
             last[:] = now_s, pan
@@ -56,7 +59,7 @@ class HeadActionServer:
                 self._head.pan(), goal.position - self._head.pan(), goal.position, tolerance),
             make_result=SingleJointPositionResult, timeout_s=timeout_s, refusal=self._refusal(goal))
 
-    def _refusal(self, goal):
+    def _refusal(self, goal) -> str:
         """Why a goal cannot be carried out, "" if it can."""
         if not math.isfinite(goal.position) or not math.isfinite(goal.max_velocity):
             return "position and max_velocity must be finite numbers, got %r and %r" % (
@@ -67,5 +70,5 @@ class HeadActionServer:
                 self._limit.lower, self._limit.upper, goal.position)
         return ""
 
-    def _turn(self, angle, speed):
+    def _turn(self, angle: float, speed: float) -> None:
         self._head.set_pan(angle, speed, timeout=0)

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of the trajectory server to one arm, tick by tick. Free of ROS; time is an argument."""
+from __future__ import annotations
+
 import enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from baxter_control.pid import PID
 from joint_trajectory import Follower, GoalTolerances, Tolerances, bounds, merge_tolerances
+
+if TYPE_CHECKING:
+    from joint_trajectory.command import Command
+    from joint_trajectory.limits import Limits
 
 # Duration of a stop, from the present velocity to rest [s].
 STOP_DURATION_S = 0.25
@@ -40,9 +46,9 @@ class GoalDefaults(NamedTuple):
     gains: np.ndarray
 
     @classmethod
-    def from_config(cls, config, joint_names):
+    def from_config(cls, config: dict[str, float], joint_names: list[str]) -> GoalDefaults:
         """From the server's parameters, a mapping; gains that a mode does not have are 0."""
-        def column(ending, *default):
+        def column(ending: str, *default: float) -> np.ndarray:
             return np.array([config.get(name + ending, *default) for name in joint_names], dtype=float)
 
         return cls(column("_trajectory"), column("_goal"), float(config["stopped_velocity_tolerance"]),
@@ -62,7 +68,7 @@ class ArmMotion:
         When the present goal's trajectory began [s].
     """
 
-    def __init__(self, joint_names, mode, period_s, limits=None):
+    def __init__(self, joint_names: list[str], mode: Mode, period_s: float, limits: Limits | None = None) -> None:
         """``mode``: :class:`Mode`; ``period_s`` [s] between ticks; ``limits``: :class:`joint_trajectory.Limits`."""
         self.joint_names = list(joint_names)
         self.goal = None
@@ -77,7 +83,8 @@ class ArmMotion:
         self._now_s = 0.0
         self._output = np.zeros((3, len(self.joint_names)))
 
-    def begin(self, command, now_s, position, goal, settings, wanted=_AS_SETTINGS):
+    def begin(self, command: Command, now_s: float, position: np.ndarray, goal: Any, settings: GoalDefaults,
+              wanted: GoalTolerances = _AS_SETTINGS) -> Any:
         """Follow ``command`` (:class:`joint_trajectory.Command`) from ``now_s`` [s] on.
 
         ``position`` (n,): measured [rad]; ``goal``: any object. ``wanted``: the goal's own
@@ -107,7 +114,7 @@ class ArmMotion:
         self.begin_s = now_s if command.start_time is None else command.start_time
         return replacement
 
-    def tick(self, now_s, position, velocity):
+    def tick(self, now_s: float, position: np.ndarray, velocity: np.ndarray) -> None:
         """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`Verdict` if the goal ends now.
 
         A goal that fails during the motion stops the joints where they are; one that fails at its end holds the end.
@@ -126,7 +133,7 @@ class ArmMotion:
             self._correct()
         return verdict
 
-    def command(self):
+    def command(self) -> dict[str, float]:
         """The command of this tick: {joint name: rad, or rad/s in velocity mode} of the joints that goals have
         named."""
         row = 1 if self._mode is Mode.VELOCITY else 0
@@ -134,7 +141,7 @@ class ArmMotion:
                 in zip(self.joint_names, self._output[row], self._named, strict=True) if named}
 
     @property
-    def output(self):
+    def output(self) -> np.ndarray:
         """(3, n): position, velocity, acceleration that the last tick commands; read only."""
         return self._output
 
@@ -144,38 +151,38 @@ class ArmMotion:
         return self._follower.desired
 
     @property
-    def error(self):
+    def error(self) -> np.ndarray:
         """(3, n): wanted minus measured at the last tick; read only."""
         return self._follower.error
 
-    def farthest(self, position):
+    def farthest(self, position: np.ndarray) -> tuple[str, float]:
         """The joint with the largest error to the end of the trajectory: (name, error [rad])."""
         end = self._follower.trajectory.sample(self._follower.trajectory.end_time)[0]
         error = np.where(self._named, end - position, 0.0)
         joint = int(np.argmax(np.abs(error)))
         return self.joint_names[joint], float(error[joint])
 
-    def stop(self, now_s, position):
+    def stop(self, now_s: float, position: np.ndarray) -> None:
         """End the goal, come to rest and hold."""
         self.goal = None
         self._follower.release()
         self._follower.stop(now_s, position)
 
-    def release(self):
+    def release(self) -> None:
         """End the goal and command nothing any more."""
         self.goal = None
         self.engaged = False
         self._follower.release()
 
-    def _make_pids(self, settings):
+    def _make_pids(self, settings: GoalDefaults) -> None:
         self._pids = [PID(*gains, now=lambda: self._now_s) for gains in settings.gains.T.tolist()]
 
-    def _set_gains(self, settings):
+    def _set_gains(self, settings: GoalDefaults) -> None:
         for pid, (kp, ki, kd) in zip(self._pids, settings.gains.T.tolist(), strict=True):
             pid.set_kp(kp)
             pid.set_ki(ki)
             pid.set_kd(kd)
 
-    def _correct(self):
+    def _correct(self) -> None:
         for joint, pid in enumerate(self._pids):
             self._output[1, joint] += pid.compute_output(float(self.error[0, joint]))

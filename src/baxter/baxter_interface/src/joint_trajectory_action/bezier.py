@@ -6,10 +6,15 @@ with continuous second derivative; each of its N pieces is a Bezier curve of fou
 it knows the times of the points. Free of ROS. (Source: G. Farin, Curves and Surfaces for CAGD, cubic spline
 interpolation.)
 """
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 
 
-def de_boor_control_pts(points_array, d0=None, dN=None, natural=True):
+def de_boor_control_pts(points_array: np.ndarray, d0: list[float] | None = None, dN: Any | None = None,
+                        natural: bool = True) -> np.ndarray:
     """Control points (N + 3, k) of the spline through `points_array` (N + 1, k).
 
     The first and the last are those of the points. `d0` and `dN` (k,) are the ones next to them; where one is not given
@@ -38,7 +43,7 @@ def de_boor_control_pts(points_array, d0=None, dN=None, natural=True):
     return np.vstack([points[:1], np.linalg.solve(system, right), points[-1:]])
 
 
-def bezier_coefficients(points_array, d_pts):
+def bezier_coefficients(points_array: np.ndarray, d_pts: np.ndarray) -> np.ndarray:
     """Bezier points (k, N, 4) of the N pieces, from the points (N + 1, k) and their de_boor_control_pts (N + 3, k)."""
     points = np.atleast_2d(np.asarray(points_array, dtype=float))
     control = np.asarray(d_pts, dtype=float)[1:-1]
@@ -46,7 +51,7 @@ def bezier_coefficients(points_array, d_pts):
     return np.concatenate([points[:-1].T[:, :, None], inner, points[1:].T[:, :, None]], axis=2)
 
 
-def bezier_point(b_coeffs, b_index, t):
+def bezier_point(b_coeffs: np.ndarray, b_index: int, t: float) -> np.ndarray:
     """The point (k,) of piece `b_index`, 1 to N, at its parameter `t`, 0 to 1.
 
     Index 0 and less is the start of the curve, above N its end. `b_coeffs` (k, N, 4): bezier_coefficients.
@@ -59,7 +64,7 @@ def bezier_point(b_coeffs, b_index, t):
     return b_coeffs[:, b_index - 1] @ np.array([s**3, 3.0 * t * s**2, 3.0 * t**2 * s, t**3])
 
 
-def bezier_curve(b_coeffs, num_intervals):
+def bezier_curve(b_coeffs: np.ndarray, num_intervals: int) -> np.ndarray:
     """Points (N num_intervals + 1, k) along the whole curve, `num_intervals` from each of the N pieces."""
     pieces = b_coeffs.shape[1]
     points = [bezier_point(b_coeffs, piece + 1, step / num_intervals)
@@ -67,7 +72,7 @@ def bezier_curve(b_coeffs, num_intervals):
     return np.array([*points, bezier_point(b_coeffs, pieces + 1, 0.0)])
 
 
-def _inner_weights(pieces):
+def _inner_weights(pieces: int) -> np.ndarray:
     """(N, 2, 2): what the two control points about each piece weigh in its two inner Bezier points.
 
     The knots are 1 apart, and those beyond the ends fall on the ends.

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server that moves an arm along trajectories: robot/limb/<limb>/follow_joint_trajectory."""
+from __future__ import annotations
+
 import collections
 import threading
 import traceback
+from typing import Any
 
 import actionlib
 import numpy as np
@@ -63,7 +66,7 @@ class JointTrajectoryActionServer:
     for the robot, and raises, as Limb does.
     """
 
-    def __init__(self, limb, reconfig_server, rate=100.0, mode="position_w_id"):
+    def __init__(self, limb: str, reconfig_server, rate: float = 100.0, mode: str = "position_w_id") -> None:
         self._mode = Mode(mode)
         self._config = reconfig_server
         self._limb = Limb(limb)
@@ -99,7 +102,7 @@ class JointTrajectoryActionServer:
         """Tell whether the robot is enabled."""
         return self._watch.is_enabled()
 
-    def clean_shutdown(self):
+    def clean_shutdown(self) -> None:
         """End the goal, if there is one, and leave the arm holding where it is."""
         with self._wake:
             self._ending = True
@@ -108,7 +111,7 @@ class JointTrajectoryActionServer:
 
     # -- rospy's threads --------------------------------------------------------------------------------------------
 
-    def _on_goal(self, handle):
+    def _on_goal(self, handle: Any) -> None:
         """Read a goal; refuse it at once if it is invalid in itself."""
         trajectory = handle.get_goal().trajectory
         try:
@@ -122,21 +125,21 @@ class JointTrajectoryActionServer:
         else:
             self._post(lambda: self._begin(handle, command))
 
-    def _on_cancel(self, handle):
+    def _on_cancel(self, handle: Any) -> None:
         self._post(lambda: self._cancel(handle))
 
-    def _on_joint_command(self, message):
+    def _on_joint_command(self, message: Any) -> None:
         if self._motion.engaged and message._connection_header["callerid"] != rospy.get_name():
             self._post(lambda: self._yield_to(message._connection_header["callerid"]))
 
-    def _post(self, request):
+    def _post(self, request) -> None:
         with self._wake:
             self._requests.append(request)
             self._wake.notify()
 
     # -- the loop's thread ------------------------------------------------------------------------------------------
 
-    def _guarded(self):
+    def _guarded(self) -> None:
         try:
             self._run()
         except Exception:
@@ -145,7 +148,7 @@ class JointTrajectoryActionServer:
                 rospy.logfatal("%s arm: the trajectory server has failed:\n%s", self._limb.name, traceback.format_exc())
                 rospy.signal_shutdown("the trajectory server of the %s arm has failed" % self._limb.name)
 
-    def _run(self):
+    def _run(self) -> None:
         while not self._ending:
             with self._wake:
                 self._wake.wait_for(lambda: self._ending or self._requests or self._motion.engaged, _IDLE_S)
@@ -159,7 +162,7 @@ class JointTrajectoryActionServer:
         for request in self._drained():
             request()
 
-    def _tick(self):
+    def _tick(self) -> None:
         self._tell_whether_gone()
         if self._motion.engaged and (trouble := self._watch.trouble()):
             self._give_up(trouble)
@@ -190,7 +193,7 @@ class JointTrajectoryActionServer:
         return (np.array([angles[name] for name in self._names]),
                 np.array([velocities.get(name, 0.0) for name in self._names]))
 
-    def _begin(self, handle, command):
+    def _begin(self, handle: Any, command):
         handle.set_accepted()
         why = "" if self._motion.engaged else self._watch.begin()
         if self._ending:
@@ -215,18 +218,18 @@ class JointTrajectoryActionServer:
             rospy.logwarn("%s arm: %d of %s are left out: the first was due %.3f s ago", self._limb.name,
                           replacement.dropped, counted(len(command.times), "point"), replacement.late_s)
 
-    def _cancel(self, handle):
+    def _cancel(self, handle: Any) -> None:
         if self._motion.goal is not None and self._motion.goal == handle:
             self._motion.stop(self._now_s(), self._measured()[0])
             handle.set_canceled(text="cancelled by request; the arm holds")
 
-    def _yield_to(self, node):
+    def _yield_to(self, node) -> None:
         if self._motion.engaged and self._motion.goal is None:
             rospy.loginfo("%s arm: %s commands it now, so the end of the last trajectory is not held any longer",
                           self._limb.name, node)
             self._motion.release()
 
-    def _send(self, now_s):
+    def _send(self, now_s: float) -> None:
         command = self._motion.command()
         if self._mode is Mode.VELOCITY:
             self._limb.set_joint_velocities(command)
@@ -239,7 +242,7 @@ class JointTrajectoryActionServer:
             self._dynamics_publisher.publish(JointTrajectoryPoint(
                 *self._motion.output.tolist(), [], rospy.Duration.from_sec(max(now_s - self._motion.begin_s, 0.0))))
 
-    def _publish_feedback(self, goal, now_s, position, velocity):
+    def _publish_feedback(self, goal, now_s: float, position: Any, velocity: np.ndarray) -> None:
         if not self._server.feedback_pub.get_num_connections():
             return
         since = rospy.Duration.from_sec(max(now_s - self._motion.begin_s, 0.0))
@@ -252,7 +255,7 @@ class JointTrajectoryActionServer:
 
     # -- ends of goals ----------------------------------------------------------------------------------------------
 
-    def _conclude(self, handle, verdict):
+    def _conclude(self, handle: Any, verdict) -> None:
         if verdict.outcome is Outcome.SUCCEEDED:
             handle.set_succeeded(FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), ""))
         else:
@@ -260,11 +263,11 @@ class JointTrajectoryActionServer:
             threading.Thread(target=self._abort_with_reason, daemon=True,
                              args=(handle, code_of_outcome(verdict.outcome), verdict.text)).start()
 
-    def _abort_with_reason(self, handle, code, text):
+    def _abort_with_reason(self, handle: Any, code, text: str) -> None:
         why = ask_what_holds(self._limb.name, is_kept_away=self._mode is not Mode.POSITION_WITH_DYNAMICS)
         self._abort(handle, code, "; ".join(filter(None, (text, why))))
 
-    def _give_up(self, why):
+    def _give_up(self, why) -> None:
         """End the goal or the hold, and stop the arm, if it can still be commanded.
 
         The last command may be far from the arm's present position, and a robot follows it until it expires.
@@ -281,16 +284,16 @@ class JointTrajectoryActionServer:
             self._abort(goal, ErrorCode.PATH_TOLERANCE_VIOLATED.value, text)
         self._motion.release()
 
-    def _refuse(self, handle, error):
+    def _refuse(self, handle: Any, error) -> None:
         """Abort a goal before its start; `error`: an exception or a text."""
         code = code_of_error(error, bool(handle.get_goal().trajectory.header.stamp))
         threading.Timer(SHORTEST_GOAL_S, self._abort, (handle, code, str(error))).start()
 
-    def _abort(self, handle, code, text):
+    def _abort(self, handle: Any, code, text: str) -> None:
         rospy.logerr("%s arm: goal aborted: %s", self._limb.name, text)
         handle.set_aborted(FollowJointTrajectoryResult(code, text), text)
 
-    def _tell_whether_gone(self):
+    def _tell_whether_gone(self) -> None:
         gone = self._watch.is_gone()
         if gone and not self._was_gone:
             rospy.logwarn("%s arm: the robot is gone (nobody publishes joint states); goals are refused until it is "

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Watches robot, cuff and clock for reasons why an arm cannot be commanded, now or since a motion began."""
+from __future__ import annotations
+
 import threading
 import time
+from typing import Any
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, DigitalIOState
@@ -22,7 +25,7 @@ class RobotWatch:
     One message with a disabled robot is enough: events are kept until :meth:`begin`.
     """
 
-    def __init__(self, side):
+    def __init__(self, side: str) -> None:
         self._side = side
         self._lock = threading.Lock()
         self._state = None
@@ -69,7 +72,7 @@ class RobotWatch:
             return "the robot has reported no joint states for %.1f s" % age_s
         return ""
 
-    def was_interrupted(self):
+    def was_interrupted(self) -> bool:
         """Whether an event since :meth:`begin` ends a motion; cheaper than :meth:`trouble`."""
         return bool(self._event)
 
@@ -85,10 +88,10 @@ class RobotWatch:
     def _age_s(self):
         return rospy.get_time() - self._heard_ros_s
 
-    def _note(self, event):
+    def _note(self, event: Any) -> None:
         self._event = self._event or event
 
-    def _on_state(self, message):
+    def _on_state(self, message: Any) -> None:
         with self._lock:
             self._state = message
             if message.stopped:
@@ -96,17 +99,17 @@ class RobotWatch:
             elif not message.enabled:
                 self._note("the robot was disabled")
 
-    def _on_reset(self):
+    def _on_reset(self) -> None:
         with self._lock:
             self._note(PUT_ELSEWHERE)
 
-    def _on_cuff(self, message):
+    def _on_cuff(self, message: Any) -> None:
         with self._lock:
             self._cuff = message.state == DigitalIOState.PRESSED
             if self._cuff:
                 self._note("the %s cuff was squeezed" % self._side)
 
-    def _on_joint_states(self, _message):
+    def _on_joint_states(self, _message) -> None:
         now_s = rospy.get_time()
         with self._lock:
             if self._heard_ros_s is not None and now_s < self._heard_ros_s:

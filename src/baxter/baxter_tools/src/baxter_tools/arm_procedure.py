@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Programs that let the robot run a procedure on one arm: taring, calibrating."""
+from __future__ import annotations
+
 import argparse
 
 import rospy
@@ -10,7 +12,7 @@ from baxter_interface.programs import ProgramFailed, run
 from baxter_model import SIDES
 
 
-def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):
+def run_arm_procedure(node_name, procedure, kind, data, timeout_s: float, description):
     """Parse the options, run `procedure` on the arm, and return the exit status.
 
     Parameters: `procedure` as the robot calls it; `kind` of its enable message and its `data`; `timeout_s`.
@@ -21,7 +23,7 @@ def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):
     parser.add_argument("-l", "--limb", required=True, choices=SIDES, help="the arm")
     limb = parser.parse_args(rospy.myargv()[1:]).limb
 
-    def body():
+    def body() -> None:
         robot = RobotEnable(CHECK_VERSION)
         _require_bare_hand(limb, procedure)
         controller = RobustController("/robustcontroller/%s/%s" % (limb, procedure), kind(True, "sdk", data),
@@ -37,7 +39,7 @@ def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):
     return run("%s_%s" % (node_name, limb), body)
 
 
-def _require_bare_hand(limb, procedure):
+def _require_bare_hand(limb: str, procedure) -> None:
     """Raise ProgramFailed if the arm carries a gripper: the robot would count its weight as the arm's."""
     try:
         kind = Gripper(limb).type()

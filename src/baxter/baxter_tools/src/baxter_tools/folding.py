@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fold both arms up and unfold them, around each other and the body."""
+from __future__ import annotations
+
 import contextlib
 import itertools
 import threading
+from typing import Any
 
 import numpy as np
 import rospy
@@ -35,7 +38,7 @@ OPEN_POSES = ("untucked", "neutral")
 class Arms:
     """Both arms as one set of joints."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._limbs = [Limb(side) for side in SIDES]
         self.names = [name for limb in self._limbs for name in limb.joint_names()]
         self._switch = None
@@ -44,12 +47,12 @@ class Arms:
         """Return the joint angles as a dict of name to rad."""
         return {name: angle for limb in self._limbs for name, angle in limb.joint_angles().items()}
 
-    def command(self, angles, raw):
+    def command(self, angles, raw) -> None:
         """Command joint angles, a dict of name to rad; as Limb.set_joint_positions."""
         for limb in self._limbs:
             limb.set_joint_positions({name: angles[name] for name in limb.joint_names()}, raw)
 
-    def follow(self, way, is_enabled):
+    def follow(self, way, is_enabled) -> None:
         """Move both arms through the postures of `way` (dicts of name to rad), all joints in step; stop at each.
 
         `is_enabled` returns whether the robot is enabled. Raises ProgramFailed; the arms then stay where they are.
@@ -77,7 +80,7 @@ class Arms:
     def _resets(self):
         return [limb.resets for limb in self._limbs]
 
-    def _step(self, move, elapsed_s, enabled, resets):
+    def _step(self, move, elapsed_s, enabled: bool, resets):
         speeds = {name: speed for limb in self._limbs for name, speed in limb.joint_velocities().items()}
         return move.step(elapsed_s, self.angles(), speeds, refusal="" if enabled else NOT_ENABLED,
                          interrupted=PUT_ELSEWHERE if self._resets() != resets else "")
@@ -89,7 +92,7 @@ class Folding:
     Reads the robot's description from the parameter server. Raises ProgramFailed if there is none.
     """
 
-    def __init__(self, names):
+    def __init__(self, names: list[str]) -> None:
         self._names = names
         text = rospy.get_param("robot_description", None)
         if text is None:
@@ -97,7 +100,7 @@ class Folding:
                                 % rospy.resolve_name("robot_description"))
         self._clearance = SelfClearance(text, names, rospy.logwarn)
 
-    def way(self, angles, pose):
+    def way(self, angles, pose: Any):
         """Return the path from `angles` (dict of name to rad) to the named pose as a list of such dicts.
 
         Raises ProgramFailed if there is none.
@@ -112,7 +115,7 @@ class Folding:
                                 "joint_position_keyboard.py" % (pose, failure)) from failure
         return [dict(zip(self._names, posture.tolist(), strict=True)) for posture in way]
 
-    def _posture(self, pose):
+    def _posture(self, pose: Any):
         angles = {name: angle for side in SIDES for name, angle in poses().angles(pose, side).items()}
         return np.array([angles[name] for name in self._names])
 
@@ -132,7 +135,7 @@ def own_collision_avoidance():
                   for side in SIDES]
     ended = threading.Event()
 
-    def suppress():
+    def suppress() -> None:
         # Wall time: simulation time may stand still.
         while not ended.wait(1.0 / SUPPRESS_RATE_HZ):
             for publisher in publishers:

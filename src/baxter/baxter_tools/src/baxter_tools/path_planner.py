@@ -5,9 +5,19 @@ Two trees of postures grow from both ends towards random ones and towards each o
 Kuffner and LaValle, ICRA 2000); then corners are cut off. Straight paths, also through given postures, are tried first:
 nearly always one of them is free.
 """
+from __future__ import annotations
+
 import itertools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import ArrayLike
+
+    from baxter_tools.self_clearance import SelfClearance
 
 # Distance between checked postures of a path, by the joint that moves most [rad].
 RESOLUTION_RAD = 0.02
@@ -37,13 +47,14 @@ class PathPlanner:
         one gives the same paths.
     """
 
-    def __init__(self, lower, upper, clearance, margin_m, rng):
+    def __init__(self, lower: ArrayLike, upper: ArrayLike, clearance: Callable[[Any], Any] | SelfClearance,
+                 margin_m: float, rng: Generator) -> None:
         self._lower, self._upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
         self._clearance = clearance
         self._margin_m = margin_m
         self._rng = rng
 
-    def plan(self, start, goal, via=()):
+    def plan(self, start: ArrayLike, goal: ArrayLike, via: Sequence[ArrayLike] = ()) -> list[ArrayLike]:
         """Return a path from `start` to `goal` as a list of postures, straight in between; `via`: postures to try
         first.
 
@@ -64,13 +75,13 @@ class PathPlanner:
                 return self._shorten([*way, *legs[1:]], margin_m)
         return self._shorten([*way, *self._connect(way[-1], goal, margin_m)[1:]], margin_m)
 
-    def _is_free(self, a, b, margin_m):
+    def _is_free(self, a: Any, b: Any, margin_m: float) -> bool:
         count = max(1, int(np.ceil(np.abs(b - a).max() / RESOLUTION_RAD)))
         # Coarse steps first: obstacles are thick, and are found sooner this way.
         steps = sorted(range(1, count + 1), key=_bits_reversed)
         return all(self._clearance(a + (b - a) * (step / count)) >= margin_m for step in steps)
 
-    def _escape(self, start, margin_m):
+    def _escape(self, start: np.ndarray, margin_m: float) -> np.ndarray:
         touch_m = self._clearance(start)
         for radius in ESCAPE_RADII_RAD:
             for _ in range(ESCAPE_TRIES):
@@ -79,7 +90,7 @@ class PathPlanner:
                     return end
         raise NoPath("parts of the robot touch (clearance %.0f mm) and no way out was found" % (1000.0 * touch_m))
 
-    def _connect(self, start, goal, margin_m):
+    def _connect(self, start: np.ndarray, goal: np.ndarray, margin_m: float) -> list[np.ndarray]:
         trees = [_Tree(start), _Tree(goal)]
         for turn in range(TREE_LIMIT):
             grown, other = trees[turn % 2], trees[1 - turn % 2]
@@ -93,7 +104,7 @@ class PathPlanner:
                     return here[::-1] + there[1:] if grown is trees[0] else there[::-1] + here[1:]
         raise NoPath("no free way was found in %d tries" % TREE_LIMIT)
 
-    def _grow(self, tree, target, margin_m):
+    def _grow(self, tree: _Tree, target: np.ndarray, margin_m: float) -> int | None:
         """Extend `tree` towards `target`; return the new node, or None if it is blocked."""
         nearest = tree.nearest(target)
         from_here = tree.postures[nearest]
@@ -101,7 +112,7 @@ class PathPlanner:
         end = target if distance <= STRETCH_RAD else from_here + (target - from_here) * (STRETCH_RAD / distance)
         return tree.add(end, nearest) if self._is_free(from_here, end, margin_m) else None
 
-    def _shorten(self, way, margin_m):
+    def _shorten(self, way: list[ArrayLike], margin_m: float) -> list[ArrayLike]:
         """Remove postures where the straight path is free. The first segment out of a contact stays."""
         first = 1 if len(way) > 1 and self._clearance(way[0]) < margin_m else 0
         for _ in range(SHORT_CUTS):
@@ -115,19 +126,19 @@ class PathPlanner:
 
 
 class _Tree:
-    def __init__(self, root):
+    def __init__(self, root: np.ndarray) -> None:
         self.postures = [root]
         self._parents = [None]
 
-    def nearest(self, target):
+    def nearest(self, target: np.ndarray) -> int:
         return int(np.abs(np.array(self.postures) - target).max(axis=1).argmin())
 
-    def add(self, posture, parent):
+    def add(self, posture: np.ndarray, parent: int) -> int:
         self.postures.append(posture)
         self._parents.append(parent)
         return len(self.postures) - 1
 
-    def branch(self, node):
+    def branch(self, node: int) -> list[np.ndarray]:
         """Postures from `node` back to the root."""
         way = []
         while node is not None:
@@ -136,5 +147,5 @@ class _Tree:
         return way
 
 
-def _bits_reversed(number):
+def _bits_reversed(number: int) -> int:
     return int(format(number, "016b")[::-1], 2)

@@ -3,6 +3,10 @@
 
 It uses the simulator's shapes and collision pairs, in a separate physics world.
 """
+from __future__ import annotations
+
+from collections.abc import Callable
+
 import numpy as np
 
 from baxter_model.description import finger_openings
@@ -26,7 +30,7 @@ class SelfClearance:
 
     FAR, SEEN_M = 1.0, 0.02
 
-    def __init__(self, urdf_xml, names, warn=LOG.warning):
+    def __init__(self, urdf_xml: str, names: list[str], warn: Callable[[str], None] = LOG.warning) -> None:
         robot = parse_urdf(urdf_xml, source="robot_description")
         self._world = World(find_mesh=ResourceFinder(), warn=warn, contact_ahead_m=self.SEEN_M)
         options = spawn_options(robot.links)
@@ -37,11 +41,11 @@ class SelfClearance:
         openings = finger_openings(robot)
         self._model.set_joint_positions(self._model.index(openings), np.array(list(openings.values())))
 
-    def __call__(self, posture):
+    def __call__(self, posture: np.ndarray) -> float:
         self._model.set_joint_positions(self._index, np.asarray(posture))
         self._world.detect_contacts()
         return min((contact.distance for contact in self._world.contacts(self._model)), default=self.FAR)
 
-    def close(self):
+    def close(self) -> None:
         """Close the physics world."""
         self._world.close()

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Short tests of everything the robot has; each is a function that raises when something is wrong."""
+from __future__ import annotations
+
 import concurrent.futures
 import itertools
 import os
+from typing import TYPE_CHECKING, Any
 
 import cv_bridge
 import numpy as np
@@ -17,6 +20,9 @@ from baxter_interface.camera import list_cameras
 from baxter_interface.navigator import LOCATIONS
 from baxter_interface.programs import ProgramFailed, expect
 from baxter_model import ELECTRIC, SIDES, poses
+
+if TYPE_CHECKING:
+    from datetime import datetime
 
 ZERO_G_S = 10.0
 MESSAGE_TIMEOUT_S = 5.0
@@ -38,7 +44,7 @@ CAMERA_RESOLUTION = (960, 600)
 USUAL_RESOLUTION, USUAL_FPS = (640, 400), 25.0
 
 
-def test_enable(say):
+def test_enable(say) -> None:
     """The robot can be enabled and disabled."""
     robot = RobotEnable()
     robot.enable()
@@ -47,7 +53,7 @@ def test_enable(say):
     robot.disable()
 
 
-def test_messages(say):
+def test_messages(say) -> None:
     """Joint states and analog states arrive."""
     for topic, kind in (("robot/joint_states", JointState), ("robot/analog_io_states", AnalogIOStates)):
         say("waiting for %s" % topic)
@@ -60,13 +66,13 @@ def test_messages(say):
             subscriber.unregister()
 
 
-def test_services(say):
+def test_services(say) -> None:
     """The left arm's inverse kinematics finds a posture."""
     angles = Limb("left").ik(REACHABLE)
     say("a posture for the pose: %s" % ", ".join("%s %.3f" % item for item in angles.items()))
 
 
-def test_head(say):
+def test_head(say) -> None:
     """The head turns and nods, and the screen shows pictures."""
     RobotEnable().enable()
     head = Head()
@@ -84,7 +90,7 @@ def test_head(say):
         RosClock().sleep(PICTURE_S)
 
 
-def test_move_arms(say):
+def test_move_arms(say) -> None:
     """Both arms move through four postures."""
     RobotEnable().enable()
     limbs = [Limb(side) for side in SIDES]
@@ -99,7 +105,7 @@ def test_move_arms(say):
                 expect(move.result(), "the %s arm did not get to posture %d" % (limb.name, number))
 
 
-def test_grippers(say):
+def test_grippers(say) -> None:
     """Both electric grippers calibrate, open, close and take positions and speeds."""
     RobotEnable().enable()
     for gripper in [Gripper(side) for side in SIDES]:
@@ -123,7 +129,7 @@ def test_grippers(say):
         gripper.set_parameters(defaults=True)
 
 
-def test_blink_leds(say):
+def test_blink_leds(say) -> None:
     """Every light of the navigators follows."""
     for name in LIGHTS:
         say("blinking %s" % name)
@@ -135,7 +141,7 @@ def test_blink_leds(say):
         light.set_output(before)
 
 
-def test_cameras(say):
+def test_cameras(say) -> None:
     """Every camera that has power opens, and its pictures arrive; they are shown on the screen."""
     names = list_cameras(MESSAGE_TIMEOUT_S)
     expect(names, "no camera has power")
@@ -147,7 +153,7 @@ def test_cameras(say):
             camera.resolution = CAMERA_RESOLUTION
             sizes = set()
 
-            def on_image(message, sizes=sizes):
+            def on_image(message: Any, sizes=sizes) -> None:
                 sizes.add((message.width, message.height))
                 screen.publish(message)
 
@@ -180,6 +186,6 @@ TESTS = {
 }
 
 
-def log_file_name(serial, version, now):
+def log_file_name(serial: str, version: str, now: datetime) -> str:
     """Name the log file of a robot's tests at `now`, a datetime."""
     return "%s-%d.%d.%d-rsdk-%s.smoketest" % (serial.replace(os.sep, "_"), now.month, now.day, now.year, version)

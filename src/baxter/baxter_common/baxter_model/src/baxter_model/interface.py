@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ROS interface of a physical robot: topics, services, parameters, frames, from interface.yaml beside this file."""
+from __future__ import annotations
+
 import functools
 import pathlib
 from dataclasses import dataclass
@@ -23,17 +25,17 @@ class Interface:
     frames: tuple
     types_not_public: tuple
 
-    def is_public(self, kind):
+    def is_public(self, kind: str | None) -> bool:
         """Can programs that are not the vendor's use this type of message or service?"""
         return kind is not None and not any(fnmatchcase(kind, pattern) for pattern in self.types_not_public)
 
 
-def both_sides(table):
+def both_sides(table: dict[str, str | None]) -> dict[str, str | None]:
     """The same table, with one row per side for names with {limb}."""
     return {name.format(limb=side): value for name, value in table.items() for side in SIDES}
 
 
-def group_of(name):
+def group_of(name: str) -> str:
     """The group that a topic is counted in: the part of its name below /robot, or its first part."""
     parts = name.strip("/").split("/")
     if parts[0] != "robot":
@@ -42,7 +44,7 @@ def group_of(name):
 
 
 @functools.cache
-def physical_robot():
+def physical_robot() -> Interface:
     """The Interface of a physical robot. Read once, and shared: do not change it."""
     import yaml
 

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sentences for all programs: why the robot does not move, and the command that helps."""
 
+from __future__ import annotations
+
+from typing import Any
+
 ENABLE = "rosrun baxter_tools enable_robot.py -e"
 RESET = "rosrun baxter_tools enable_robot.py -r"
 UNFOLD = "rosrun baxter_tools tuck_arms.py -u"
@@ -12,7 +16,7 @@ STOPPED = "the robot is stopped; release its stop button if it is pressed, then 
 STATES_KEPT = 100
 
 
-def why_not_ready(state):
+def why_not_ready(state: Any) -> str:
     """Return why a robot ignores motion commands, "" if it takes them.
 
     ``state``: anything with ``stopped`` and ``enabled``, such as a baxter_core_msgs/AssemblyState.
@@ -22,12 +26,12 @@ def why_not_ready(state):
     return "" if state.enabled else NOT_ENABLED
 
 
-def held_by_avoidance(parts):
+def held_by_avoidance(parts) -> str:
     """Return the sentence that collision avoidance holds an arm; ``parts``: names of those that it is too near to."""
     return ("collision avoidance holds it: it is too near to %s. Move it away by another way; unfold folded arms: %s"
             % (", ".join(parts), UNFOLD))
 
 
-def lost(topic):
+def lost(topic: str) -> str:
     """Return the sentence that the robot is gone, known by the silence of ``topic``."""
     return "the robot was lost: nobody publishes %s any more" % topic

@@ -5,7 +5,14 @@ Two kinds of pairs are left out: those that joint limits keep apart, and those w
 wide bend between them) overlap although the robot's covers do not. The latter are links one or two joints apart along
 an arm, the upper arm and the torso, and the two fingers of a hand (their boxes overlap by 5 mm when it is closed).
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from .names import BASE_FRAME, SIDES, finger_prefix
+
+if TYPE_CHECKING:
+    from urdf_model.model import Link
 
 # The torso: the link of this name is merged with all fixed links.
 BODY = BASE_FRAME
@@ -34,7 +41,7 @@ MESH_CUTS = {
 }
 
 
-def self_collision_pairs(links):
+def self_collision_pairs(links: dict[str, Link] | list[str]) -> list[tuple[str, str]]:
     """[(link, link)] of those that collide, for a Baxter with these link names (any container)."""
     arms = {side: _Arm(side, links) for side in SIDES}
     left, right = (arms[side] for side in SIDES)
@@ -47,7 +54,7 @@ def self_collision_pairs(links):
     return [pair for pair in pairs if all(link in links for link in pair)]
 
 
-def spawn_options(links):
+def spawn_options(links: dict[str, Link] | list[str]) -> dict[str, Any]:
     """Spawn options of a model plugin for a Baxter with these link names (any container).
 
     {"self_collision_pairs", "mesh_cuts": as for `bullet_sim.World.spawn`, "solids": as for
@@ -60,8 +67,8 @@ def spawn_options(links):
 class _Arm:
     """One arm's link names, as far as this robot has them."""
 
-    def __init__(self, side, links):
-        def named(*suffixes):
+    def __init__(self, side: str, links: dict[str, Link] | list[str]) -> None:
+        def named(*suffixes: str) -> tuple[str, ...]:
             return tuple("%s_%s" % (side, suffix) for suffix in suffixes)
 
         fingers = tuple(sorted(link for link in links

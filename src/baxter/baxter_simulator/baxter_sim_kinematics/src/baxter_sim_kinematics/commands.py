@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands fk and ik, and what they share with those of reach_commands. They need no master."""
+from __future__ import annotations
+
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +21,11 @@ from command_line.options import counted, number
 from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
+if TYPE_CHECKING:
+    from urdf_model.model import Robot
 
-def read_robot(path):
+
+def read_robot(path) -> Robot:
     """Return the urdf_model.Robot in a URDF or xacro file, of Baxter where ``path`` is None."""
     if path is None:
         import rospkg
@@ -26,7 +33,7 @@ def read_robot(path):
     return parse_urdf(description_text(Path(path)), source=str(path))
 
 
-def new_parser(description):
+def new_parser(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--side", choices=SIDES, default="left", help="arm of Baxter (default: left)")
     parser.add_argument("--urdf", type=Path, help="another robot's URDF or xacro file; give --tip with it")
@@ -35,14 +42,14 @@ def new_parser(description):
     return parser
 
 
-def with_numbers(parser):
+def with_numbers(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     """Let negative numbers such as -1e-3 be values, not options."""
     import re
     parser._negative_number_matcher = re.compile(r"^-(\d|\.\d)\S*$")
     return parser
 
 
-def chain_of(options):
+def chain_of(options: argparse.Namespace) -> tuple[Robot, Chain]:
     robot = read_robot(options.urdf)
     base = options.base or (BASE_FRAME if options.urdf is None else robot.root)
     if options.tip is None and options.urdf is not None:
@@ -64,7 +71,7 @@ def run_command(main):
         return 130
 
 
-def _row(values, number="%.6f"):
+def _row(values, number: str = "%.6f") -> str:
     return " ".join(number % value for value in values)
 
 
@@ -83,7 +90,7 @@ def fk():
     return run_command(lambda: _fk(parser.parse_args()))
 
 
-def _fk(options):
+def _fk(options: argparse.Namespace) -> int:
     _, chain = chain_of(options)
     q = chain.posture(np.radians(options.q) if options.degrees else options.q)
     pose, jacobian = chain.fk_and_jacobian(q)
@@ -130,7 +137,7 @@ def ik():
     return run_command(lambda: _ik(parser, parser.parse_args()))
 
 
-def _ik(parser, options):
+def _ik(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
     expected = 3 if options.position_only else 6 if options.rpy else 7
     if len(options.pose) != expected:
         parser.error("expected %s for the pose, got %d" % (counted(expected, "number"), len(options.pose)))
@@ -165,13 +172,13 @@ def _ik(parser, options):
     return 0
 
 
-def self_collision_checker(robot, warn):
+def self_collision_checker(robot: Robot, warn: Callable[[str], None]):
     """Return a BulletChecker of ``robot`` alone; ``warn`` is called with a text where a mesh is missing."""
     from baxter_sim_kinematics.self_checker import self_checker
     from model_files.resources import ResourceFinder
     return self_checker(robot, ResourceFinder(), warn)
 
 
-def tell(text):
+def tell(text: str) -> None:
     """Print a warning of this command."""
     print("%s: %s" % (Path(sys.argv[0]).name, text), file=sys.stderr)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Conversions between ROS messages and this package's own types. Few other modules know messages."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from baxter_kinematics_msgs.msg import IKVerdict
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
@@ -7,6 +11,9 @@ from sensor_msgs.msg import JointState
 from arm_kinematics.errors import NoSolution, Reason
 from arm_kinematics.target import pose_from_quaternion
 from urdf_model.transforms import quaternion_from_matrix
+
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
 
 _VERDICTS = {
     Reason.OUT_OF_REACH: IKVerdict.OUT_OF_REACH,
@@ -17,7 +24,7 @@ _VERDICTS = {
 }
 
 
-def pose_matrix(pose):
+def pose_matrix(pose: Any):
     """Return the (4, 4) matrix of a geometry_msgs/Pose. Raises InvalidTarget when it is not a pose."""
     point, turn = pose.position, pose.orientation
     return pose_from_quaternion((point.x, point.y, point.z), (turn.x, turn.y, turn.z, turn.w))
@@ -28,12 +35,12 @@ def transform_matrix(transform):
     return pose_matrix(Pose(position=transform.translation, orientation=transform.rotation))
 
 
-def posture(chain, joint_state):
+def posture(chain: Chain, joint_state):
     """Return the posture (n,) of ``chain`` that a sensor_msgs/JointState holds. Raises InvalidPosture."""
     return chain.posture_by_name(list(joint_state.name), list(joint_state.position))
 
 
-def joint_state(chain, q, order, stamp):
+def joint_state(chain: Chain, q, order, stamp):
     """Return a sensor_msgs/JointState of the posture ``q`` (n,), its joints in the given order of names."""
     by_name = dict(zip(chain.joint_names, q.tolist(), strict=True))
     message = JointState(name=list(order), position=[by_name[name] for name in order])
@@ -46,7 +53,7 @@ def pose_message(matrix):
     return Pose(Point(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
 
 
-def verdict(chain, error, target, order, stamp):
+def verdict(chain: Chain, error, target, order, stamp):
     """Return the IKVerdict of the exception ``error`` about the PoseStamped ``target``; see :func:`joint_state`."""
     message = IKVerdict(verdict=IKVerdict.INVALID_REQUEST, detail=str(error), target=target)
     if isinstance(error, NoSolution):

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The newest joint states of an arm, deserialized only on demand. Uses messages."""
+from __future__ import annotations
+
 import struct
+from typing import Any
 
 import genpy
 from sensor_msgs.msg import JointState
@@ -12,7 +15,7 @@ _STAMP = struct.Struct("<4xII")
 class UnreadJointState(JointState):
     """A JointState that keeps its bytes: only a few of the messages are ever read."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         """Does not create the fields: nobody reads them, and creating them takes as long as all other work here."""
 
     @property
@@ -31,7 +34,7 @@ class UnreadJointState(JointState):
 class NewestState:
     """Takes UnreadJointStates; any thread may read the newest one with all of ``joint_names``."""
 
-    def __init__(self, joint_names, time_went_back):
+    def __init__(self, joint_names, time_went_back) -> None:
         """``time_went_back()`` is called when a state is older than the one before it."""
         # A serialized string is its length and its bytes. The fingers may come in a message of their own.
         self._needed = [struct.pack("<I", len(name)) + name for name in map(str.encode, joint_names)]
@@ -39,7 +42,7 @@ class NewestState:
         self._serialized, self._stamp = None, (0, 0)
         self._read = None, None  # the last result, and the message that it came from
 
-    def take(self, message):
+    def take(self, message: Any):
         """Returns whether it has all of the joints, and so is the newest state now."""
         stamp = _STAMP.unpack_from(message.serialized)
         if stamp < self._stamp:

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of maps of reach: reach, reach_overlap and reach_place. They need no master."""
+from __future__ import annotations
+
 import argparse
 import csv
 import math
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,11 +31,15 @@ from baxter_sim_kinematics.commands import (
 from command_line.options import MAX_WORKERS, number
 from command_line.user_files import PIPE_WAIT_S, read_text
 
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
+    from urdf_model.model import Robot
+
 # Of a file of poses.
 MAX_BYTES = 100_000_000
 
 
-def _reach_parser():
+def _reach_parser() -> argparse.ArgumentParser:
     parser = with_numbers(new_parser(
         "Map what an arm reaches: in each cell of a volume the share of orientations that the tip can have\n"
         "there, and the mean manipulability. Writes reach.csv, reach.npz and reach.png. If interrupted, it continues\n"
@@ -62,7 +70,7 @@ def reach():
     return run_command(lambda: _reach(parser.parse_args()))
 
 
-def map_of(words):
+def map_of(words: list[str]) -> MapParts:
     """Return the reach.MapParts of the map that ``reach`` makes with the arguments ``words``."""
     options = _reach_parser().parse_args(words)
     robot, chain, settings = _settings(options)
@@ -70,7 +78,7 @@ def map_of(words):
     return MapParts(chain, settings, options.out, checker)
 
 
-def _settings(options):
+def _settings(options: argparse.Namespace) -> tuple[Robot, Chain, MapSettings]:
     """Return (urdf_model.Robot, Chain, MapSettings). Raises ReachError, UrdfError."""
     robot, chain = chain_of(options)
     volume = _volume(options, chain)
@@ -83,7 +91,7 @@ def _settings(options):
     return robot, chain, settings
 
 
-def _reach(options):
+def _reach(options: argparse.Namespace) -> int:
     from arm_kinematics.reach_picture import draw
 
     robot, chain, settings = _settings(options)
@@ -107,7 +115,7 @@ def _reach(options):
     return 0
 
 
-def _volume(options, chain):
+def _volume(options: argparse.Namespace, chain: Chain) -> list[float]:
     """The bounds x0 x1 y0 y1 z0 z1 [m], by default of all that the arm reaches."""
     if options.volume is not None:
         return options.volume
@@ -123,10 +131,10 @@ def _volume(options, chain):
 class _Bar:
     """A progress bar on a terminal, a line every tenth elsewhere."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._last = -1
 
-    def __call__(self, done, total):
+    def __call__(self, done: Callable[[], bool], total) -> None:
         tenth, terminal = 10 * done // total, sys.stderr.isatty()
         if terminal:
             full = 40 * done // total
@@ -151,7 +159,7 @@ def reach_overlap():
     return run_command(lambda: _overlap(parser.parse_args()))
 
 
-def _overlap(options):
+def _overlap(options: argparse.Namespace) -> int:
     from arm_kinematics.reach_picture import draw
 
     first, second = (ReachMap.read(path) for path in options.maps)
@@ -195,7 +203,7 @@ def reach_place():
     return run_command(lambda: _place(parser.parse_args()))
 
 
-def _place(options):
+def _place(options: argparse.Namespace) -> int:
     found = ReachMap.read(options.map)
     poses = (_task_poses(options.poses) if options.poses
              else table_poses(*options.table, options.step, found.rotations))
@@ -220,7 +228,7 @@ def _place(options):
     return 0
 
 
-def _is_solved(chain, pose, checker):
+def _is_solved(chain: Chain, pose: Any, checker) -> bool:
     try:
         solve(chain, pose, chain.mid_range, checker=checker)
     except NoSolution:

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Seeds for the searches of one request, and when the next seed is tried."""
+from __future__ import annotations
+
 import enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from arm_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
 from command_line.options import counted
+
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
 
 
 class SeedMode(enum.IntEnum):
@@ -24,7 +29,7 @@ _TRIED = {
 }
 
 
-def seed_mode(number):
+def seed_mode(number: str):
     """Return the SeedMode of a number. Raises InvalidSeed."""
     try:
         return SeedMode(number)
@@ -45,7 +50,7 @@ class SeedRequest(NamedTuple):
 class SeedPolicy:
     """Tries seeds in the order of the mode. ``neutral`` (n,): used if the current posture is not known."""
 
-    def __init__(self, chain, posture_map, neutral, current):
+    def __init__(self, chain: Chain, posture_map, neutral, current) -> None:
         """``current()``: returns the current posture (n,), or raises InvalidPosture, which says why it is not known."""
         self._chain, self._posture_map, self._neutral, self._current = chain, posture_map, neutral, current
         self._reported = None  # why the current posture was unknown at the last call, or None

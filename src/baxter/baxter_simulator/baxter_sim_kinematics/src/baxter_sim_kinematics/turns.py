@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A fair lock, which goes to the thread that has waited longest."""
+from __future__ import annotations
+
 import collections
 import threading
 
@@ -11,12 +13,12 @@ class Turns:
     all other threads waiting until its end.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()  # of what follows, and never held for long
         self._is_taken = False
         self._gates = collections.deque()
 
-    def __enter__(self):
+    def __enter__(self) -> Turns:
         with self._lock:
             if not self._is_taken:
                 self._is_taken = True
@@ -27,7 +29,7 @@ class Turns:
         gate.acquire()  # until it is handed over
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             if self._gates:
                 self._gates.popleft().release()
