@@ -32,14 +32,30 @@ ROBOT_CONFIG = "/robot_config/jcb_urdf_config/torso_t0/joint/"
 LARGEST_SERIAL = 2 ** 31 - 1
 
 
+def is_file(serial):
+    """Whether `serial` names a file of numbers, as `./baxter.sh sysid` writes it, and no number."""
+    return str(serial).endswith((".yaml", ".yml"))
+
+
+def numbers_of(serial):
+    """Path of the numbers of the robot `serial`: its file, or those that all numbered robots have."""
+    return str(serial) if is_file(serial) else effects.physical_robot()
+
+
 def checked(serial):
-    """A serial number as an integer. Raises HardwareError unless it is a whole number from 0 to LARGEST_SERIAL."""
+    """A serial number as an integer; of a robot with a file of its own, that of the drawing.
+
+    Raises HardwareError unless it is a YAML file or a whole number from 0 to LARGEST_SERIAL.
+    """
+    if is_file(serial):
+        return DRAWING
     try:
         number = int(str(serial))
     except ValueError:
         number = -1
     if not 0 <= number <= LARGEST_SERIAL or isinstance(serial, bool):
-        raise HardwareError("serial is %r; it must be a whole number, 0 (the drawing) to %d" % (serial, LARGEST_SERIAL))
+        raise HardwareError("serial is %r; it must be a whole number, 0 (the drawing) to %d, or a YAML file" % (
+            serial, LARGEST_SERIAL))
     return number
 
 

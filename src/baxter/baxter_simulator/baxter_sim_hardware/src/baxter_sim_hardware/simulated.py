@@ -37,7 +37,7 @@ class Which(NamedTuple):
     """Which robot it is; the package's README explains the parameters of the same names.
 
     profile: "sim" or "robot"; effects: a text such as "lag,noise", "all" or "none", or None for those of the profile;
-    serial: from 0; disabled: "hold" or "sink".
+    serial: from 0, or a YAML file of numbers; disabled: "hold" or "sink".
     """
 
     profile: str = "sim"
@@ -76,7 +76,7 @@ class SimulatedBaxter:
         limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
         usual = effects.ALL if which.profile == "robot" else effects.NONE
         chosen = self.chosen = effects.chosen(usual if which.effects is None else which.effects)
-        rows = self.numbers = effects.read(effects.physical_robot()) if chosen else {}
+        rows = self.numbers = effects.read(individual.numbers_of(which.serial)) if chosen else {}
         self.seed = int(world.random.integers(2**32)) if chosen & {"noise", "delay"} else None
         serial = individual.checked(which.serial)
         self._sensors = JointSensors(rows["noise"], names, self.seed, serial) if "noise" in chosen else None

@@ -11,8 +11,8 @@ Each joint is a series elastic actuator. Its controller sees the motor, not the 
 m, w: angle and speed of the motor, seen at the joint; q, v: of the link. So a load that the controller does not know
 bends the spring for good, and the error of the motor itself goes away by I, which acts at rest only.
 
-The counterbalance may be stronger than the controller knows, by a share of itself (`counterbalance_excess`). How far that
-bends the spring is measured, so an arm at rest is where it should be; the torque has to come from I, which is late.
+The counterbalance may be stronger than the controller knows, by a share of itself (`counterbalance_excess`). How far
+that bends the spring is measured, so an arm at rest is where it should be; the torque comes from I, which is late.
 
 Effort is told from how far the spring is bent, with hysteresis: after a way of some `hysteresis_way` in one direction
 all of `effort_hysteresis` is added to it, in that direction.
@@ -69,7 +69,8 @@ class Actuators:
 
     def __init__(self, rows, names):
         self._numbers = np.array([effects.per_joint(rows, number, names) for number in NUMBERS])
-        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6), ("motor_speed", 0.1)):
+        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6),
+                              ("motor_speed", 0.1)):
             values = self._numbers[NUMBERS.index(number)]
             if values.min() < least:
                 raise effects.HardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))

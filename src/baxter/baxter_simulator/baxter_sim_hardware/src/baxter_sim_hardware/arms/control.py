@@ -231,6 +231,12 @@ class Arms:
             self._is_settled = False
             self._move_in_step(command)
             return command
+        if command.mode is Mode.RAW_POSITION is limb.mode and not _any(modes.mode[command.index] != RAW_POSITION):
+            # A stream goes on: the joints' modes and speeds are as they were.
+            self._stream.take(points, modes.mode, command, self._measured.time_s)
+            modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
+            self._is_settled = False
+            return command
         named = np.zeros(len(self._all), dtype=bool)
         named[command.index] = True
         if limb.mode is not command.mode:

@@ -73,7 +73,8 @@ class ArmTopics(Part):
         if actuators is not None:
             acceleration, effort = arms.commanded_acceleration[joints], effort + actuators.added[joints]
             # What the springs beside the actuators carry is told with the hysteresis. s1's has the largest share.
-            hysteresis = (actuators.known_counterbalance(snapshot.position[self._arm_index]) + actuators.hysteresis)[joints]
+            known = actuators.known_counterbalance(snapshot.position[self._arm_index])
+            hysteresis = (known + actuators.hysteresis)[joints]
             model = (gravity + hysteresis, gravity, hysteresis, nothing,
                      actuators.hysteresis_share[joints[SPRING_JOINT]])
         return convert.sea_joint_state(
