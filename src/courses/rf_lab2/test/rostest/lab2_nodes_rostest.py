@@ -13,9 +13,9 @@ from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKResponse
 from baxter_kinematics_msgs.msg import IKReport, IKVerdict
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, TransformStamped
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from baxter_interface import Limb, NoIKSolution
+from lab_testing.knobs import set_knobs
 from lab_testing.waiting import stretched, wait_until
 
 DEADLINE_S = stretched(60.0)
@@ -55,12 +55,7 @@ class MoveBaxterTest(unittest.TestCase):
         self.set_knobs()
 
     def set_knobs(self, **knobs):
-        if rospy.has_param("/fake_robot"):
-            rospy.delete_param("/fake_robot")
-        for name, value in knobs.items():
-            rospy.set_param("/fake_robot/" + name, value)
-        rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
-        rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+        set_knobs("/fake_robot", **knobs)
 
     def wait_at(self, side, wanted):
         """A program ends within its tolerance; the robot moves on to the goal."""
