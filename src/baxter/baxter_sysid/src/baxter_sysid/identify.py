@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fit the numbers of an arm's actuators to what it did, and say which of them the recording determines.
+
+A number that the recording does not determine is not fitted: it keeps its value. What is left is fitted again.
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baxter_model import JOINTS, joint_names
+from baxter_sim_hardware import effects
+from baxter_sim_hardware.arms.actuators import NUMBERS
+from urdf_model import Robot
+
+from . import fit as least
+from .arm_body import ArmBody, Array, arm_body, hand_in_last, with_load
+from .recording import Recording, start_of
+from .replay import Motion, replay, set_points
+
+#: {number: (least, most, largest standard deviation with which it counts as determined: a share of it, or so much)}.
+FREE = {"proportional_gain": (5.0, 1500.0, 0.3, 0.0), "motor_damping": (0.05, 300.0, 0.45, 0.0),
+        "friction": (0.0, 8.0, 0.2, 0.25)}
+EXCESS = ("counterbalance_excess", "s1")
+#: Beside those of joints: the mass in the hand [kg], the way of a message to and fro [s].
+MASS, DELAY = ("mass", "hand"), ("delay", "messages")
+COMMON = {MASS: (0.0, 4.0, 0.2, 0.15), DELAY: (0.0, 0.06, 0.2, 0.003), EXCESS: (-0.5, 0.5, 0.2, 0.04)}
+#: The load's place on the hand's axis [m from the frame `<side>_hand`]: that of a gripper.
+LOAD_M = 0.08
+MAX_REFUSALS = 4
+#: The inertia about w2 is so small that only the ratios of its gain, damping and friction show in a motion.
+NEVER = ("proportional_gain", "w2")
+
+Name = tuple[str, str]
+
+
+class Settings(NamedTuple):
+    """load: whether a mass in the hand is fitted; known: whether the controller was told of it (`configure`); delay:
+    whether the way of messages is fitted; excess: whether s1's counterbalance is; given: [kg] a mass that is there."""
+
+    load: bool = False
+    known: bool = False
+    delay: bool = False
+    excess: bool = True
+    given: float = 0.0
+
+
+class Found(NamedTuple):
+    """names (p,) of the fitted numbers, values and deviations (p,); refused: {name: deviation} of those that the
+    recording does not determine; before, after, without (rows, arms, 7) [rad]: simulated less recorded, with the
+    numbers as they were, as fitted, and, in each block of time, as fitted without it; motions: of each arm, after;
+    numbers (k, 7): of the actuators."""
+
+    sides: tuple[str, ...]
+    names: list[Name]
+    values: Array
+    deviations: Array
+    refused: dict[Name, float]
+    before: Array
+    after: Array
+    without: Array
+    motions: list[Motion]
+    numbers: dict[str, Array]
+
+    def value(self, name: Name, default: float = 0.0) -> float:
+        """The fitted value of a number, or `default`."""
+        return float(self.values[self.names.index(name)]) if name in self.names else default
+
+
+class _Arm(NamedTuple):
+    side: str
+    body: ArmBody
+    hand: Array
+    numbers: Array
+    start: tuple[Array, Array]
+    commanded: Array
+    sensed: Array
+
+
+class Model:
+    """Arms that share the numbers that are fitted, and their recording.
+
+    rows: section "lag" of `effects.read`. Raises SysidError for a description that is no Baxter's.
+    """
+
+    def __init__(self, robot: Robot, rows: dict, recording: Recording, sides: tuple[str, ...], settings: Settings):
+        self.settings, self._period = settings, recording.period_s
+        self.arms = [_Arm(side, arm_body(robot, side), hand_in_last(robot, side),
+                          np.array([effects.per_joint(rows, number, joint_names(side)) for number in NUMBERS]),
+                          start_of(recording.sensed[side], self._period),
+                          recording.commanded[side], recording.sensed[side]) for side in sides]
+
+    def names(self) -> list[Name]:
+        """Of all numbers that may be fitted."""
+        settings = self.settings
+        common = [name for name, is_free in ((EXCESS, settings.excess), (MASS, settings.load), (DELAY, settings.delay))
+                  if is_free]
+        return [(number, joint) for number in FREE for joint in JOINTS if (number, joint) != NEVER] + common
+
+    def start(self, names: list[Name]) -> Array:
+        """(p,) the numbers as they are."""
+        first = self.arms[0].numbers
+        return np.array([{MASS: 0.5, DELAY: 0.01}[name] if name in (MASS, DELAY)
+                         else first[NUMBERS.index(name[0]), JOINTS.index(name[1])] for name in names])
+
+    def numbers(self, arm: _Arm, names: list[Name], values: Array) -> Array:
+        """(k, 7) of one arm's actuators."""
+        numbers = arm.numbers.copy()
+        for (number, joint), value in zip(names, values, strict=True):
+            if number in NUMBERS:
+                numbers[NUMBERS.index(number), JOINTS.index(joint)] = value
+        return numbers
+
+    def motions(self, names: list[Name], values: Array) -> list[Motion]:
+        """What the arms do with these numbers."""
+        common = dict(zip(names, values, strict=True))
+        mass, found = float(common.get(MASS, self.settings.given)), []
+        for arm in self.arms:
+            loaded = with_load(arm.body, mass, arm.hand[:3, :3] @ [0.0, 0.0, LOAD_M] + arm.hand[:3, 3])
+            points = set_points(arm.commanded, self._period, float(common.get(DELAY, 0.0)))
+            found.append(replay(loaded, loaded if self.settings.known else arm.body, self.numbers(arm, names, values),
+                                arm.start, points, self._period))
+        return found
+
+    def errors(self, names: list[Name], values: Array) -> Array:
+        """(rows, arms * 7) [rad] simulated less recorded."""
+        return np.concatenate([motion.position - arm.sensed
+                               for motion, arm in zip(self.motions(names, values), self.arms, strict=True)], axis=1)
+
+
+def identify(model: Model) -> Found:
+    """Fit a model's numbers."""
+    names, refused = model.names(), {NEVER: float("inf")}
+    before = model.errors([], np.zeros(0))
+    for _ in range(MAX_REFUSALS):
+        start = model.start(names)
+        bounds = _bounds(names, start)
+
+        def errors(values: Array, names: list[Name] = names) -> Array:
+            return model.errors(names, values)
+
+        found = least.least_squares(errors, start, bounds)
+        vague = _vague(names, found)
+        if not vague.any():
+            break
+        refused.update({name: float(deviation) for name, deviation, is_vague in zip(
+            names, found.deviation, vague, strict=True) if is_vague})
+        names = [name for name, is_vague in zip(names, vague, strict=True) if not is_vague]
+    without = found.error.copy()
+    others = least.left_out(errors, found, bounds)
+    for number, block in enumerate(least.block_slices(len(without))):
+        without[block] = others[number][block]
+    shape = (len(without), len(model.arms), len(JOINTS))
+    return Found(tuple(arm.side for arm in model.arms), names, found.numbers, found.deviation, refused,
+                 before.reshape(shape), found.error.reshape(shape), without.reshape(shape),
+                 model.motions(names, found.numbers),
+                 {arm.side: model.numbers(arm, names, found.numbers) for arm in model.arms})
+
+
+def _limits(name: Name) -> tuple[float, float, float, float]:
+    return COMMON[name] if name in COMMON else FREE[name[0]]
+
+
+def _bounds(names: list[Name], start: Array) -> least.Bounds:
+    limits = np.array([_limits(name)[:2] for name in names])
+    return least.Bounds(limits[:, 0], limits[:, 1], np.maximum(0.02 * np.abs(start), 2e-3))
+
+
+def _vague(names: list[Name], found: least.Fit) -> NDArray[np.bool_]:
+    """(p,) which numbers are not determined. Of a joint's gain and damping the vaguer one goes first: often only
+    their ratio, the joint's lag, is determined."""
+    limits = np.array([_limits(name)[2:] for name in names])
+    ratio = found.deviation / np.maximum(limits[:, 0] * np.abs(found.numbers), np.maximum(limits[:, 1], 1e-9))
+    vague = ratio > 1.0
+    for joint in JOINTS:
+        own = [index for index, name in enumerate(names) if name[1] == joint and name[0] in FREE and vague[index]]
+        for index in own:
+            vague[index] = index == max(own, key=lambda one: ratio[one])
+    return vague
+
+
+def table_of(table: dict, found: Found, source: str) -> dict:
+    """A copy of the YAML table of physical_robot.yaml in which the fitted numbers are an arm's own."""
+    lag = {number: {**row, "values": dict(row["values"])} for number, row in table["lag"].items()}
+    for number, joint in found.names:
+        if number not in NUMBERS:
+            continue
+        for side in found.sides:
+            lag[number]["values"]["%s_%s" % (side, joint)] = float(
+                "%.5g" % found.numbers[side][NUMBERS.index(number), JOINTS.index(joint)])
+        lag[number].update(grade="fitted", source=source)
+    return {**table, "lag": lag}
+
+

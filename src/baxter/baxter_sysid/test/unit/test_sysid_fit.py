@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Least squares on a model whose numbers are known: found, uncertain where the data say nothing, left out by blocks."""
+import numpy as np
+import pytest
+
+from baxter_sysid.fit import Bounds, block_slices, least_squares, left_out, rms
+
+TIME_S = np.linspace(0.0, 4.0, 400)
+TRUE = np.array([2.0, 0.7])
+BOUNDS = Bounds(np.array([0.0, 0.0]), np.array([10.0, 5.0]), np.array([0.02, 0.01]))
+
+
+def model(numbers):
+    return np.stack([numbers[0] * np.exp(-numbers[1] * TIME_S), np.sin(numbers[1] * TIME_S)], axis=1)
+
+
+def noisy(seed, size=0.02):
+    return model(TRUE) + size * np.random.default_rng(seed).standard_normal((len(TIME_S), 2))
+
+
+def test_numbers_are_found_within_their_uncertainty():
+    off = []
+    for seed in range(20):
+        data = noisy(seed)
+        fit = least_squares(lambda numbers, data=data: model(numbers) - data, np.array([5.0, 0.2]), BOUNDS)
+        off.append((fit.numbers - TRUE) / fit.deviation)
+        np.testing.assert_allclose(fit.numbers, TRUE, rtol=0.02)
+    assert 0.3 < np.std(off) < 2.5
+
+
+def test_numbers_of_which_only_the_ratio_counts_are_uncertain():
+    data = np.outer(TIME_S, [1.0, 1.0])
+    data = data + 0.01 * np.random.default_rng(1).standard_normal(data.shape)
+
+    def errors(numbers):
+        return np.outer(TIME_S, [1.0, 1.0]) * numbers[0] / numbers[1] - data
+
+    fit = least_squares(errors, np.array([3.0, 2.0]), BOUNDS)
+    assert fit.numbers[0] / fit.numbers[1] == pytest.approx(1.0, rel=0.01)
+    assert (fit.deviation > 0.3 * fit.numbers).all()
+
+
+def test_a_number_that_changes_nothing_is_kept_and_has_no_certainty():
+    fit = least_squares(lambda numbers: (numbers[0] - np.ones((50, 1))), np.array([3.0, 1.5]), BOUNDS)
+    assert fit.numbers == pytest.approx([1.0, 1.5]) and np.isinf(fit.deviation[1])
+
+
+def test_numbers_stay_within_their_bounds():
+    tight = BOUNDS._replace(most=np.array([1.5, 5.0]))
+    fit = least_squares(lambda numbers: model(numbers) - model(TRUE), np.array([1.0, 0.5]), tight)
+    assert fit.numbers[0] == 1.5
+
+
+def test_a_block_that_is_left_out_is_judged_by_the_others():
+    data = noisy(3)
+    strange = block_slices(len(TIME_S))[4]
+    data[strange] += 0.5
+    fit = least_squares(lambda numbers: model(numbers) - data, np.array([2.0, 0.7]), BOUNDS)
+    without = left_out(lambda numbers: model(numbers) - data, fit, BOUNDS, rounds=2)
+    assert without.shape == (10, *data.shape)
+    assert rms(without[4][strange]).min() > 0.45
+    # Without the strange block the others are as near as their noise.
+    assert rms(without[4][:100]).max() < 0.03
