@@ -2,4 +2,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["robot_learning"], package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["robot_learning", "robot_learning.over_ros"], package_dir={"": "src"}))
