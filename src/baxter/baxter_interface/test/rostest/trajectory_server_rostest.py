@@ -16,12 +16,12 @@ from control_msgs.msg import FollowJointTrajectoryResult, JointTolerance
 from dynamic_reconfigure.client import Client as ParameterClient
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from dynamic_reconfigure.srv import Reconfigure
-from std_srvs.srv import Trigger
 from trajectory_client import TrajectoryClient
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from baxter_dataflow import wait_for
 from baxter_interface import Limb, RobotEnable
+from lab_testing.knobs import reload
 from lab_testing.waiting import stretched
 
 DEADLINE_S = stretched(90.0)
@@ -87,11 +87,9 @@ class TrajectoryServerTest(unittest.TestCase):
         self.wait_for(works, request.__name__)
 
     def knobs(self, **knobs):
-        knobs = {"enabled": True, "stuck": [], **knobs}
-        for name, value in knobs.items():
+        for name, value in {"enabled": True, "stuck": [], **knobs}.items():
             rospy.set_param("/fake_robot/" + name, value)
-        rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
-        rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+        reload("/fake_robot")
 
     def squeeze(self, pressed):
         self.cuff.publish(state=int(pressed), isInputOnly=True)
