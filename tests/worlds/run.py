@@ -4,7 +4,7 @@
 
     ./baxter.sh sim python3 tests/worlds/run.py --models GAZEBO/models --out worlds.csv GAZEBO/worlds GAZEBO/test/worlds
 
-Each world is in a process of its own, with its models and plugins, for some seconds of simulated time. A world that
+Each world is in a separate process, with its models and plugins, for some seconds of simulated time. A world that
 includes a model that is in none of the folders is left out. Columns: ``world``; ``models``; ``comes up`` (yes, or what
 is wrong); ``Gazebo's values``: how far those of ``checks.py`` are met; ``without an effect``: elements and plugins that
 the simulator names; ``notes``.
