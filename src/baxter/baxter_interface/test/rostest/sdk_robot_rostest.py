@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RobotEnable and Limb against the fake robot, fault by fault."""
 import errno
+import functools
 import statistics
 import threading
 import time
@@ -11,7 +12,6 @@ from unittest import mock
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Bool, Float64
-from std_srvs.srv import Trigger
 
 import baxter_model
 from baxter_dataflow import wait_for
@@ -19,19 +19,13 @@ from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
 from baxter_interface.joint_motion import MAKING_ROOM_S, PEAK_SPEED_RAD_S
 from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.robot_enable import ENABLE_TIMEOUT_S
+from lab_testing import knobs
 from lab_testing.waiting import stretched
 
 DEADLINE_S = 60.0
 
 
-def set_knobs(**knobs):
-    """Set the fake robot's knobs, all others to their defaults; in force when this returns."""
-    if rospy.has_param("/fake_robot"):
-        rospy.delete_param("/fake_robot")
-    for name, value in knobs.items():
-        rospy.set_param("/fake_robot/" + name, value)
-    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
-    rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+set_knobs = functools.partial(knobs.set_knobs, "/fake_robot")
 
 
 class Recorder:
