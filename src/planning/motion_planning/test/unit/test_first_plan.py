@@ -5,7 +5,6 @@ import time
 
 import pytest
 
-from lab_testing.waiting import wait_until
 from motion_planning.exact import ExactChecker
 from motion_planning.planners import NoPath, Search, plan_path, planning
 from motion_planning.scene import Scene
@@ -15,15 +14,16 @@ PATIENCE_S = 60.0
 
 @pytest.fixture
 def slow(monkeypatch):
-    """(list of the groups that are being made, Event that lets them be ready)"""
-    making, ready = [], threading.Event()
+    """(list of the groups that are being made, Event that the first is, Event that lets them be ready)"""
+    making, begun, ready = [], threading.Event(), threading.Event()
 
     def make(spheres, group, allowed):
         making.append(group.name)
+        begun.set()
         ready.wait(PATIENCE_S)
 
     monkeypatch.setattr(planning, "make_links", make)
-    yield making, ready
+    yield making, begun, ready
     ready.set()
 
 
@@ -42,10 +42,10 @@ def plan(mix, exact, answers, stop=lambda: False):
 
 
 def test_two_plans_make_the_spheres_once_and_both_get_their_paths(mix, slow):
-    making, ready = slow
+    making, begun, ready = slow
     exact, answers = ExactChecker(mix, None), []
     threads = [plan(mix, exact, answers) for _ in range(2)]
-    wait_until(lambda: making, "the spheres to be made", PATIENCE_S)
+    assert begun.wait(PATIENCE_S)
     ready.set()
     for thread in threads:
         thread.join(PATIENCE_S)
@@ -53,10 +53,10 @@ def test_two_plans_make_the_spheres_once_and_both_get_their_paths(mix, slow):
 
 
 def test_a_plan_that_waits_for_spheres_can_be_stopped(mix, slow):
-    making, _ = slow
+    making, begun, _ = slow
     exact, answers, stopped = ExactChecker(mix, None), [], threading.Event()
     plan(mix, exact, answers)
-    wait_until(lambda: making, "the spheres to be made", PATIENCE_S)
+    assert begun.wait(PATIENCE_S)
     waits = plan(mix, exact, answers, stopped.is_set)
     stopped.set()
     waits.join(PATIENCE_S)

@@ -108,7 +108,7 @@ class SceneMonitor:
     def set_octomap(self, octree, pose):
         """Put an Octree, or None, at ``pose`` (4, 4) in the place of the scene's octomap."""
         stamp = rospy.Time.now()
-        # Many maps come between two that anybody asks for.
+        # Many maps come between two requests for one.
         message = None if octree is None else functools.cache(lambda: octomap_message(octree, pose, self.model.frame,
                                                                                       stamp))
         self._change(lambda scene: (scene.with_octomap(octree, pose), []), "octomap", message)
