@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-#: For how long it is valid [days], and when it is made anew [s before its end].
+#: For how long it is valid [days], and when another one is made [s before its end].
 _DAYS, _SOON_S = 397, 7 * 86400
 _PATIENCE_S = 30.0
 

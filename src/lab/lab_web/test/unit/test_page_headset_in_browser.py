@@ -36,7 +36,7 @@ def press(browser, side, button, is_down=True):
 
 
 def grip(browser, side):
-    """Grip anew, where the controller is; whether the page leads the hand: a busy machine may be too slow for it."""
+    """Grip again, where the controller is; whether the page leads the hand: a busy machine may be too slow for it."""
     press(browser, side, "squeeze", False)
     browser.wait("lab.headset.grips.size === 0")
     press(browser, side, "squeeze")

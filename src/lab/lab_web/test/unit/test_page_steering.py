@@ -151,7 +151,7 @@ def test_a_hand_that_is_led_goes_where_it_is_led_from_where_it_is(hall):
     assert lead(shift=(0.1, 0.1, 0)) == pytest.approx([0.0] * 6, abs=1e-9), "it has arrived"
     turn = [0, 0, np.sin(0.025), np.cos(0.025)]
     assert lead(shift=(0.1, 0.1, 0), turn=turn) == pytest.approx([0, 0, 0, 0, 0, 0.5])
-    # Tracking that leaps, and another grip, begin anew.
+    # Tracking that leaps, and another grip, begin another way.
     assert lead(shift=(0.5, 0.1, 0), turn=turn) == pytest.approx([0.0] * 6, abs=1e-9)
     assert lead(number=2) == pytest.approx([0.0] * 6, abs=1e-9)
     hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": {}})
