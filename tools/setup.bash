@@ -27,7 +27,7 @@ STEPS=(apt venv overlay pip meshes build urdf kernels pictures)
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
 # and run one after the other, the groups beside each other. The collision spheres are cached beside the compiled code.
-COMPILED=("python3 -m arm_kinematics && python3 -m baxter_sim_hardware"
+COMPILED=("python3 -m arm_kinematics && python3 -m baxter_sim_hardware && python3 -m baxter_sysid"
     "python3 -m motion_planning && python3 -m moveit_servo && rosrun motion_planning prepare_robots $(printf '%q ' "${PLANNED_FOR[@]}")")
 # Robots whose meshes are made ready for pictures.
 PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/courses/cwru_baxter_sim/cwru_baxter.urdf.xacro")

@@ -163,13 +163,13 @@ def test_pictures_have_noise_and_dark_corners_the_same_for_the_same_seed():
 
 def test_a_robot_with_a_file_of_its_own_has_its_numbers_and_the_drawing_s_mounts(make_lab, tmp_path):
     """Also one arm's own; a missing file is named."""
-    text = effects.physical_robot().read_text(encoding="utf-8").replace("{s0: 133.0,", "{s0: 133.0, left_s0: 77.0,")
+    text = effects.physical_robot().read_text(encoding="utf-8").replace("{s0: 139.0,", "{s0: 139.0, left_s0: 77.0,")
     path = tmp_path / "own.yaml"
     path.write_text(text, encoding="utf-8")
     assert individual.checked(str(path)) == individual.DRAWING
     lab = make_lab(parameters={"enable": True, "effects": "lag", "serial": str(path)})
     assert lab.plugin._simulated.numbers["lag"]["proportional_gain"]["left_s0"] == 77.0
     gain = lab.plugin._baxter.actuators._numbers[3]
-    assert (gain[0], gain[7]) == (77.0, 133.0)
+    assert (gain[0], gain[7]) == (77.0, 139.0)
     with pytest.raises(Exception, match="none.yaml cannot be read"):
         make_lab(parameters={"enable": True, "effects": "lag", "serial": str(tmp_path / "none.yaml")})
