@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prints a leader's messages as lines of JSON, like rosbridge's; a process of its own, at the leader's master.
+"""Prints a leader's messages as lines of JSON, like rosbridge's; a separate process at the leader's master.
 
     python3 -m steering_devices.leader_relay SIDE...
 """

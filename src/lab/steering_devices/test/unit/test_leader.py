@@ -33,7 +33,7 @@ def test_the_follower_moves_as_the_leader_does_from_where_it_is(signs):
     assert np.abs(np.diff(way, axis=0)).max() < 0.012
 
 
-def test_a_clutch_that_is_let_go_moves_nothing_and_begins_anew():
+def test_a_clutch_that_is_let_go_moves_nothing_and_then_begins_again():
     lead = np.concatenate([np.linspace(0.0, 0.4, 50), np.linspace(0.4, -1.0, 50), np.linspace(-1.0, -0.8, 50)])[:, None]
     way = led(Clutch(np.ones(1)), lead, (0.0,), lambda number: not 50 <= number < 100)
     assert way[99] == way[49] and way[-1] == pytest.approx(way[49] + 0.2, abs=0.05)
