@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One lab for many .test files: those that start the same, and that are marked as leaving it as it was.
 
-rostest starts the launch file anew for each `<test>`. Marked files become one launch file with one test, the node
+rostest starts the launch file again for each `<test>`. Marked files become one launch file with one test, the node
 shared_lab of lab_testing, which runs their programs one after the other and puts the lab back between them.
 """
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A question to the ROS master has a deadline.
 
-A master that is stopped, not ended, still accepts connections, and ``rosgraph.Master`` waits for its answer for ever: in
-services of nodes, in buttons of a page, in rosnode and rostopic. Here each call raises TimeoutError after ANSWER_S, which
-is an OSError as the error of a master that is not there; rosnode and rostopic say then that they cannot reach it.
+A master that is stopped, not ended, still accepts connections, and ``rosgraph.Master`` waits for its answer for ever:
+in services of nodes, in buttons of a page, in rosnode and rostopic. Here each call raises TimeoutError after ANSWER_S,
+an OSError as the error of a master that is not there; rosnode and rostopic say then that they cannot reach it.
 """
 from __future__ import annotations
 

@@ -48,8 +48,8 @@ FIXES = (
         "read, stops a node for ever", "ros/ros_comm#262", "test_registrations.py"),
     Fix("rospy.impl.statistics", "registrations", EVERYWHERE, "each subscriber asks a master that hangs, with all "
         "locks held", "", "test_registrations.py"),
-    Fix("rosgraph.masterapi", "master_answers", EVERYWHERE, "a question to a master that is stopped is waited for without "
-        "end", "", "test_master_answers.py"),
+    Fix("rosgraph.masterapi", "master_answers", EVERYWHERE, "a question to a master that is stopped waits for "
+        "ever", "", "test_master_answers.py"),
     Fix("rosgraph.xmlrpc", "ended_servers", EVERYWHERE, "the server of an ended node takes a core until its process "
         "ends", "ros/ros_comm#2238", "test_ended_servers.py"),
     Fix("rosgraph.roslogging", "full_disk", EVERYWHERE, "a full disk prints a traceback for each message of the log",

@@ -19,7 +19,7 @@ BLOCKS = 10
 MAX_ROUNDS = 12
 #: A round that makes the cost less by a smaller share is the last one.
 ENOUGH = 1e-4
-LEAST_EIGENVALUE = 1e-9  # of the slopes' correlation
+MIN_EIGENVALUE = 1e-9  # of the slopes' correlation
 
 
 class Fit(NamedTuple):
@@ -87,7 +87,7 @@ def deviations(slopes: Array, error: Array) -> Array:
     unit = flat[moves] / size[moves, None]
     # A direction in which nothing changes is uncertain, not certain: its eigenvalue is bounded, not left out.
     values, vectors = np.linalg.eigh(unit @ unit.T)
-    inverse = (vectors / np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T
+    inverse = (vectors / np.maximum(values, MIN_EIGENVALUE)) @ vectors.T
     unit = unit.reshape(-1, *error.shape)
     blocks = [np.einsum("prk,rk->p", unit[:, block], error[block]) for block in block_slices(len(error))]
     scatter = sum(np.outer(one, one) for one in blocks) * len(blocks) / max(len(blocks) - 1, 1)

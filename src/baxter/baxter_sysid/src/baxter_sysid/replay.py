@@ -53,11 +53,12 @@ def replay(body: ArmBody, known: ArmBody, numbers: Array, start: tuple[Array, Ar
     the start.
     """
     return Motion(*_replay(body, known, np.ascontiguousarray(numbers), start[0], start[1],
-                           np.ascontiguousarray(points), round(period_s / TICK_S), TICK_S))
+                           np.ascontiguousarray(points), round(period_s / TICK_S)))
 
 
 @_compiled
-def _replay(body, known, numbers, start, velocity, points, every, dt):
+def _replay(body, known, numbers, start, velocity, points, every):
+    dt = TICK_S
     ticks, count = points.shape
     rows = ticks // every + 1
     positions, bounded, efforts = np.empty((rows, count)), np.zeros((rows, count)), np.zeros((rows, count))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospkg
+from excitation import AMPLITUDES, PERIOD_S, motion
 
 import xacro
 from baxter_model import JOINTS, SIDES, joint_names, poses
@@ -12,7 +13,6 @@ from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms.actuators import NUMBERS
 from baxter_sysid.arm_body import arm_body, hand_in_last, holding_torques, with_load
 from baxter_sysid.errors import SysidError
-from baxter_sysid.excitation import AMPLITUDES, PERIOD_S, motion
 from baxter_sysid.identify import DELAY, LOAD_M, MASS, Model, Settings, identify, table_of
 from baxter_sysid.recording import Recording, start_of
 from baxter_sysid.replay import replay, set_points

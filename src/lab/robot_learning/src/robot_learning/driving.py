@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from baxter_model import readiness
+
 #: What a policy's node tells about itself.
 WAITING, ACTING, SUCCEEDED, FAILED, STOPPED = "waiting", "acting", "success", "failure", "stopped"
 
@@ -42,9 +44,9 @@ class Situation:
 def reason_to_wait(limits: DrivingLimits, now: Situation) -> str:
     """Why the policy must not move the robot now, "" if it may."""
     if now.stopped:
-        return "the robot is stopped: release its stop and enable it"
+        return readiness.STOPPED
     if not now.enabled:
-        return "the robot is not enabled: rosrun baxter_tools enable_robot.py -e"
+        return readiness.NOT_ENABLED
     if now.seen_s > limits.seen_s:
         return "what is observed is %.2f s old; at most %.2f s are allowed" % (now.seen_s, limits.seen_s)
     if now.held_s > limits.hold_s:

@@ -234,7 +234,7 @@ class Arms:
         if command.mode is Mode.RAW_POSITION is limb.mode and not _any(modes.mode[command.index] != RAW_POSITION):
             # A stream goes on: the joints' modes and speeds are as they were.
             self._stream.take(points, modes.mode, command, self._measured.time_s)
-            modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
+            self._expire_later(command, limb)
             self._is_settled = False
             return command
         named = np.zeros(len(self._all), dtype=bool)
@@ -257,9 +257,12 @@ class Arms:
         elif command.mode is Mode.TORQUE:
             modes.value[command.index] = command.values
         if command.mode is not Mode.POSITION:
-            modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
+            self._expire_later(command, limb)
         self._refresh_speed()
         return command
+
+    def _expire_later(self, command, limb):
+        self._modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
 
     def set_yielding(self, side, yields):
         """Whether a limb, in position and velocity mode, pushes with a fraction of its effort limits only."""
