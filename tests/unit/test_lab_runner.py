@@ -388,7 +388,8 @@ def test_a_run_that_is_ended_leaves_no_process(tmp_path, fake_rostest):
         (tmp_path / f"rostest/{name}.test").write_text("<launch/>")
     mark = uuid.uuid4().hex
     environment = {**os.environ, **ENVIRONMENT, processes.RUN_MARKER: mark}
-    words = ["-q", "-p", "lab_tests.plugin", "-c", str(ROOT / "pytest.ini"), "-n3", "--dist=loadscope",
+    # Two of the workers take only files that mostly wait.
+    words = ["-q", "-p", "lab_tests.plugin", "-c", str(ROOT / "pytest.ini"), "-n4", "--dist=loadscope",
              f"--rootdir={tmp_path}"]
     files = [str(path) for path in (tmp_path / "rostest").iterdir()]
     child = subprocess.Popen([sys.executable, "-m", "pytest", *words, *files], cwd=tmp_path, env=environment,
