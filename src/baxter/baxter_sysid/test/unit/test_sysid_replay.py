@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arm without a physics engine beside the physics; recordings; a hidden robot is found again."""
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rospkg
-from excitation import AMPLITUDES, PERIOD_S, motion
 
 import xacro
 from baxter_model import JOINTS, SIDES, joint_names, poses
@@ -18,6 +18,9 @@ from baxter_sysid.recording import Recording, start_of
 from baxter_sysid.replay import replay, set_points
 from baxter_sysid.sheet import errors, numbers, worst_seconds
 from urdf_model import parse_urdf
+
+sys.path.insert(0, str(Path(__file__).parent))
+from excitation import AMPLITUDES, PERIOD_S, motion  # noqa: E402
 
 POSTURE = np.array([0.349, -0.436, -0.698, 1.047, -0.349, 1.396, 0.0])
 

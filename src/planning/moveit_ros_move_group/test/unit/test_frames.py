@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import rospy
@@ -13,7 +13,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject
 from shape_msgs.msg import SolidPrimitive
 
-from moveit_ros_move_group.capabilities.frames import TfPublisher
+from moveit_ros_move_group.capabilities import frames
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from in_process import Node  # noqa: E402
@@ -33,7 +33,8 @@ def thing(name, frame, x, subframe_x):
 
 def published(monkeypatch, **private):
     """tf as it is after the node has published its frames once."""
-    monkeypatch.setattr(threading, "Thread", lambda **_: type("Thread", (), {"start": lambda self: None})())
+    # Its thread publishes at a rate; here the test publishes once.
+    monkeypatch.setattr(frames, "threading", SimpleNamespace(Thread=lambda **_: SimpleNamespace(start=lambda: None)))
     monkeypatch.setattr(rospy, "get_name", lambda: "/move_group")
     tree = parameters()
     tree["~"] = {**tree["~"], **private}
@@ -43,7 +44,7 @@ def published(monkeypatch, **private):
     node.topics["attached_collision_object"](
         AttachedCollisionObject(link_name="l5", object=thing("tool", "l5", 0.1, 0.05)))
     for one in node.kept:
-        if isinstance(one, TfPublisher):
+        if isinstance(one, frames.TfPublisher):
             one.publish()
     buffer = tf2_ros.BufferCore()
     for message in node.told("/tf"):
