@@ -27,11 +27,16 @@ def certificate(folder: Path, names: Sequence[str]) -> tuple[str, str]:
     files = str(place / "certificate.pem"), str(place / "key.pem")
     if not _is_valid(files[0]):
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as draft:  # of its owner alone, as the key
-            _make(Path(draft), names)
+        draft = Path(tempfile.mkdtemp(dir=folder))  # its owner's alone from the beginning, as the key must be
+        try:
+            _make(draft, names)
             shutil.rmtree(place, ignore_errors=True)
-            made = shutil.copytree(draft, place)
-            os.chmod(made, 0o700)
+            draft.rename(place)
+        except OSError:
+            if not _is_valid(files[0]):  # else another page has just made it
+                raise
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
     return files
 
 
