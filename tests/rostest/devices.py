@@ -15,7 +15,7 @@ from sensor_msgs.msg import Joy
 
 from baxter_interface import Limb, RobotEnable
 from baxter_model import SIDES
-from lab_testing.waiting import stretched, wait_until
+from lab_testing.waiting import stretched, wait_for_time, wait_until
 
 RATE_HZ = 50.0
 AT_REST = 0.01  # [rad/s]
@@ -37,11 +37,11 @@ class DevicesTest(unittest.TestCase):
 
     def raise_hand(self, side, send):
         """Call ``send()`` at RATE_HZ of simulated time until the hand is 5 cm higher."""
-        rate, begin = rospy.Rate(RATE_HZ), self.height(side)
+        begin = self.height(side)
 
         def is_higher():
             send()
-            rate.sleep()
+            wait_for_time(1.0 / RATE_HZ)
             return self.height(side) > begin + 0.05
         wait_until(is_higher, "the %s hand 5 cm higher" % side, 30.0)
 

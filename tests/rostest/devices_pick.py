@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
+from baxter_core_msgs.msg import DigitalIOState
 from bullet_sim_msgs.msg import Drag
 from bullet_sim_msgs.srv import Press
 from control_msgs.msg import JointJog
@@ -27,7 +28,7 @@ from arm_kinematics import Chain, solve
 from baxter_interface import Gripper, Limb, RobotEnable
 from baxter_model import BASE_HEIGHT_M, joint_names
 from lab_testing.fake_joystick import FakeJoystick
-from lab_testing.waiting import stretched, wait_until
+from lab_testing.waiting import stretched, wait_for_message, wait_for_time, wait_until
 from processes.ports import free_port
 from urdf_model import parse_urdf
 
@@ -199,9 +200,10 @@ class Cuff:
     mark = None
 
     def _tap(self, name):
-        for action in (Press._request_class.PRESS, Press._request_class.RELEASE):
+        for action, state in ((Press._request_class.PRESS, 1), (Press._request_class.RELEASE, 0)):
             self._press(name, action, 0)
-            rospy.sleep(0.2)
+            wait_for_message("/robot/digital_io/%s/state" % name, DigitalIOState,
+                             lambda message, state=state: message.state == state)
 
 
 class PickTest(unittest.TestCase):
@@ -260,14 +262,12 @@ class PickTest(unittest.TestCase):
 
     def fly(self, device, goal):
         """Steer until the hand is at ``goal``, as one who sees it."""
-        rate = rospy.Rate(RATE_HZ)
-
         def there():
             way = goal - self.hand()
             if np.linalg.norm(way) < NEAR_M:
                 return True
             device.push(way)
-            rate.sleep()
+            wait_for_time(1.0 / RATE_HZ)
             return False
         wait_until(there, lambda: "the hand at %s, is at %s" % (goal, self.hand()), 150.0)
         device.let_go()

@@ -9,6 +9,8 @@ import rospy
 from baxter_core_msgs.msg import DigitalIOState, NavigatorState
 from sensor_msgs.msg import JointState
 
+from lab_testing.waiting import beats
+
 SIDE, PRESS_S = "left", 0.2
 
 
@@ -28,14 +30,12 @@ def main():
         rospy.signal_shutdown("nobody leads")
 
     threading.Thread(target=read, daemon=True).start()
-    rate = rospy.Rate(100.0)
-    while not rospy.is_shutdown():
+    for _ in beats(100.0, rospy.is_shutdown):
         now, angles = rospy.get_time(), newest["position"]
         joints.publish(JointState(name=list(angles), position=list(angles.values())))
         cuff.publish(DigitalIOState(state=int(newest["cuff"])))
         button.publish(DigitalIOState(state=int(until.get("lower_button", 0.0) > now)))
         navigator.publish(NavigatorState(buttons=[until.get("navigator", 0.0) > now, False, False]))
-        rate.sleep()
 
 
 if __name__ == "__main__":

@@ -35,6 +35,18 @@ def wait_until(condition, what="the condition", timeout_s=DEADLINE_S, interval_s
         time.sleep(interval_s)
 
 
+def wait_for_time(seconds, timeout_s=DEADLINE_S):
+    """Wait until rospy's time has gone on by ``seconds`` [s]; rospy.sleep waits for ever where the clock stands still.
+
+    Raises AssertionError after ``timeout_s`` [s] of wall time.
+    """
+    import rospy
+
+    begin = rospy.get_time()
+    wait_until(lambda: rospy.get_time() >= begin + seconds, "the clock to go on by %g s" % seconds, timeout_s,
+               interval_s=min(POLL_S, 0.2 * seconds))
+
+
 def beats(rate_hz, is_over):
     """Yield at ``rate_hz`` of wall time until ``is_over()`` is true: the pace of a part that publishes.
 

@@ -5,10 +5,11 @@ import unittest
 from types import SimpleNamespace
 
 import pytest
+import rospy
 
 from lab_testing import subtests, waiting
 from lab_testing.processes import is_alive, living
-from lab_testing.waiting import beats, wait_for_publishers, wait_until
+from lab_testing.waiting import beats, wait_for_publishers, wait_for_time, wait_until
 
 
 @pytest.fixture(autouse=True)
@@ -60,6 +61,16 @@ def test_beats_keep_their_rate_and_leave_out_missed_ones(monkeypatch):
         seen.append(round(clock.now, 6))
         clock.now += 0.025 if len(seen) == 2 else 0.002  # the second is slow
     assert seen == [0.0, 0.01, 0.035, 0.045, 0.055]
+
+
+def test_a_clock_that_stands_still_ends_a_wait_for_time(monkeypatch):
+    now = iter([5.0, 5.1, 5.19, 5.2])
+    monkeypatch.setattr(rospy, "get_time", lambda: next(now))
+    wait_for_time(0.2)
+    assert next(now, None) is None
+    monkeypatch.setattr(rospy, "get_time", lambda: 5.0)
+    with pytest.raises(AssertionError, match="clock"):
+        wait_for_time(0.2, timeout_s=0.05)
 
 
 def test_a_share_of_the_machine_makes_deadlines_longer(monkeypatch):

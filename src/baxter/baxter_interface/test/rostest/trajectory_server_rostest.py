@@ -22,7 +22,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from baxter_dataflow import wait_for
 from baxter_interface import Limb, RobotEnable
 from lab_testing.knobs import reload
-from lab_testing.waiting import stretched
+from lab_testing.waiting import stretched, wait_for_time
 
 DEADLINE_S = stretched(90.0)
 HOME = [0.2, 0.5, 0.0, 0.5, -0.2, -0.1, 0.0]
@@ -196,7 +196,7 @@ class TrajectoryServerTest(unittest.TestCase):
         os.kill(pid, signal.SIGSTOP)
         begin = rospy.get_time()
         try:
-            rospy.sleep(PAUSE_S)
+            wait_for_time(PAUSE_S)
             return rospy.get_time() - begin
         finally:
             os.kill(pid, signal.SIGCONT)

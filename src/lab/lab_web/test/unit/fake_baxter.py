@@ -37,6 +37,7 @@ from std_msgs.msg import Bool, Empty
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
+from lab_testing.waiting import beats
 from world_picture.snapshot import SnapshotWriter
 
 RATE_HZ = 50.0
@@ -88,8 +89,7 @@ class FakeBaxter:
         FakeMoveGroup(lambda: dict(self._positions), self._say)
 
     def run(self):
-        rate, number = rospy.Rate(RATE_HZ), 0
-        while not rospy.is_shutdown():
+        for number, _ in enumerate(beats(RATE_HZ, rospy.is_shutdown)):
             with self._lock:
                 self._near = rospy.get_param_cached("/fake_baxter/near", [])
                 joints = JointState(name=list(self._positions), position=list(self._positions.values()))
@@ -97,8 +97,6 @@ class FakeBaxter:
             self._joints.publish(joints)
             self._states.publish(self._state)
             self._avoidance.publish(collision_object=self._near)
-            number += 1
-            rate.sleep()
 
     def _command(self, message):
         with self._lock:

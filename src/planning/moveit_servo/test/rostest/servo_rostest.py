@@ -19,7 +19,7 @@ from std_msgs.msg import Int8, String
 from std_srvs.srv import Empty
 
 from baxter_interface import RobotEnable
-from lab_testing.waiting import stretched, wait_until
+from lab_testing.waiting import stretched, wait_for_time, wait_until
 
 SIDES = ("left", "right")
 RATE_HZ = 50.0
@@ -79,11 +79,9 @@ class ServoTest(unittest.TestCase):
 
     def stream(self, send, until, what):
         """Call ``send()`` at RATE_HZ of simulated time until ``until()``; then nothing more is sent."""
-        rate = rospy.Rate(RATE_HZ)
-
         def ready():
             send()
-            rate.sleep()
+            wait_for_time(1.0 / RATE_HZ)
             return until()
         wait_until(ready, what, 30.0)
 
