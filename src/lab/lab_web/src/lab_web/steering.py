@@ -176,6 +176,6 @@ def _led_of(asked: dict) -> dict[str, Led]:
     try:
         return {side: Led(float(one["number"]), pose_from_quaternion(one["shift"], one["turn"]))
                 for side, one in led.items()}
-    except (AttributeError, KeyError, TypeError, ValueError, KinematicsError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError, KinematicsError) as error:
         raise RobotError("\"led\" must be an object of sides with number, shift (3) and turn (4) each: %s"
                          % str(error)[:100]) from None

@@ -169,7 +169,8 @@ def test_a_hand_that_is_led_rests_when_nothing_comes(hall):
 
 
 @pytest.mark.parametrize("bad", [[], {"left": 1}, {"left": {}}, {"left": led(number="x")}, {"left": led(shift=(1, 2))},
-                                 {"left": led(turn=(0, 0, 0, 0))}, {"left": led(shift=(float("nan"), 0, 0))}])
+                                 {"left": led(turn=(0, 0, 0, 0))}, {"left": led(shift=(float("nan"), 0, 0))},
+                                 {"left": led(number=10**400)}])
 def test_what_leads_nowhere_is_refused(hall, bad):
     before = len(hall.told)
     hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": bad})

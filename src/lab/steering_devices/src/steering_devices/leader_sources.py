@@ -39,8 +39,8 @@ def follow(address: str, sides: Sequence[str], take: Take, tell: Callable[[str],
         while not ended.is_set():
             try:
                 kind(address, sides, take, ended)
-            except (OSError, ValueError, KeyError, TypeError) as error:
-                tell("the leader at %s is lost: %s; trying again" % (address, error))
+            except Exception as error:  # whatever another robot's server answers; the leader may come back
+                tell("the leader at %s is lost: %s: %s; trying again" % (address, type(error).__name__, error))
             ended.wait(_AGAIN_S)
 
     thread = threading.Thread(target=run, name="leader", daemon=True)

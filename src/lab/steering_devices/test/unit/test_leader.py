@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A leader's arm is followed while its cuff is squeezed, from where both are."""
+import contextlib
 import json
 import threading
 
@@ -8,6 +9,7 @@ import pytest
 from tornado import httpserver, ioloop, netutil, web, websocket
 
 from lab_testing.waiting import wait_until
+from steering_devices import leader_sources
 from steering_devices.leader import Clutch, Leader, topics_of
 from steering_devices.leader_sources import LeaderAddressError, follow
 
@@ -80,13 +82,31 @@ class Bridge(websocket.WebSocketHandler):
         self.write_message(json.dumps({"op": "publish", "topic": topic, "msg": said}))
 
 
-def test_a_rosbridge_is_heard_and_its_loss_is_told():
-    heard, told, ready = {}, [], threading.Event()
-    sockets, loops = netutil.bind_sockets(0, "127.0.0.1"), []
+class Babbler(Bridge):
+    """At first no rosbridge at all, then one that sends something else, then one."""
+
+    answers = []
+
+    def prepare(self):
+        self.answers.append(len(self.answers))
+        if len(self.answers) == 1:
+            raise web.HTTPError(404)
+
+    def on_message(self, message):
+        if len(self.answers) == 2:
+            self.write_message("[]")
+        else:
+            super().on_message(message)
+
+
+@contextlib.contextmanager
+def serving(handler):
+    """(port, what stops it) of a web server with this handler."""
+    ready, sockets, loops = threading.Event(), netutil.bind_sockets(0, "127.0.0.1"), []
 
     def serve():
         async def begin():
-            httpserver.HTTPServer(web.Application([("/", Bridge)])).add_sockets(sockets)
+            httpserver.HTTPServer(web.Application([("/", handler)])).add_sockets(sockets)
             loops.append(ioloop.IOLoop.current())
             ready.set()
         loop = ioloop.IOLoop()
@@ -96,13 +116,38 @@ def test_a_rosbridge_is_heard_and_its_loss_is_told():
 
     server = threading.Thread(target=serve)
     server.start()
-    ready.wait(10.0)
-    end = follow("ws://127.0.0.1:%d/" % sockets[0].getsockname()[1], ["left"], heard.__setitem__, told.append)
+    assert ready.wait(10.0)
+
+    def stop():
+        if server.is_alive():
+            loops[0].add_callback(loops[0].stop)
+            server.join()
     try:
-        wait_until(lambda: len(heard) == len(topics_of(["left"])), "a message of each topic", 10.0)
-        assert heard[CUFF]["state"] == 1 and not told
-        loops[0].add_callback(loops[0].stop)
-        server.join()
-        wait_until(lambda: told, "its loss to be told", 10.0)
+        yield sockets[0].getsockname()[1], stop
     finally:
-        end()
+        stop()
+
+
+def test_a_rosbridge_is_heard_and_its_loss_is_told():
+    heard, told = {}, []
+    with serving(Bridge) as (port, stop):
+        end = follow("ws://127.0.0.1:%d/" % port, ["left"], heard.__setitem__, told.append)
+        try:
+            wait_until(lambda: len(heard) == len(topics_of(["left"])), "a message of each topic", 10.0)
+            assert heard[CUFF]["state"] == 1 and not told
+            stop()
+            wait_until(lambda: told, "its loss to be told", 10.0)
+        finally:
+            end()
+
+
+def test_a_leader_that_answers_something_else_is_asked_again(monkeypatch):
+    monkeypatch.setattr(leader_sources, "_AGAIN_S", 0.05)
+    heard, told = {}, []
+    with serving(Babbler) as (port, _):
+        end = follow("ws://127.0.0.1:%d/" % port, ["left"], heard.__setitem__, told.append)
+        try:
+            wait_until(lambda: heard, "a message in the end", 10.0)
+        finally:
+            end()
+    assert len(told) == 2 and "404" in told[0]
