@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, counted, number
-from gym_baxter.tasks import TASKS
 from lab_batch import JobError
 
 from . import robomimic
 from .collecting import collect
 from .environment import core_for, replay
+from .experts import EXPERTS
 from .frames import DemonstrationError
 from .reading import DataSet, repair, survey
 
@@ -25,7 +25,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                     epilog="Exit status: 0 done, 1 something is broken or differs, 2 wrong options.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=Parser)
     one = commands.add_parser("record", help="append an expert's episodes to a LeRobot data set")
-    one.add_argument("task", choices=tuple(TASKS), metavar="TASK", help="one of %s" % ", ".join(TASKS))
+    one.add_argument("task", choices=tuple(EXPERTS), metavar="TASK", help="one of %s" % ", ".join(EXPERTS))
     one.add_argument("folder", type=Path, metavar="FOLDER")
     one.add_argument("--episodes", type=number(int, 1, 10**6), default=50, metavar="N", help="default: %(default)s")
     one.add_argument("--first", type=number(int, 0, MAX_SEED), default=0, metavar="SEED", help="of the first episode")
