@@ -81,7 +81,7 @@ def test_parameters_are_compared_leaf_by_leaf():
 
 
 PROGRAM = """#!/usr/bin/env python3
-import os, unittest
+import os, subprocess, unittest
 import rosgraph, rospy, rostest
 
 
@@ -110,7 +110,8 @@ def test_a_file_that_leaves_something_fails_and_the_next_one_gets_a_new_lab(tmp_
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}:{os.environ['ROS_PACKAGE_PATH']}")
     monkeypatch.setenv("SHARED_LABS", str(tmp_path / "labs"))
     monkeypatch.setenv("LC_ALL", "C")
-    ends = {"clean": "pass", "dirty": "stay()", "wrong": "self.fail('on purpose')", "last": "pass"}
+    ends = {"clean": "pass", "dirty": "stay()", "wrong": "self.fail('on purpose')",
+            "parent": "subprocess.Popen(['sleep', '600'], start_new_session=True)", "last": "pass"}
     paths = []
     for name, end in ends.items():
         program = package / f"{name}.py"
@@ -119,8 +120,8 @@ def test_a_file_that_leaves_something_fails_and_the_next_one_gets_a_new_lab(tmp_
         paths.append(write(package, name, inside=f"<param name='goal' value='/{name}'/>"))
     tallies = rostests.run_shared(paths, tmp_path / "work", dict(os.environ))
     assert {path.stem: (tally.passed, tally.failed) for path, tally in tallies.items()} == {
-        "clean": (2, 0), "dirty": (1, 1), "wrong": (1, 1), "last": (1, 0)}
-    assert "/never" in tallies[paths[1]].details[0]
+        "clean": (2, 0), "dirty": (1, 1), "wrong": (1, 1), "parent": (2, 1), "last": (1, 0)}
+    assert "/never" in tallies[paths[1]].details[0] and "sleep 600" in str(tallies[paths[3]].details)
     labs = [line.split() for line in Path(tmp_path, "labs").read_text().splitlines()]
     assert [name for _, name in labs] == [f"/{name}" for name in ends]
     assert labs[0][0] == labs[1][0] != labs[2][0] == labs[3][0]
