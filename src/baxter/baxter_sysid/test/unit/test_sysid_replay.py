@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arm without a physics engine beside the physics; recordings; a hidden robot is found again."""
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,12 @@ from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms.actuators import NUMBERS
 from baxter_sysid.arm_body import arm_body, hand_in_last, holding_torques, with_load
 from baxter_sysid.errors import SysidError
+from baxter_sysid.excitation import AMPLITUDES, PERIOD_S, motion
 from baxter_sysid.identify import DELAY, LOAD_M, MASS, Model, Settings, identify, table_of
 from baxter_sysid.recording import Recording, start_of
 from baxter_sysid.replay import replay, set_points
 from baxter_sysid.sheet import errors, numbers, worst_seconds
 from urdf_model import parse_urdf
-
-sys.path.insert(0, str(Path(__file__).parent))
-from excitation import AMPLITUDES, PERIOD_S, motion  # noqa: E402
 
 POSTURE = np.array([0.349, -0.436, -0.698, 1.047, -0.349, 1.396, 0.0])
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from baxter_model import JOINTS, poses
-from baxter_sysid.arm_body import Array
+
+from .arm_body import Array
 
 PERIOD_S = 0.01
 REST_S = 4.0  # before and after, so that the integral is at rest
