@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, TransformStamped, Twist
+from geometry_msgs.msg import Quaternion, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from bullet_sim import Pose
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from gazebo_ros.transforms import quaternion, transform_msg
 from gazebo_ros.urdf_extras import unscoped
 from ros_controllers.wheel_odometry import WheelOdometry
 from sim_time.pace import Pace
@@ -93,7 +94,7 @@ class Drive(ModelPlugin):
             if wanted[0]:
                 self._odometry.publish(self._message(stamp(time_s), pose, linear, angular))
             if wanted[1]:
-                self._tf.publish(TFMessage([_transform(time_s, self._odometry_frame, self._base_frame, pose)]))
+                self._tf.publish(TFMessage([transform_msg(time_s, self._odometry_frame, self._base_frame, pose)]))
         self.also_publish(time_s)
 
     def also_publish(self, time_s):
@@ -109,7 +110,7 @@ class Drive(ModelPlugin):
         message.header.stamp, message.header.frame_id = now, self._odometry_frame
         position, twist = message.pose.pose.position, message.twist.twist
         position.x, position.y, position.z = pose[:3, 3].tolist()
-        message.pose.pose.orientation = Quaternion(*_quaternion(pose))
+        message.pose.pose.orientation = Quaternion(*quaternion(pose))
         twist.linear.x, twist.linear.y, twist.linear.z = linear.tolist()
         twist.angular.x, twist.angular.y, twist.angular.z = angular.tolist()
         message.pose.covariance = message.twist.covariance = np.diag(self.variances).ravel().tolist()
@@ -260,7 +261,7 @@ class DiffDrive(_Wheels):
     def _wheel_transform(self, name, time_s):
         joint = self.context.robot.joints[name]
         parent, child = (self.model.link_pose(link).matrix() for link in (joint.parent, joint.child))
-        return _transform(time_s, self.context.frame(joint.parent), self.context.frame(joint.child),
+        return transform_msg(time_s, self.context.frame(joint.parent), self.context.frame(joint.child),
                           np.linalg.inv(parent) @ child)
 
     def joints_set(self):
@@ -336,19 +337,3 @@ class ForceBasedMove(PlanarMove):
         up = np.cross(along, across)
         linear = linear + (x - linear @ along) * along + (y - linear @ across) * across
         self.model.set_base_twist(tuple(linear), tuple(angular + (turn - angular @ up) * up))
-
-
-def _transform(time_s, parent, child, pose):
-    """The transform (4, 4) of frame ``child`` in ``parent``."""
-    transform = TransformStamped(child_frame_id=child)
-    transform.header.stamp, transform.header.frame_id = stamp(time_s), parent
-    translation = transform.transform.translation
-    translation.x, translation.y, translation.z = pose[:3, 3].tolist()
-    transform.transform.rotation = Quaternion(*_quaternion(pose))
-    return transform
-
-
-def _quaternion(pose):
-    """x, y, z, w of a pose's rotation, w not below 0."""
-    quaternion = Pose.from_matrix(pose).quaternion
-    return quaternion if quaternion[3] >= 0.0 else tuple(-value for value in quaternion)

@@ -52,6 +52,8 @@ PLUGINS = {
     "libgazebo_ros_planar_move.so": (_DRIVE + "odometryRate cmdTimeout",),
     "libgazebo_ros_force_based_move.so": (_DRIVE + "odometryRate publishOdometryTf cmdTimeout", _FORCE_GAINS),
     "libgazebo_ros_elevator.so": ("topic lift_joint door_joint floor_height door_wait_time",),
+    "libgazebo_ros_hand_of_god.so": ("frameId kl ka linkName",),
+    "libgazebo_world_odometry.so": ("topicName frameName updateRate",),
     "libgazebo_ros_control.so": ("robotParam robotSimType controlPeriod eStopTopic legacyModeNS",),
 }
 TABLES = {name: ElementTable([{"plugin": "%s %s" % (_ALL, known)}], [("plugin", *row) for row in rows])

@@ -4,16 +4,14 @@ import math
 
 import numpy as np
 from control_msgs.msg import PointHeadAction, PointHeadFeedback
-from rospy import Duration, Time
-from tf2_msgs.msg import TFMessage
-from tf2_py import BufferCore, TransformException
 
 from controller_manager import POSITION, VELOCITY, ControllerError
+from gazebo_ros.transforms import TransformSource
 from gazebo_ros_control.cascade import motion
 from gazebo_ros_control.goal_controller import GoalController
 from sim_time.pace import Pace
 from urdf_model import UrdfError
-from urdf_model.transforms import inverse, matrix_from_quaternion, rigid
+from urdf_model.transforms import inverse
 
 FEEDBACK_HZ = 50.0
 # A joint has arrived within so much [rad]; it may be late by so long, and so may the transform of a target's frame [s].
@@ -22,8 +20,6 @@ ARRIVED_RAD, LATE_S = 0.02, 1.0
 SPEED_RAD_S = 1.0
 # Of a target's coordinates [m] and the velocity [rad/s]; squares of larger numbers may be infinite.
 LARGEST = 1e9
-# Transforms that are kept, and messages with transforms between two ticks.
-TF_CACHE_S, TF_DEPTH = 10.0, 100
 
 
 class HeadGeometry:
@@ -63,33 +59,6 @@ class HeadGeometry:
     def _seen_from(self, joint, point, positions):
         frame = self.pose(joint.parent, positions) @ joint.origin
         return inverse(frame)[:3] @ np.append(point, 1.0)
-
-
-class TransformSource:
-    """Transforms from tf, listened to from now on until :meth:`close`."""
-
-    def __init__(self, topics):
-        self._buffer = BufferCore(Duration(TF_CACHE_S))
-        self._topics = {topics.subscription(name, TFMessage, TF_DEPTH): take for name, take in (
-            ("/tf", self._buffer.set_transform), ("/tf_static", self._buffer.set_transform_static))}
-
-    def take(self):
-        """Take the transforms that have come since."""
-        for topic, take in self._topics.items():
-            topic.handle(lambda message, take=take: [take(transform, "tf") for transform in message.transforms])
-
-    def look_up(self, target, source):
-        """The newest pose (4, 4) of the frame ``source`` in ``target``, or None where it is not known."""
-        try:
-            found = self._buffer.lookup_transform_core(target, source, Time(0)).transform
-        except TransformException:
-            return None
-        turn, shift = found.rotation, found.translation
-        return rigid(matrix_from_quaternion((turn.x, turn.y, turn.z, turn.w)), (shift.x, shift.y, shift.z))
-
-    def close(self):
-        for topic in self._topics:
-            topic.close()
 
 
 class PointHead(GoalController):
