@@ -8,7 +8,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
-from bullet_sim import Pose
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.transforms import quaternion, transform_msg
 from gazebo_ros.urdf_extras import unscoped

@@ -85,7 +85,8 @@ class HandOfGod(ModelPlugin):
             return
         self._waits = False
         model = self.context.model
-        pose, (linear, angular) = model.link_pose(self._link).matrix(), map(np.asarray, model.link_twist(self._link))
+        pose = model.link_pose(self._link).matrix()
+        linear, angular = (np.asarray(part) for part in model.link_twist(self._link))
         axes = pose[:3, :3]
         (stiff, damping), (turn_stiff, turn_damping) = self._springs
         turn = axes @ _half_turn(axes.T @ wanted[:3, :3])
@@ -118,7 +119,7 @@ class WorldOdometry(PacedSensor):
         if not self.is_due(time_s):
             return
         pose = self.context.model.link_pose(self._link)
-        linear, angular = map(np.asarray, self.context.model.link_twist(self._link))
+        linear, angular = (np.asarray(part) for part in self.context.model.link_twist(self._link))
         message = Odometry(child_frame_id=self._link)
         message.pose.pose = msg_from_pose(pose)
         message.twist.twist = msg_from_twist(linear, pose.matrix()[:3, :3].T @ angular)
@@ -126,7 +127,7 @@ class WorldOdometry(PacedSensor):
 
 
 def _half_turn(rotation):
-    """Axis times half the angle (3,) [rad] of a rotation (3, 3): the logarithm of its quaternion, as Gazebo takes it."""
+    """Axis times half the angle (3,) [rad] of a rotation (3, 3), as Gazebo's springs have it."""
     found = np.asarray(quaternion_from_matrix(rotation))
     vector, real = (found[:3], found[3]) if found[3] >= 0.0 else (-found[:3], -found[3])
     sine = np.linalg.norm(vector)

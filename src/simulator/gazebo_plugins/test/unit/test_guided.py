@@ -65,12 +65,12 @@ def test_what_a_hand_cannot_follow_is_refused(make, elements, said):
 
 
 def test_odometry_of_the_world_has_speeds_in_the_world_and_turn_rates_in_the_link(make):
-    lab = make(BALL % (0.1, 0.1, 0.1), WorldOdometry, {"topicName": "floating_base_pose_simulated", "frameName": "hand"},
+    lab = make(BALL % (0.1, 0.1, 0.1), WorldOdometry, {"topicName": "pose", "frameName": "hand"},
                Pose((1, 2, 3), (0, math.sqrt(0.5), 0, math.sqrt(0.5))))
     lab.world.set_gravity((0, 0, 0))
     lab.model.set_base_twist((0.1, 0.2, 0.3), (0, 0, 0.5))
     lab.run(0.05)
-    messages = lab.sent("floating_base_pose_simulated")
+    messages = lab.sent("pose")
     assert len(messages) == 50 and messages[-1].header.frame_id == "hand"
     twist, place = messages[-1].twist.twist, messages[-1].pose.pose.position
     assert (place.x, place.y, place.z) == pytest.approx((1.005, 2.01, 3.015), abs=1e-6)

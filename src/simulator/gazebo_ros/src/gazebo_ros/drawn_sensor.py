@@ -8,3 +8,16 @@ class DrawnSensor(ModelPlugin):
 
     required = False
     named_if_empty = True
+
+
+class Prosilica(DrawnSensor):
+    """``libgazebo_ros_prosilica.so``: a camera that streams. Of one whose parameter ``trigger_mode`` is ``polled`` a
+    warning says so: polled_camera is in no package of Debian's ROS."""
+
+    def __init__(self, context):
+        super().__init__(context)
+        mode = context.param("trigger_mode", "streaming")
+        if mode != "streaming":
+            context.log.warn("plugin %s of model '%s': trigger_mode is '%s', and it streams all the same: its service "
+                             "for single pictures is of polled_camera, which is not there"
+                             % (context.element.get("filename"), context.model.name, mode))

@@ -2,12 +2,12 @@
 """The elements of noetic's gazebo_plugins and gazebo_ros_control, by file name, and their effect here. ROS-free."""
 from urdf_model.element_table import ElementTable
 
-# Read for all plugins, or of no use to any: noetic's plugins do not read alwaysOn, and rosDebugLevel is of the log.
+# Read for all plugins, or of no use to any: noetic's plugins do not read alwaysOn, and rosDebugLevel is of the log. Of
+# the cameras, only those that are triggered use triggerTopicName.
 _ALL = "robotNamespace alwaysOn always_on rosDebugLevel"
 _CAMERA = ("cameraName imageTopicName cameraInfoTopicName frameName updateRate hackBaseline distortionK1 distortionK2 "
-           "distortionK3 distortionT1 distortionT2 focalLength Cx Cy CxPrime autoDistortion")
+           "distortionK3 distortionT1 distortionT2 focalLength Cx Cy CxPrime autoDistortion triggerTopicName")
 _LENS = ({"borderCrop": "true"}, "the picture is distorted as a whole")
-_TRIGGER = ({"triggerTopicName": None}, "cameras are not triggered")
 _DEPTH = _CAMERA + (" depthImageTopicName depthImageCameraInfoTopicName pointCloudTopicName pointCloudCutoff "
                     "pointCloudCutoffMax useDepth16UC1Format")
 _MORE_DEPTH = ({"normalsTopicName": None, "reflectanceTopicName": None, "reduceNormals": None},
@@ -20,10 +20,10 @@ _FORCE_GAINS = ({"yaw_velocity_p_gain": None, "x_velocity_p_gain": None, "y_velo
 
 #: File name -> (elements with an effect, ({name: harmless texts}, reason), ...).
 PLUGINS = {
-    "libgazebo_ros_camera.so": (_CAMERA, _LENS, _TRIGGER),
-    "libgazebo_ros_multicamera.so": (_CAMERA, _LENS, _TRIGGER),
-    "libgazebo_ros_depth_camera.so": (_DEPTH, _LENS, _TRIGGER, _MORE_DEPTH),
-    "libgazebo_ros_openni_kinect.so": (_DEPTH, _LENS, _TRIGGER),
+    **dict.fromkeys(("libgazebo_ros_camera.so", "libgazebo_ros_multicamera.so", "libgazebo_ros_prosilica.so",
+                     "libgazebo_ros_triggered_camera.so", "libgazebo_ros_triggered_multicamera.so"), (_CAMERA, _LENS)),
+    "libgazebo_ros_depth_camera.so": (_DEPTH, _LENS, _MORE_DEPTH),
+    "libgazebo_ros_openni_kinect.so": (_DEPTH, _LENS),
     "libgazebo_ros_laser.so": ("topicName frameName updateRate",),
     "libgazebo_ros_gpu_laser.so": ("topicName frameName updateRate",),
     "libgazebo_ros_block_laser.so": ("topicName frameName updateRate gaussianNoise hokuyoMinIntensity",),

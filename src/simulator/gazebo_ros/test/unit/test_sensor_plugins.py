@@ -9,13 +9,13 @@ from lxml import etree
 
 from bullet_sim import Pose, World
 from gazebo_ros import sensor_plugins
-from gazebo_ros.drawn_sensor import DrawnSensor
+from gazebo_ros.drawn_sensor import DrawnSensor, Prosilica
 from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource, with_tf_prefix
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
 from gazebo_ros.urdf_extras import plugins
 from gazebo_ros.urdf_extras import sensor_plugins as found_in
-from loop_ros.testing import FakeRos
+from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
 BOX = """<robot name="box"><link name="link"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"
@@ -267,6 +267,17 @@ def test_a_sensor_that_is_on_no_link_is_left_out_with_a_warning(reference, text)
 def test_sensors_may_be_left_out_and_control_logic_not():
     assert not sensor_plugins.Laser.required and not sensor_plugins.PoseSensor.required
     assert not DrawnSensor.required and ModelPlugin.required
+
+
+@pytest.mark.parametrize(("parameters", "warnings"), [({}, 0), ({"trigger_mode": "polled"}, 1)])
+def test_a_prosilica_that_is_to_be_polled_streams_and_says_so(parameters, warnings):
+    log = FakeLog()
+    world = World()
+    robot = parse_urdf('<robot name="r"><link name="a"/></robot>')
+    source = PluginSource(robot, etree.fromstring('<plugin filename="libgazebo_ros_prosilica.so"/>'), "/eye", "")
+    Prosilica(PluginContext(world, world.spawn(robot, "r"), source, log, FakeRos(), {"eye": parameters}))
+    assert len(log.of("warn")) == warnings
+    world.close()
 
 
 def test_all_file_names_lead_to_classes():

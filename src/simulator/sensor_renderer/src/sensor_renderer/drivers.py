@@ -16,7 +16,7 @@ from sensor_renderer.errors import SensorError
 from sensor_renderer.imager import Imager
 from sensor_renderer.pictures import Cloud, millimetres, within
 from sensor_renderer.structured_light import StructuredLight
-from sensor_renderer.topics import ColourTopics, LearningTopics, Topic
+from sensor_renderer.topics import ColourTopics, LearningTopics, Topic, Trigger
 from sim_time.pace import Pace
 
 _FASTEST_HZ = 1000.0
@@ -84,7 +84,8 @@ class Driver:
 
 
 class Camera(Driver):
-    """``libgazebo_ros_camera.so``, and ``libgazebo_ros_multicamera.so`` with a folder for each camera."""
+    """``libgazebo_ros_camera.so``, ``libgazebo_ros_prosilica.so``, and with a folder for each camera
+    ``libgazebo_ros_multicamera.so``."""
 
     def __init__(self, entry):
         super().__init__(entry)
@@ -92,8 +93,8 @@ class Camera(Driver):
         base = entry.text("cameraName", entry.name)
         self._frame = entry.frame
         self._cameras = []
-        for camera in cameras:
-            folder = base if len(cameras) == 1 else "%s/%s" % (base, camera.name)
+        self._folders = [base if len(cameras) == 1 else "%s/%s" % (base, camera.name) for camera in cameras]
+        for camera, folder in zip(cameras, self._folders, strict=True):
             topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
             learning = LearningTopics(self.name(folder))
@@ -105,6 +106,10 @@ class Camera(Driver):
                                         more=[self.rate_setting])
         self.topics.append(self._settings)
 
+    def takes(self, number):
+        """Whether the camera of that number takes this picture."""
+        return True
+
     def _apply(self, settings):
         self._pace.rate = settings.value("imager_rate")
         self.memory_s = settings.exposure.exposure_time
@@ -112,10 +117,33 @@ class Camera(Driver):
             settings.apply(imager, learning)
 
     def publish(self, moment):
-        for imager, topics, learning, info in self._cameras:
+        for number, (imager, topics, learning, info) in enumerate(self._cameras):
+            if not self.takes(number):
+                continue
             middle, picture, _ = imager.taken(moment, topics.want_picture, False)
             topics.publish(middle.time_s, self._frame, picture, imager.camera.encoding, info)
             learning.publish(middle, imager.camera, self._frame)
+
+
+class TriggeredCamera(Camera):
+    """``libgazebo_ros_triggered_camera.so`` and ``libgazebo_ros_triggered_multicamera.so``: a picture for each
+    std_msgs/Empty on ``triggerTopicName`` (image_trigger) below the name of each
+    camera. A trigger without a subscriber to the pictures is used up."""
+
+    def __init__(self, entry):
+        super().__init__(entry)
+        self._triggers = [Trigger(self.under_camera(entry.text("triggerTopicName", "image_trigger"), folder))
+                          for folder in self._folders]
+        self.topics += self._triggers
+
+    def is_due(self, time_s):
+        if not self.has_listeners:
+            for trigger in self._triggers:
+                trigger.clear()
+        return any(trigger.count for trigger in self._triggers) and super().is_due(time_s)
+
+    def takes(self, number):
+        return self._triggers[number].take()
 
 
 class DepthCamera(Driver):

@@ -6,11 +6,14 @@ import threading
 import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
-from std_msgs.msg import String
+from std_msgs.msg import Empty, String
 
 from loop_ros.reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
 from sensor_renderer.labels import Motion
+
+# Pictures that can be asked for before the first of them is taken.
+_MAX_TRIGGERS = 1000
 
 
 class Topic:
@@ -39,6 +42,37 @@ class Topic:
             publisher, self._publisher = self._publisher, None
         if publisher is not None:
             publisher.unregister()
+
+
+class Trigger:
+    """Counts the std_msgs/Empty on a topic; closed like one."""
+
+    #: It needs no picture.
+    has_listeners = False
+
+    def __init__(self, name):
+        self.count = 0
+        self._lock = threading.Lock()
+        self._subscriber = rospy.Subscriber(name, Empty, self._add)
+
+    def _add(self, _):
+        with self._lock:
+            self.count = min(self.count + 1, _MAX_TRIGGERS)
+
+    def take(self):
+        """Whether there was a message that has not been taken; it is now."""
+        with self._lock:
+            self.count, had = max(self.count - 1, 0), self.count
+        return had > 0
+
+    def clear(self):
+        """Forget the messages that have not been taken."""
+        with self._lock:
+            self.count = 0
+
+    def close(self):
+        """Unregister the topic."""
+        self._subscriber.unregister()
 
 
 class ReconfigureServer:

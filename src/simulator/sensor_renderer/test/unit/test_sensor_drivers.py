@@ -135,7 +135,7 @@ class Ros:
 
     def __init__(self, monkeypatch):
         self.opened, self.parameters = [], {}
-        for kind in ("Publisher", "Service"):
+        for kind in ("Publisher", "Service", "Subscriber"):
             monkeypatch.setattr(topics.rospy, kind, lambda *arguments, **_: Opened(self, *arguments))
         monkeypatch.setattr(topics.rospy, "get_param", lambda name, default: self.parameters.get(name, default))
 
@@ -276,3 +276,30 @@ def test_names_that_are_none_are_refused():
         drivers.Driver(SensorEntry("robot", {
             "link": "base", "frame": "ns/eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/n s",
             "xml": SENSOR % ("10", "", "0")})).name("eye")
+
+
+def test_a_triggered_camera_takes_a_picture_for_each_trigger(ros, monkeypatch):
+    camera = drivers.TriggeredCamera(entry(rate="0", camera="".join(
+        (CAMERA % ("64", "R8G8B8")).replace("<camera>", '<camera name="%s">' % side) for side in ("left", "right"))))
+    triggers = {opened.arguments[0]: opened.arguments[-1] for opened in ros.opened
+                if opened.arguments[0].endswith("image_trigger")}
+    assert set(triggers) == {"/ns/eye/left/image_trigger", "/ns/eye/right/image_trigger"}
+    picture = np.zeros((48, 64, 3), dtype=np.uint8)
+
+    def pictures():
+        while camera.is_due(1.0):
+            camera.take(Still(1.0, picture))
+        return [len(ros.sent("/ns/eye/%s/image_raw" % side)) for side in ("left", "right")]
+
+    assert pictures() == [0, 0]
+    for side, count in (("left", 2), ("right", 1)):
+        for _ in range(count):
+            triggers["/ns/eye/%s/image_trigger" % side](None)
+    assert pictures() == [2, 1]
+    with monkeypatch.context() as nobody:
+        nobody.setattr(Opened, "get_num_connections", staticmethod(lambda: 0))
+        triggers["/ns/eye/left/image_trigger"](None)
+        assert not camera.is_due(1.0)
+    assert pictures() == [2, 1], "nobody looked"
+    camera.close()
+    assert not ros.names()
