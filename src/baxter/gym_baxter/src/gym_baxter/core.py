@@ -17,7 +17,7 @@ from .tasks import TASKS, robosuite_start
 
 # Set-points are streamed at 100 Hz, as programs on the robot do.
 STREAM_S = 0.01
-OBSERVATIONS = ("state", "pixels", "pixels_agent_pos")
+OBSERVATIONS = ("state", "environment_state_agent_pos", "pixels", "pixels_agent_pos")
 CAMERAS = ("head", "left_hand", "right_hand")
 
 
@@ -109,15 +109,18 @@ class Core:
     # -- what is observed
 
     def observation(self) -> dict:
-        """{"state": (n,) float64} or {"pixels": {camera: (size, size, 3) uint8}, "agent_pos": (n,)}, or a part."""
-        kind, found = self.choices.obs_type, {}
+        """{"state": (n,) float64}, or what obs_type names of {"pixels": {camera: (size, size, 3) uint8},
+        "agent_pos": (n,), "environment_state": (m,)}."""
+        kind, size = self.choices.obs_type, self.choices.size
         if kind == "state":
-            found["state"] = np.concatenate([self.agent_pos(), self.task.observed()])
-        else:
-            size = self.choices.size
+            return {"state": np.concatenate([self.agent_pos(), self.task.observed()])}
+        found: dict = {}
+        if "pixels" in kind:
             found["pixels"] = {name: self.lab.cameras.take(name, size, size).pixels for name in self.choices.cameras}
-            if kind == "pixels_agent_pos":
-                found["agent_pos"] = self.agent_pos()
+        if "agent_pos" in kind:
+            found["agent_pos"] = self.agent_pos()
+        if "environment_state" in kind:
+            found["environment_state"] = self.task.observed()
         return found
 
     def agent_pos(self) -> np.ndarray:

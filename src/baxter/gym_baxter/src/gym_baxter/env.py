@@ -19,7 +19,8 @@ _FAR = 100.0
 
 class BaxterEnv(gymnasium.Env, EzPickle):
     """One task: the arguments are those of `core.Choices`. An episode ends when the task is done, and is truncated by
-    Gymnasium's TimeLimit. `info` has ``is_success``. `reset(options={"state": s})` begins at a state of ``save()``."""
+    Gymnasium's TimeLimit. `info` has ``is_success``. `reset(options={"state": s})` begins at a state of ``save()``.
+    Attribute `task_description`: the task in words."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
@@ -30,6 +31,7 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         self.render_mode = render_mode
         self._core = Core(task, Choices(**choices))
         self.metadata = {**type(self).metadata, "render_fps": self._core.choices.control_freq}
+        self.task_description = self._core.task.SENTENCE
         self.action_space = spaces.Box(-1.0, 1.0, (self._core.action_size,), np.float32)
         self._core.reset(np.random.default_rng(0))
         self.observation_space = _space(self._given(self._core.observation()))

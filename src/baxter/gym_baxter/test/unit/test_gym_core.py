@@ -48,6 +48,16 @@ def played(core, seed, count=4):
     return np.concatenate(found)
 
 
+def test_robot_and_things_are_observed_together_or_apart():
+    core = Core("PickPlace", Choices(obs_type="environment_state_agent_pos", options=PLAIN))
+    apart = core.reset(np.random.default_rng(1))
+    assert list(apart) == ["agent_pos", "environment_state"]
+    assert len(apart["environment_state"]) == len(core.task.OBSERVED)
+    together = np.concatenate([core.agent_pos(), core.task.observed()])
+    np.testing.assert_array_equal(np.concatenate(list(apart.values())), together)
+    core.close()
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_equal_seeds_give_equal_episodes_whatever_was_before(made, task):
     core = made(task)
