@@ -32,9 +32,12 @@ class Demonstrate(Job):
 
     def run(self, seed: int) -> dict:
         """{task, success, columns} of the episode of a seed."""
-        episode = record(self._core, self._expert, seed, self._noise)
+        episode = self._episode(seed)
         return {"task": episode.task, "success": episode.success,
                 "columns": {key: values.tolist() for key, values in episode.columns.items()}}
+
+    def _episode(self, seed: int) -> Episode:
+        return record(self._core, self._expert, seed, self._noise)
 
     def end(self) -> None:
         """End the world."""
@@ -50,14 +53,14 @@ class Collected(NamedTuple):
 
 
 def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1, rate_hz: int = 20,
-            say: Callable[[str], None] = lambda text: None) -> Collected:
-    """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. Raises
-    DemonstrationError, JobError."""
+            say: Callable[[str], None] = lambda text: None, spec: Spec | None = None) -> Collected:
+    """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
+    with the results of `Demonstrate` and with the expert's own actions. Raises DemonstrationError, JobError."""
     seeds = list(seeds)
     core = core_of(task, control_freq=rate_hz)
     try:
         expert_of(core)
-        schema = schema_of(core, noise > 0.0)
+        schema = schema_of(core, noise > 0.0 or spec is not None)
     finally:
         core.close()
     kept = failed = frames = 0
@@ -66,9 +69,9 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
     with SetWriter(folder, schema) as writer:
         order = iter(seeds)
         following = next(order, None)
-        spec = Spec("%s:%s" % (__name__, Demonstrate.__name__),
-                    {"task": task, "noise": noise, "control_freq": rate_hz})
-        for outcome in map_seeds(spec, seeds, limits):
+        usual = Spec("%s:%s" % (__name__, Demonstrate.__name__),
+                     {"task": task, "noise": noise, "control_freq": rate_hz})
+        for outcome in map_seeds(spec or usual, seeds, limits):
             if outcome.error:
                 say("seed %d: %s" % (outcome.seed, outcome.error))
             waiting[outcome.seed] = outcome.result if outcome.is_done else None

@@ -2,7 +2,7 @@
 """Demonstrations in the environments of gym_baxter: recorded of an expert, and replayed. In lock-step, bit for bit."""
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -33,7 +33,19 @@ from .frames import (
 _NOISE, _TURN_NOISE, _LASTING, _STRETCH = 0.08, 0.02, 0.9, 10
 #: Experts need much less; more is a try that failed.
 MAX_STEPS = 200
+#: A student acts for so many actions of an episode at most; then the expert ends it.
+STUDENT_STEPS = 120
 _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
+
+
+class Student(Protocol):
+    """What an expert corrects: a policy that acts on (n,) numbers, the robot's and those of the things."""
+
+    def begin(self) -> None:
+        """An episode begins."""
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """(action,) for an observation."""
 
 
 def core_of(task: str, control: str = CONTROL, cameras: tuple[str, ...] = (), size: int = 84, **choices: Any) -> Core:
@@ -92,19 +104,29 @@ class Disturbance:
         return action + self._now if self._is_on else action
 
 
-def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any = None) -> Episode:
-    """One episode of an expert. noise: 0 to 1, of `Disturbance`; then `expert.action` has what the expert wanted.
-    sink: gets each frame as well, `SetWriter.frame` for pictures."""
+def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any = None,
+           student: Student | None = None) -> Episode:
+    """One episode of an expert. noise: 0 to 1, of `Disturbance`; student: acts first, and the expert ends what it began
+    (Ross et al., *A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning*, 2011);
+    with either, `expert.action` has what the expert wanted. sink: gets each frame as well, `SetWriter.frame` for
+    pictures."""
     core.reset(np.random.default_rng(seed))
     expert.begin()
+    if student is not None:
+        student.begin()
     disturbance = Disturbance(core, expert.MOVED, seed, noise)
     rows: dict[str, list] = {}
     stepped = None
-    for _ in range(min(core.steps, MAX_STEPS)):
+    for count in range(min(core.steps, MAX_STEPS)):
         wanted = np.clip(expert.act(), -1.0, 1.0)
-        action = np.clip(disturbance.on(wanted), -1.0, 1.0).astype(np.float32) if noise else wanted.astype(np.float32)
-        frame = {ACTION: action, **observed(core)}
-        if noise:
+        frame = observed(core)
+        if student is not None and count < STUDENT_STEPS:
+            done = student.act(np.concatenate([frame[STATE], frame[ENVIRONMENT]]))
+        else:
+            done = disturbance.on(wanted) if noise else wanted
+        action = np.clip(done, -1.0, 1.0).astype(np.float32)
+        frame = {ACTION: action, **frame}
+        if noise or student is not None:
             frame[EXPERT_ACTION] = wanted.astype(np.float32)
         stepped = core.step(action)
         frame |= {REWARD: [stepped.reward], DONE: [stepped.succeeded], SUCCESS: [stepped.succeeded]}
