@@ -64,6 +64,7 @@ def said(folder: Path, program: str) -> tuple[int | None, str, str]:
 
 def main():
     folder, programs = Path(sys.argv[1]), sys.argv[2:]
+    os.environ["TMPDIR"] = str(folder)  # os._exit leaves what a program removes at its end
     for name in COMMON:
         __import__(name)
     with concurrent.futures.ThreadPoolExecutor(AT_A_TIME) as pool:

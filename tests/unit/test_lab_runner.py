@@ -347,6 +347,14 @@ def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path):
     assert done.stdout.splitlines()[-1].startswith("2 passed, 1 failed")
 
 
+@pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_a_temporary_file_that_a_test_leaves_fails_the_run(tmp_path, words):
+    (tmp_path / "test_one.py").write_text("import os, tempfile\ndef test_one(tmp_path):\n    tempfile.mkstemp('left')\n"
+                                          "    os.system('mktemp -t XXXXXXleft')")
+    done = run_pytest(tmp_path, *words)
+    assert "left 2 temporary files" in done.stdout and done.stdout.splitlines()[-1].startswith("1 passed, 1 failed")
+
+
 def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):
     def order(*words):
         return re.findall(r"^(test_\w+\.py::\w+)", run_pytest(tmp_path, "--collect-only", *words).stdout, re.MULTILINE)

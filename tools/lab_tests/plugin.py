@@ -16,6 +16,8 @@ import locale
 import os
 import random
 import resource
+import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -31,6 +33,8 @@ LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
 DURATIONS, FIRST_DURATIONS = "durations.json", Path(__file__).with_name("durations.json")
 # Files that take less are ordered by name [s].
 MIN_DURATION_S = 2.0
+# Temporary files that are named.
+MAX_NAMED = 20
 
 
 def pytest_addoption(parser):
@@ -229,6 +233,10 @@ class Controller:
         self._config, self._folder = config, work_folder(config)
         self._total = Tally()
         self._took: dict[str, list[float]] = {}
+        # What tests put into the folder for temporary files, they remove. pytest's own folders stay for who looks.
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
+        self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
+        os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
 
     def pytest_xdist_make_scheduler(self, config, log):
         return FileScheduling(config, log)
@@ -278,6 +286,8 @@ class Controller:
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session):
         self._total.refuse_bare_skips()
+        if left := sorted(path.name for path in self._temporary.iterdir()):
+            self._fail(f"tests left {len(left)} temporary files: {', '.join(left[:MAX_NAMED])}")
         ordinary = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
         if session.exitstatus not in ordinary and not self._total.failed:
             self._fail(f"pytest ended with exit code {int(session.exitstatus)}")
@@ -293,6 +303,7 @@ class Controller:
 
     @pytest.hookimpl(trylast=True)
     def pytest_unconfigure(self):
+        shutil.rmtree(self._temporary, ignore_errors=True)
         print(summary(self._total), flush=True)
 
 

@@ -48,7 +48,7 @@ class Browser:
 
     def __init__(self, width=1280, height=800):
         self._folder = tempfile.mkdtemp(prefix="lab_browser_")
-        environment = {**os.environ, "LANGUAGE": "en", "HOME": self._folder}
+        environment = {**os.environ, "LANGUAGE": "en", "HOME": self._folder, "TMPDIR": self._folder}
         self.process = subprocess.Popen([PROGRAM, "--user-data-dir=" + self._folder, *_OPTIONS], env=environment,
                                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
         self.errors = []
