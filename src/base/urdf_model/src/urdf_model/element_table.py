@@ -73,7 +73,7 @@ class ElementTable:
                 if inside in self.parents:
                     yield from self.find(child, inside)
             elif row.harmless is None or not any(
-                    _is(child.text, text, element) for text in row.harmless.split("|")):
+                    _is(content(child), text, element) for text in row.harmless.split("|")):
                 yield Idle(child.tag, child.sourceline, row.reason, False)
 
 
@@ -112,29 +112,39 @@ def placed(table: Mapping[str, Mapping[str, list[Any]]]) -> str:
     return ", ".join(parts)
 
 
+def content(element: Any) -> str:
+    """The attribute ``value`` of an element, as older files for Gazebo have it, or its text."""
+    return element.get("value", element.text or "").strip()
+
+
+def _content_of(parent, name):
+    child = parent.find(name)
+    return "" if child is None else content(child)
+
+
 def _is(text, harmless, parent):
     """Whether ``text``, of an element in ``parent``, is the text that ``harmless`` means."""
     if harmless[:1] not in "@?+>" or not harmless:
         return _same(text, harmless)
     name, _, other = harmless[1:].partition("=")
     if harmless.startswith(">"):
-        return min(_number(text), _number(parent.findtext(name))) >= float(other)
+        return min(_number(text), _number(_content_of(parent, name))) >= float(other)
     if harmless.startswith("+"):
-        return any(word.strip("-+0.") for word in (parent.findtext(name) or "").split())
+        return any(word.strip("-+0.") for word in _content_of(parent, name).split())
     if harmless.startswith("?"):
-        return _same(parent.findtext(name) or "1", parent.findtext(other) or "1")
-    return _same(text, parent.findtext(name) or other)
+        return _same(_content_of(parent, name) or "1", _content_of(parent, other) or "1")
+    return _same(text, _content_of(parent, name) or other)
 
 
 def _number(text):
     try:
-        return float(text or "")
+        return float(text)
     except ValueError:
         return 0.0
 
 
 def _same(text, other):
-    text, other = (text or "").strip().lower(), other.strip().lower()
+    text, other = text.lower(), other.strip().lower()
     if not text or text == other or _FLAGS.get(text, text) == _FLAGS.get(other, other):
         return True
     try:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import bounds
+from .element_table import content
 from .materials import GLOWS, MATERIALS
 from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
 
@@ -47,10 +48,10 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
         if value is not None:
             link.decay = (_within(part, "link '%s'" % link.name, value, 1.0, warn),) * 2
     for part in element.iterchildren("selfCollide", "self_collide"):
-        link.self_collide = is_true(part.text)
+        link.self_collide = is_true(content(part))
     for part in element.iterchildren("turnGravityOff", "gravity"):
         link.gravity = _has_weight(part)
-    name = (element.findtext("material") or "").strip()
+    name = next((content(part) for part in element.iterchildren("material")), "")
     finish = Finish(emission=GLOWS[name]) if name in GLOWS else None
     for shape in link.visuals:
         shape.colour = shape.colour or MATERIALS.get(name)
@@ -61,9 +62,9 @@ def read_joint_block(element: Any, joint: Joint, warn: Callable[[Any, str], None
     """Apply a block that refers to ``joint``; ``warn``: as for :func:`read_link_block`."""
     what = "joint '%s'" % joint.name
     for part in element.iterchildren("implicitSpringDamper", "cfmDamping"):
-        joint.implicit_damping = is_true(part.text)
+        joint.implicit_damping = is_true(content(part))
     for part in element.iterchildren("preserveFixedJoint", "disableFixedJointLumping"):
-        joint.preserved = is_true(part.text)
+        joint.preserved = is_true(content(part))
     for part in element.iterchildren("springStiffness"):
         value = _number(part, what, False, warn)
         if value is not None:  # Gazebo takes a negative stiffness for one that it may reduce
@@ -89,11 +90,11 @@ def _direction(part, link, warn):
     """The unit direction in an <fdir1>, which is in the axes of the link's first collision, in those of the link; None
     for 0 0 0."""
     try:
-        values = np.array([float(word) for word in (part.text or "").split()])
+        values = np.array([float(word) for word in content(part).split()])
     except ValueError:
         values = np.empty(0)
     if len(values) != 3 or not np.isfinite(values).all():
-        warn(part, "<fdir1> of link '%s' is '%s', expected three numbers, and is left out" % (link.name, part.text))
+        warn(part, "<fdir1> of link '%s' is '%s', expected three numbers, and is left out" % (link.name, content(part)))
         return None
     length = np.linalg.norm(values)
     if length == 0.0:
@@ -104,7 +105,7 @@ def _direction(part, link, warn):
 
 def _number(part, what, may_be_infinite, warn):
     """The number in an element about ``what``, or None, with a warning."""
-    text = (part.text or "").strip() or part.get("value", "")
+    text = content(part)
     try:
         value = float(text)
     except ValueError:
@@ -124,5 +125,5 @@ def _within(part, what, value, high, warn, low=0.0):
 
 def _has_weight(part):
     """Whether a link has weight by this element, whose texts are those of Gazebo's readers."""
-    text = (part.text or "").strip().lower()
+    text = content(part).lower()
     return text in ("false", "no", "0") if part.tag == "turnGravityOff" else text not in ("false", "0")

@@ -265,6 +265,29 @@ def test_a_joint_may_have_a_spring():
     assert (joint.spring_stiffness, joint.spring_reference, robot.warnings) == (12.0, -0.4, [])
 
 
+WRITTEN_BOTH_WAYS = """<robot name="r"><link name="a"><visual><geometry><sphere radius="1"/></geometry></visual></link>
+<link name="b"/><joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
+<gazebo reference="a">%s</gazebo><gazebo reference="j">%s</gazebo></robot>"""
+
+
+@pytest.mark.parametrize("form", ["<%s>%s</%s>", '<%s value="%s"/>'])
+def test_elements_of_gazebo_may_have_their_content_in_an_attribute(form):
+    def written(**elements):
+        return "".join(form % ((tag, text, tag)[:form.count("%s")]) for tag, text in elements.items())
+
+    robot = parse_urdf(WRITTEN_BOTH_WAYS % (
+        written(mu1=0.5, mu2=0.1, fdir1="0 0 2", kp=7, selfCollide="true", turnGravityOff="true", dampingFactor=0.1,
+                material="Gazebo/Red"), written(preserveFixedJoint="true", implicitSpringDamper="1")))
+    link, joint = robot.links["a"], robot.joints["j"]
+    surface = link.surface
+    assert robot.warnings == []
+    assert (surface.friction, surface.friction_across, surface.direction, surface.stiffness) == (
+        0.5, 0.1, (0.0, 0.0, 1.0), 7.0)
+    assert (link.self_collide, link.gravity, link.decay) == (True, False, (0.1, 0.1))
+    assert link.visuals[0].colour is not None
+    assert joint.preserved and joint.implicit_damping
+
+
 @pytest.mark.parametrize("mu", ["inf", "Inf", "-1"])
 def test_a_friction_without_a_bound_is_infinite(mu):
     robot = parse_urdf('<robot name="r"><link name="l"/><gazebo reference="l"><mu1>%s</mu1></gazebo></robot>' % mu)

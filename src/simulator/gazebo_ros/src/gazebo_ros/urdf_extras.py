@@ -3,6 +3,7 @@
 import math
 
 from loop_ros.names import IllegalName, checked_name
+from urdf_model.element_table import content
 
 #: The element, inside <gazebo>, in which spawn_model hands over the joint positions of its option -J.
 START_CONFIGURATION = "start_configuration"
@@ -52,7 +53,7 @@ def sensor_of(plugin):
 
 def is_static(robot):
     """True or None (not said): ``<gazebo><static>true</static></gazebo>`` fixes a model in the world."""
-    said = [(gazebo.findtext("static") or "").strip().lower() for gazebo in robot.gazebo]
+    said = [content(static).lower() for gazebo in robot.gazebo for static in gazebo.findall("static")]
     return True if "true" in said or "1" in said else None
 
 
