@@ -9,6 +9,8 @@ _SOLVER = "the solver is Bullet's, not ODE's"
 _HARD_STOPS = "the stops of joints are hard"
 _ONE_MU = "without fdir1, friction is the same in all directions"
 _NO_FEELING = "such a link passes through others, and its contacts are not told"
+#: An overlap is corrected entirely, and its body rests higher by <min_depth>: no news up to this [m].
+KEPT_DEPTH, WHOLE_DEPTH = "0|<=0.001", "overlaps are corrected entirely"
 _PLUGINS_NOISE = "the plugin's own elements say what it measures, and with which noise"
 _OWN_VIEW = "the window has a view of its own"
 
@@ -101,6 +103,8 @@ HARMLESS = {
     "sensor": "contact always_on visualize topic enable_metrics",
     "sensor/ray/noise": "type",
     "sensor/lidar/noise": "type",
+    "sensor/ray/range": "resolution",
+    "sensor/lidar/range": "resolution",
 }
 #: (Parent, {element: harmless texts}, why it has no effect).
 WITHOUT_EFFECT = (
@@ -156,7 +160,7 @@ WITHOUT_EFFECT = (
                          "category_bitmask": "65535|0xffff"}, _NO_FEELING),
     ("surface/contact", {"poissons_ratio": "0.3", "elastic_modulus": "-1"}, "kp alone says how stiff contacts are"),
     ("surface/contact/ode", {"soft_cfm": "0", "soft_erp": "0.2"}, _SOLVER),
-    ("surface/contact/ode", {"min_depth": "0"}, "overlaps of any depth are corrected"),
+    ("surface/contact/ode", {"min_depth": KEPT_DEPTH}, WHOLE_DEPTH),
     ("material", {"lighting": "true"}, "all materials are lit"),
     ("material", {"shader": None, "shininess": "0", "double_sided": "false"}, "the renderer has one shader"),
     ("material/pbr/metal", dict.fromkeys((
@@ -180,7 +184,6 @@ WITHOUT_EFFECT = (
     *(("sensor/%s/noise" % ray, {"mean": "0", "bias_mean": "0", "bias_stddev": "0", "dynamic_bias_stddev": "0",
                                  "dynamic_bias_correlation_time": "0", "precision": "0"}, "noise is white")
       for ray in ("ray", "lidar")),
-    *(("sensor/%s/range" % ray, {"resolution": "0|0.01"}, "ranges are not rounded") for ray in ("ray", "lidar")),
     ("sensor/force_torque", {"force": None, "torque": None}, _PLUGINS_NOISE),
     ("sensor", {"imu": None, "air_pressure": None, "altimeter": None, "gps": None, "navsat": None, "sonar": None,
                 "logical_camera": None, "magnetometer": None, "rfid": None, "rfidtag": None, "transceiver": None},

@@ -75,7 +75,7 @@ LINK = """<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></
     ("<contact><collide_bitmask>65535</collide_bitmask><ode/></contact><bounce/>", ""),
     ("<contact><collide_bitmask>2</collide_bitmask></contact>", ""),
     ("<contact><collide_without_contact>1</collide_without_contact></contact>", "collide_without_contact"),
-    ("<contact><ode><max_vel>0.01</max_vel><min_depth>0.001</min_depth></ode></contact>", "min_depth"),
+    ("<contact><ode><max_vel>0.01</max_vel><min_depth>0.003</min_depth></ode></contact>", "min_depth"),
     ("<foo>1</foo>", "foo")])
 def test_what_has_an_effect_in_gazebo_alone_is_named_with_its_line(inside, named):
     xml = "<sdf version='1.6'><model name='m'>\n%s</model></sdf>" % (LINK % inside)

@@ -15,7 +15,7 @@ class Row(NamedTuple):
     ``harmless``: the texts, with | between them, with which it has none in Gazebo either; None where its presence
     counts. ``@mu=1`` is the text of the element <mu> beside it, or 1; ``?mu=mu2`` is any text, where the elements <mu>
     and <mu2> are the same; ``+fdir1`` any, where <fdir1> has a number that is not 0; ``>mu=1``
-    one of 1 or more, where <mu> is so, too.
+    one of 1 or more, where <mu> is so, too; ``<=0.1`` one of at most that.
     """
 
     reason: str = ""
@@ -124,9 +124,11 @@ def _content_of(parent, name):
 
 def _is(text, harmless, parent):
     """Whether ``text``, of an element in ``parent``, is the text that ``harmless`` means."""
-    if harmless[:1] not in "@?+>" or not harmless:
+    if harmless[:1] not in "@?+><" or not harmless:
         return _same(text, harmless)
     name, _, other = harmless[1:].partition("=")
+    if harmless.startswith("<"):
+        return _number(text) <= float(other)
     if harmless.startswith(">"):
         return min(_number(text), _number(_content_of(parent, name))) >= float(other)
     if harmless.startswith("+"):

@@ -6,27 +6,32 @@ ground, then flies 100 m high. Gazebo (ODE) corrects an overlap by the position 
 """
 import numpy as np
 
+from urdf_model import Surface
 from urdf_model.model import ALL_BITS
 
+from .builder import is_rigid
 from .quiet_pybullet import pybullet
 
-# Shallower overlaps stay: bodies that rest on each other have them [m].
-_ALLOWED_M = 1e-3
+# Shallower overlaps stay: bodies that rest on each other have them [m]. Soft surfaces, whose stiffness turns an overlap
+# into a speed, keep no more than the one in which they bear the model's weight, and this at least.
+_ALLOWED_M, _LEAST_M = 1e-3, 1e-5
 # Each moves a model out of what it is deepest in; in a corner the next one leads out of the other wall.
 _ROUNDS = 10
 
 
-def come_out(client, model, index, others):
+def come_out(client, model, index, others, gravity):
     """Move a free root of a Model, by its ``index``, out of the Models ``others``; its velocity is kept.
 
-    It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's.
+    It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's; ``gravity`` (3,)
+    [m/s^2].
     """
+    weight = float(np.linalg.norm(gravity)) * sum(link.inertial.mass for link in model.merged.links.values())
     body = model.parts.places[index].body
     start, turn = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
     twist = pybullet.getBaseVelocity(body, physicsClientId=client)
     place = np.array(start)
     for _ in range(_ROUNDS):
-        way = _deepest(client, model, body, others)
+        way = _deepest(client, model, body, others, weight)
         if way is None:
             break
         place = place + way
@@ -40,19 +45,31 @@ def _put(client, body, place, turn, twist):
     pybullet.resetBaseVelocity(body, *twist, physicsClientId=client)
 
 
-def _deepest(client, model, body, others):
+def _deepest(client, model, body, others, weight):
     """Return the way (3,) [m, world] out of what the multibody ``body`` of ``model`` is deepest in, or None."""
-    depth, way = _ALLOWED_M, None
+    depth, way = 0.0, None
     for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
-        for point in pybullet.getClosestPoints(body, obstacle, 0.0, physicsClientId=client) or ():
-            if -point[8] > depth and _bits(model, body, point[3]) & _bits(owner, obstacle, point[4]):
+        for point in pybullet.getClosestPoints(body, obstacle, -_LEAST_M, physicsClientId=client) or ():
+            surfaces = _surface(model, body, point[3]), _surface(owner, obstacle, point[4])
+            if -point[8] > max(depth, _allowed(weight, surfaces)) and _bits(surfaces[0]) & _bits(surfaces[1]):
                 # The normal points to the first body.
                 depth = -point[8]
                 way = depth * np.array(point[7])
     return way
 
 
-def _bits(model, body, index):
-    """The ``Surface.bitmask`` of the link that PyBullet numbers ``index`` in the multibody ``body`` of ``model``."""
-    surface = model.merged.links[model.link_name(body, index)].surface
-    return ALL_BITS if surface is None or surface.bitmask is None else surface.bitmask
+def _allowed(weight, surfaces):
+    """The depth [m] in which two surfaces may stay, of which one belongs to a model of this ``weight`` [N]."""
+    softest = min((surface.stiffness for surface in surfaces if not is_rigid(surface.stiffness)), default=None)
+    if softest is None:
+        return _ALLOWED_M
+    return min(max(weight / softest, _LEAST_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
+
+
+def _surface(model, body, index):
+    """The Surface of the link that PyBullet numbers ``index`` in the multibody ``body`` of ``model``."""
+    return model.merged.links[model.link_name(body, index)].surface or Surface()
+
+
+def _bits(surface):
+    return ALL_BITS if surface.bitmask is None else surface.bitmask

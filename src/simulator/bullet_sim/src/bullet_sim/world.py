@@ -298,7 +298,7 @@ class World:
             for model in placed:
                 others = [other for other in self.models.values() if other is not model]
                 for index in model.free:
-                    come_out(self._client, model, index, others)
+                    come_out(self._client, model, index, others, self._gravity)
         for model in self._weightless:
             model.cancel_weight()
         for groups in self._sliding.values():

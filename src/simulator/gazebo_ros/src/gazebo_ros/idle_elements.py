@@ -26,7 +26,7 @@ KNOWN = {
 }
 WITHOUT_EFFECT = (
     ("link", {"mu2": "@mu1=1|+fdir1|>mu1=1"}, _ONE_MU),
-    ("link", {"minDepth": "0"}, "overlaps of any depth are corrected"),
+    ("link", {"minDepth": sdf.KEPT_DEPTH}, sdf.WHOLE_DEPTH),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
     ("link", {"visual": None}, _NOT_IN_A_URDF),

@@ -55,7 +55,7 @@ def said(block):
 
 @pytest.mark.parametrize("block", [
     '<gazebo reference="a"><mu1>0.5</mu1><mu2>0.5</mu2><kp>1</kp><selfCollide>false</selfCollide><maxVel>0.01</maxVel>'
-    "<fdir1>0 0 1</fdir1><minDepth>0.0</minDepth><laserRetro>0</laserRetro><material>Gazebo/Red</material></gazebo>",
+    "<fdir1>0 0 1</fdir1><minDepth>0.001</minDepth><laserRetro>0</laserRetro><material>Gazebo/Red</material></gazebo>",
     '<gazebo reference="j"><provideFeedback>true</provideFeedback><springStiffness>1</springStiffness></gazebo>',
     '<gazebo><static>true</static><plugin filename="libother.so"><any>1</any></plugin></gazebo>',
     '<gazebo reference="a"><sensor type="camera" name="s"><camera><image><width>9</width></image></camera><plugin '
@@ -65,7 +65,7 @@ def test_what_has_its_effect_or_none_in_gazebo_is_no_news(block):
 
 
 @pytest.mark.parametrize(("block", "words"), [
-    ('<gazebo reference="a"><mu1>1</mu1><mu2>0.1</mu2><fdir1>1 0 0</fdir1><minDepth>0.001</minDepth></gazebo>',
+    ('<gazebo reference="a"><mu1>1</mu1><mu2>0.1</mu2><fdir1>1 0 0</fdir1><minDepth>0.003</minDepth></gazebo>',
      ["minDepth"]),
     ('<gazebo reference="a"><selfCollide>true</selfCollide><dampingFactor>0.1</dampingFactor><maxVel>1</maxVel>'
      "</gazebo>", []),
