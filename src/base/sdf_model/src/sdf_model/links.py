@@ -10,7 +10,9 @@ from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere
 from urdf_model.model import ALL_BITS, MAY_BE_INFINITE
 from urdf_model.transforms import pose_matrix
 
+from .document import SdfError
 from .materials import read_material
+from .polylines import polyline_file
 
 # Of a surface.
 _MOST = {"damping": bounds.DAMPING.high, "restitution": 1.0}
@@ -73,7 +75,7 @@ def _shape(document, element, link):
     if not shapes:
         document.note(element, "<%s> of link '%s' without a shape" % (element.tag, link))
         return None
-    if len(shapes) > 1:
+    if len(shapes) > 1 and any(shape.tag != "polyline" for shape in shapes):
         document.note(shapes[1], "<%s> beside <%s> in a <geometry>" % (shapes[1].tag, shapes[0].tag))
     kind, origin = shapes[0], document.pose(element)
     if kind.tag == "box":
@@ -95,9 +97,22 @@ def _shape(document, element, link):
         size = document.vector(kind, "size", (1.0, 1.0, 1.0))
         found = Mesh(file_of(document, document.text(kind, "uri")), tuple(size))
         origin = origin @ pose_matrix(document.vector(kind, "pos", (0.0, 0.0, 0.0)))
+    elif kind.tag == "polyline":
+        found = Mesh(_polylines(document, shapes))
     else:
         return None  # <empty>, or one that the table of elements has noted
     return Shape(found, origin, element.get("name", ""), None, link)
+
+
+def _polylines(document, lines):
+    """The file of the body over the <polyline> elements ``lines``; the first one has its height."""
+    points = [[document.numbers(point, 2) for point in line.iterchildren("point")] for line in lines]
+    try:
+        return polyline_file(points, document.positive(lines[0], "height", 1)[0])
+    except (ValueError, OSError) as error:
+        if isinstance(error, SdfError):
+            raise
+        raise document.error(lines[0], "<polyline>: %s" % error) from None
 
 
 def _turned_to(document, plane):
