@@ -19,13 +19,13 @@ class RayPattern:
 
     Attributes: ``directions`` (rows * columns, 3), row by row from the lowest; ``angle_min``, ``angle_max``,
     ``increment`` [rad] of a row; ``range_min``, ``range_max`` [m]; ``noise`` [m], a standard deviation; ``field``
-    [rad], the wider of both angles.
+    [rad], the wider of both angles; ``remarks``: texts about angles that Gazebo takes and that are rarely meant.
     """
 
     def __init__(self, ray, what):
         """``ray``: the element, or None for SDF's defaults; ``what`` names the sensor in messages. Raises
         :class:`RayPatternError`."""
-        self._ray, self._what = ray, what
+        self._ray, self._what, self.remarks = ray, what, []
         self.columns, self.angle_min, self.angle_max = self._span("scan/horizontal", 640)
         self.rows, low, high = self._span("scan/vertical", 1)
         if self.rows * self.columns > _MAX_RAYS:
@@ -37,7 +37,7 @@ class RayPattern:
                                   % (what, self.range_min, self.range_max))
         self.noise = max(self._number("noise/stddev", 0.0), 0.0)
         self.increment = (self.angle_max - self.angle_min) / (self.columns - 1) if self.columns > 1 else 0.0
-        self.field = max(self.angle_max - self.angle_min, high - low)
+        self.field = max(abs(self.angle_max - self.angle_min), abs(high - low))
         yaw, pitch = np.meshgrid(_angles(self.columns, self.angle_min, self.angle_max), _angles(self.rows, low, high))
         self.directions = np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)],
                                    axis=-1).reshape(-1, 3)
@@ -46,9 +46,11 @@ class RayPattern:
         samples = round(self._number(path + "/samples", default_samples) * self._number(path + "/resolution", 1.0))
         low, high = self._number(path + "/min_angle", 0.0), self._number(path + "/max_angle", 0.0)
         # Scanners that turn continuously are described either from 0 to 2 pi or from -pi to pi.
-        if samples < 1 or not low <= high <= low + _ONCE_ROUND:
-            raise RayPatternError("%s: %s has %d samples from %g to %g rad; expected at least one, angles in order and "
-                                  "once round at most" % (self._what, path, samples, low, high))
+        if samples < 1:
+            raise RayPatternError("%s: %s has %d samples; expected at least one" % (self._what, path, samples))
+        if abs(high - low) > _ONCE_ROUND:
+            self.remarks.append("%s: %s goes from %g to %g rad, more than once round; angles are in rad"
+                                % (self._what, path, low, high))
         return samples, low, high
 
     def _number(self, path, default):

@@ -100,6 +100,8 @@ class RaySensor(PacedSensor):
             self.pattern = RayPattern(element if element is not None else self.sensor.find("lidar"), self.what)
         except RayPatternError as error:
             raise PluginError(str(error)) from error
+        for remark in self.pattern.remarks:
+            context.log.warn(remark)
         self.frame = context.frame(context.element_text("frameName", self.link))
         self._offset = self.sensor_pose()
         self._start_sweep()

@@ -223,13 +223,26 @@ def test_after_a_reset_of_time_sensors_go_on(lab):
 @pytest.mark.parametrize(("element", "text"), [
     ("<range><min>2</min><max>1</max></range>", "from 2 to 1 m"), ("<range><min>x</min></range>", "'x'"),
     ("<scan><horizontal><samples>0</samples></horizontal></scan>", "0 samples"),
-    ("<scan><horizontal><samples>9</samples><min_angle>0</min_angle><max_angle>7</max_angle></horizontal></scan>",
-     "once round at most"),
-    ("<scan><horizontal><samples>9</samples><min_angle>1</min_angle></horizontal></scan>", "angles in order"),
     ("<scan><horizontal><samples>1e9</samples></horizontal></scan>", "at most")])
 def test_impossible_rays_are_refused(element, text):
     with pytest.raises(RayPatternError, match=text):
         RayPattern(etree.fromstring("<ray>%s</ray>" % element), "it")
+
+
+ANGLES = "<%s><samples>3</samples><min_angle>%g</min_angle><max_angle>%g</max_angle></%s>"
+
+
+@pytest.mark.parametrize(("axis", "low", "high", "remarks"), [
+    ("horizontal", 1, -1, 0), ("vertical", -0.1, -0.35, 0), ("horizontal", -28, 28, 1), ("horizontal", 0, 7, 1)])
+def test_rays_may_go_from_left_to_right_and_more_than_once_round_as_in_gazebo(axis, low, high, remarks):
+    pattern = RayPattern(etree.fromstring("<ray><scan>%s</scan></ray>" % (ANGLES % (axis, low, high, axis))), "it")
+    middle = (low + high) / 2
+    turns = [(math.cos(angle), math.sin(angle)) for angle in (low, middle, high)]
+    across = pattern.directions[-3:] if axis == "horizontal" else pattern.directions[320::640]
+    along = [np.hypot(x, y) for x, y, _ in across] if axis == "vertical" else across[:, 0]
+    np.testing.assert_allclose(np.column_stack([along, across[:, 2 if axis == "vertical" else 1]]), turns, atol=1e-9)
+    assert pattern.field == pytest.approx(abs(high - low)) and len(pattern.remarks) == remarks
+    assert pattern.increment == pytest.approx((high - low) / 2 if axis == "horizontal" else 0.0)
 
 
 def test_a_laser_may_look_all_round(lab):
