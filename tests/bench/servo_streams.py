@@ -30,6 +30,7 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import Scene, WorldObject
+from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of
 from moveit_servo.servo import Command, Servo, Status, Step
 from moveit_servo.settings import ServoSettings
@@ -72,11 +73,13 @@ class Thing:
 
 
 class Physics(Protocol):
-    """A robot in simulated physics. arms: {group: settings of its servo}; model, exact: those of planning; states_hz:
-    rate of its joint states [Hz]; floor_m: height of the floor in the robot's frame."""
+    """A robot in simulated physics. arms: {group: settings of its servo}; model, exact: those of planning; parts: links
+    that are convex in physics; states_hz: rate of its joint states [Hz]; floor_m: height of the floor in the robot's
+    frame."""
 
     model: PlanningModel
     exact: ExactChecker
+    parts: ConvexParts
     arms: dict[str, ServoSettings]
     states_hz: float
     floor_m: float
@@ -109,6 +112,12 @@ def settings_of(file: str, **values: str) -> ServoSettings:
     return ServoSettings.from_mapping(yaml.safe_load(text))
 
 
+def parts_of(physics: Physics) -> ConvexParts:
+    """The convex parts that the settings of a robot's servos name."""
+    settings = next(iter(physics.arms.values()))
+    return ConvexParts(sphere_model_of(physics.exact), cuts_named(settings.mesh_cuts, physics.model))
+
+
 class BaxterPhysics:
     """Baxter as in ``baxter_world.launch``, with both servos of ``baxter_servo.launch``."""
 
@@ -121,6 +130,7 @@ class BaxterPhysics:
         self.exact = ExactChecker(self.model, MeshReader(self.lab.find_mesh))
         self.arms = {side + "_arm": settings_of("baxter.yaml", side=side, command_in_type="speed_units")
                      for side in SIDES}
+        self.parts = parts_of(self)
         self._things: list[str] = []
         self._robot = self.lab.robot.simulated.model
         # What touches at rest: the pedestal and the floor.
@@ -180,6 +190,7 @@ class ProbotPhysics:
                                             yaml.safe_load((config / "joint_limits.yaml").read_text()))
         self.exact = ExactChecker(self.model, MeshReader(ResourceFinder()))
         self.arms = {"manipulator": settings_of("probot.yaml", command_in_type="speed_units")}
+        self.parts = parts_of(self)
         self.world = World(time_step_s=TICK_S, find_mesh=ResourceFinder())
         self.world.add_ground_plane()
         robot = parse_urdf(urdf, source="probot")
@@ -261,7 +272,7 @@ def start(physics: Physics, rng: np.random.Generator) -> tuple[list[Thing], Scen
         q = rng.uniform(*bounds.T)
         if rng.random() < 0.25:
             q[stretched] = np.clip(0.0, *bounds[stretched].T)
-        empty = Scene(model).with_objects([floor])
+        empty = physics.parts.added_to(Scene(model).with_objects([floor]))
         state = empty.state.with_q(q, indices)
         if not exact.free(empty, state):
             continue

@@ -35,6 +35,7 @@ from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_servo.commands import CommandIgnored, Commands, Frame, sent_at
+from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
 from moveit_servo.settings import ServoSettings, SettingsError
@@ -72,6 +73,7 @@ class ServoNode:
                  faults: ThreadFaults) -> None:
         self.model, self.exact, self._faults = model, exact, faults
         self.servo = Servo(model, settings)
+        self._parts = ConvexParts(sphere_model_of(exact), cuts_named(settings.mesh_cuts, model))
         self.commands = Commands(self.servo.joints)
         self._lock, self._news = threading.Lock(), threading.Event()
         self._q, self._velocity = model.default_state().q.copy(), np.zeros(len(model.variables))
@@ -300,7 +302,7 @@ class ServoNode:
 
     def _prepare(self, scene: Any) -> None:
         try:
-            made = Surroundings(sphere_model_of(self.exact), self.servo.group, scene)
+            made = Surroundings(sphere_model_of(self.exact), self.servo.group, self._parts.added_to(scene))
         except PlanningError as error:
             self._prepared = _of_scene(scene)
             rospy.logerr("the scene cannot be prepared, the one before stays in force: %s", error)

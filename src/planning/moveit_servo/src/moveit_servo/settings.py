@@ -29,7 +29,8 @@ class ServoSettings:
 
     Ours: max_acceleration, a number or {joint: number} [rad/s^2], None: what the velocity limits need to stop;
     stopping_time; command_lead: how long after its step a trajectory's point is due, by the time in its header, 0: a
-    period after it has come, as MoveIt's; target_pose_timeout: how long a pose is pursued, 0: until it is reached; the
+    period after it has come, as MoveIt's; target_pose_timeout: how long a pose is pursued, 0: until it is reached;
+    mesh_cuts: name of a dictionary in a module, as in ``convex_parts``, for links that are convex in a simulator; the
     PID gains of pose tracking, which in MoveIt are in a file for themselves.
     """
 
@@ -83,6 +84,7 @@ class ServoSettings:
     stopping_time: float = 0.1
     command_lead: float = 0.0
     max_acceleration: Any = None
+    mesh_cuts: str = ""
     unknown: tuple[str, ...] = field(default=())
 
     @classmethod
