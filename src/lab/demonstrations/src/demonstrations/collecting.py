@@ -89,6 +89,30 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
     return Collected(kept, failed, frames)
 
 
+def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...], size: int, noise: float = 0.0,
+         rate_hz: int = 20, say: Callable[[str], None] = lambda text: None) -> Collected:
+    """As `collect`, in this process, with pictures (size, size) of cameras of gym_baxter. Raises DemonstrationError."""
+    seeds = list(seeds)
+    core = core_of(task, cameras=cameras, size=size, control_freq=rate_hz)
+    kept = frames = 0
+    try:
+        expert = expert_of(core)
+        with SetWriter(folder, schema_of(core, noise > 0.0)) as writer:
+            for count, seed in enumerate(seeds, 1):
+                episode = record(core, expert, seed, noise, writer.frame)
+                if episode.success:
+                    writer.keep(episode.task, True, seed)
+                    kept, frames = kept + 1, frames + len(episode)
+                else:
+                    writer.drop()
+                say("%d of %d demonstrations of %s" % (count, len(seeds), task))
+    finally:
+        core.close()
+    if not kept:
+        raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
+    return Collected(kept, len(seeds) - kept, frames)
+
+
 def _episode(result, schema, seed):
     columns = {key: np.array(values, dtype=schema.features[key].dtype) for key, values in result["columns"].items()}
     return Episode(result["task"], columns, result["success"], seed)

@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, counted, number
+from gym_baxter.core import CAMERAS
 from lab_batch import JobError
 
 from . import robomimic
-from .collecting import collect
+from .collecting import collect, film
 from .environment import core_for, replay
 from .experts import EXPERTS
 from .frames import DemonstrationError
@@ -31,6 +32,10 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     one.add_argument("--first", type=number(int, 0, MAX_SEED), default=0, metavar="SEED", help="of the first episode")
     one.add_argument("--noise", type=number(float, 0.0, 1.0), default=0.0, metavar="SHARE",
                      help="disturb the actions; expert.action then has what the expert wanted (default: 0)")
+    one.add_argument("--cameras", nargs="+", choices=CAMERAS, metavar="CAMERA",
+                     help="with pictures, in one process: %s" % ", ".join(CAMERAS))
+    one.add_argument("--size", type=number(int, 2, 1024), default=84, metavar="N",
+                     help="of a picture's sides, even (default: %(default)s)")
     one.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count() or 1, metavar="N",
                      help="processes at a time (default: one for each processor, %(default)s)")
     for name, text in (("replay", "do the recorded actions again, and compare what is observed to the last bit"),
@@ -48,8 +53,15 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def _record(options):
     seeds = range(options.first, options.first + options.episodes)
-    found = collect(options.task, options.folder, seeds, options.noise, options.workers,
-                    say=lambda text: print(text, file=sys.stderr))
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr)
+
+    if options.cameras:
+        found = film(options.task, options.folder, seeds, tuple(dict.fromkeys(options.cameras)), options.size,
+                     options.noise, say=say)
+    else:
+        found = collect(options.task, options.folder, seeds, options.noise, options.workers, say=say)
     print("%s of %s are in %s; the expert failed %s" % (
         counted(found.kept, "demonstration"), options.task, options.folder, counted(found.failed, "time")))
     return 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baxter_lab import Options
-from demonstrations.collecting import collect
+from demonstrations.collecting import collect, film
 from demonstrations.environment import core_of, expert_of, record, replay, schema_of
 from demonstrations.experts import EXPERTS, down, rotation_vector
 from demonstrations.frames import ACTION, EXPERT_ACTION, STATE, DemonstrationError
@@ -49,6 +49,15 @@ def test_a_set_is_the_same_with_any_number_of_workers(tmp_path):
     for one, other in zip(*sets, strict=True):
         assert one.seed == other.seed
         np.testing.assert_array_equal(one.columns[STATE], other.columns[STATE])
+
+
+def test_a_set_has_the_pictures_of_its_cameras(tmp_path):
+    assert film("Reach", tmp_path, [0], ("head",), 32).kept == 1
+    data = DataSet(tmp_path)
+    assert data.schema.features["observation.images.head"].shape == (32, 32, 3)
+    data.check(0)
+    pictures = list(data.pictures(0, "observation.images.head"))
+    assert len(pictures) == len(data.episode(0)) and np.std(pictures[0]) > 10.0
 
 
 def test_unknown_tasks_and_cameras_are_named():
