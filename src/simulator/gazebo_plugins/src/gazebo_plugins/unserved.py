@@ -7,7 +7,8 @@ from gazebo_ros.model_plugin import ModelPlugin
 
 class Nothing(ModelPlugin):
     """A plugin that does nothing in Gazebo, or whose function the simulator has built in:
-    ``libgazebo_ros_template.so``, ``libgazebo_ros_api_plugin.so``, ``libgazebo_ros_paths_plugin.so``."""
+    ``libgazebo_ros_template.so``, ``libgazebo_ros_api_plugin.so``, ``libgazebo_ros_paths_plugin.so``; and
+    ``libroboticsgroup_gazebo_disable_link_plugin.so``, whose link ODE enables again in the next step."""
 
     required = False
 

@@ -17,6 +17,17 @@ _DRIVE = "commandTopic odometryTopic odometryFrame robotBaseFrame "
 _TOLERANCES = ({"wheelSpeedTolerance": "0.01", "steeringAngleTolerance": "0.01"}, "wheels follow their targets exactly")
 _FORCE_GAINS = ({"yaw_velocity_p_gain": None, "x_velocity_p_gain": None, "y_velocity_p_gain": None},
                 "the model moves as commanded, whatever the gains")
+_ERRORS = "offset", "drift", "driftFrequency", "gaussianNoise", "scaleError"
+_ON_THE_GLOBE = ({"useWorldSphericalCoordinates": "false"}, "receivers have the reference of their plugin")
+_PAUSES = {"updateOffset": "0"}, "measurements begin with the time"
+_MIMIC = "joint mimicJoint multiplier offset sensitiveness maxEffort hasPID"
+
+
+def _with_errors(known, *prefixes):
+    """``known`` and the elements of the error model of each measurement."""
+    return known + "".join(" %s%s" % (prefix, name[0].upper() + name[1:] if prefix else name)
+                           for prefix in prefixes for name in _ERRORS)
+
 
 #: File name -> (elements with an effect, ({name: harmless texts}, reason), ...).
 PLUGINS = {
@@ -50,8 +61,37 @@ PLUGINS = {
         "encoderWheelRightJoint encoderWheelSeparation encoderWheelDiameter wheelTorque wheelAcceleration "
         "wheelDeceleration steeringSpeed odometrySource publishWheelJointState publishWheelTF", _TOLERANCES),
     "libgazebo_ros_planar_move.so": (_DRIVE + "odometryRate cmdTimeout",),
-    "libgazebo_ros_force_based_move.so": (_DRIVE + "odometryRate publishOdometryTf cmdTimeout", _FORCE_GAINS),
-    "libgazebo_ros_elevator.so": ("topic lift_joint door_joint floor_height door_wait_time",),
+    **dict.fromkeys(("libgazebo_ros_force_based_move.so", "libridgeback_ros_force_based_move.so",
+                     "librobotnik_force_based_move.so"),
+                    (_DRIVE + "odometryRate publishOdometryTf cmdTimeout", _FORCE_GAINS)),
+    **dict.fromkeys(("libgazebo_ros_elevator.so", "libElevatorPlugin.so"),
+                    ("topic lift_joint door_joint floor_height door_wait_time",)),
+    "libInitialVelocityPlugin.so": ("linear angular",),
+    "libconveyor_belt.so": ("joint speed commandTopic",),
+    "libgazebo_ros_kobuki.so": (
+        "left_wheel_joint_name right_wheel_joint_name wheel_separation wheel_diameter torque velocity_command_timeout "
+        "publish_tf imu_name", (dict.fromkeys((
+            "bumper_name", "cliff_sensor_left_name", "cliff_sensor_center_name", "cliff_sensor_right_name",
+            "cliff_detection_threshold", "wheel_drop_left_sensor_name", "wheel_drop_right_sensor_name")),
+            "kobuki_msgs, in which it would be told, is not there")),
+    **dict.fromkeys(("libgazebo_mimic_joint_plugin.so", "libroboticsgroup_gazebo_mimic_joint_plugin.so",
+                     "libroboticsgroup_upatras_gazebo_mimic_joint_plugin.so"), (_MIMIC,)),
+    "libgazebo_grasp_fix.so": ("arm", (dict.fromkeys((
+        "forces_angle_tolerance", "update_rate", "grip_count_threshold", "max_grip_count", "release_tolerance",
+        "disable_collisions_on_attach", "contact_topic")), "fingers hold by friction, and nothing is fixed")),
+    **dict.fromkeys(("libgazebo_ros_velodyne_laser.so", "libgazebo_ros_velodyne_gpu_laser.so"), (
+        "topicName frameName updateRate min_range max_range gaussianNoise organize_cloud",
+        ({"min_intensity": "0"}, "intensities of lasers are 0"))),
+    "libhector_gazebo_ros_imu.so": (_with_errors(
+        "bodyName frameId topicName biasTopicName serviceName rpyOffset updateRate updatePeriod gaussianNoise", "accel",
+        "rate", "yaw"), _OFFSET, _PAUSES),
+    "libhector_gazebo_ros_gps.so": (_with_errors(
+        "bodyName frameId topicName velocityTopicName referenceLatitude referenceLongitude referenceAltitude "
+        "referenceHeading status service updateRate updatePeriod", "", "velocity"), _ON_THE_GLOBE, _PAUSES),
+    "libhector_gazebo_ros_magnetic.so": (_with_errors(
+        "bodyName frameId topicName useMagneticFieldMsgs magnitude referenceHeading declination inclination updateRate "
+        "updatePeriod", ""), _ON_THE_GLOBE, _PAUSES),
+    "libhector_gazebo_ros_sonar.so": (_with_errors("frameId topicName updateRate", ""), _PAUSES),
     "libgazebo_ros_hand_of_god.so": ("frameId kl ka linkName",),
     "libgazebo_world_odometry.so": ("topicName frameName updateRate",),
     "libgazebo_ros_control.so": ("robotParam robotSimType controlPeriod eStopTopic legacyModeNS",),
