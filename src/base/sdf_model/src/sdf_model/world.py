@@ -136,7 +136,11 @@ class _WorldReader:
         world.models.append(model)
 
     def _state(self, element):
-        """A world saved by Gazebo has two poses of each model; <state> has the last one."""
+        """A world saved by Gazebo has two poses of each model and light; <state> has the last one."""
+        lights = {light.name: light for light in self._world.lights}
+        for child in element.iterchildren("light"):
+            if child.find("pose") is not None and child.get("name") in lights:
+                lights[child.get("name")].pose = self._document.pose(child)
         poses = {child.get("name"): child for child in element.iterchildren("model")}
         for model in self._world.models:
             child = poses.get(model.name)

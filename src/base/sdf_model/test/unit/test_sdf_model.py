@@ -313,6 +313,12 @@ def test_light_and_ambience(tmp_path):
     assert (bulb.spot, bulb.range_m) == (None, 10.0)
 
 
+def test_a_saved_state_says_where_the_lights_are(tmp_path, shelf):
+    found = world(tmp_path, '<light name="lamp" type="point"><pose>0 0 1 0 0 0</pose></light><state world_name="w">'
+                            '<light name="lamp"><pose>0 0 3 0 0 0</pose></light><light name="gone"/></state>', shelf)
+    assert found.lights[0].pose[2, 3] == 3.0 and found.warning == ""
+
+
 def test_a_saved_state_says_where_the_models_are(tmp_path, shelf):
     found = world(tmp_path, '<include><uri>model://can</uri></include><state world_name="w"><model name="can">'
                             "<pose>5 0 0 0 0 0</pose></model></state>", shelf)
