@@ -45,7 +45,8 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs
   batch-node            this machine as one of several for 'batch --engine ray', until Ctrl-C
   bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
-  sysid RECORDING       fit the model of profile:=robot to a recording of a robot's arms; --out FILE for serial:=FILE
+  sysid [RECORDING]     fit the model of profile:=robot to a recording of a robot's arms, or move an arm (--arm) and record it;
+                        --out FILE for serial:=FILE
   conformance [HOST]    compare the robot with a physical Baxter's interface, and print a score by group
   doctor [HOST]         check master, network, clock, build, Python and robot; print a fix for each problem.
                         Without HOST: the master of ROS_MASTER_URI, or else this machine's

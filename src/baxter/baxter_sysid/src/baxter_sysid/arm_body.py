@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baxter_model import joint_names
+from bullet_sim.damping import largest_stable
 from disk_cache.compiled import compiler
-from urdf_model import Robot, merge_fixed
-from urdf_model.merge import combine
+from urdf_model import Inertial, Robot, merge_fixed
+from urdf_model.merge import MergedRobot, combine
 
 from .errors import SysidError
 
@@ -22,6 +23,7 @@ Array = NDArray[np.float64]
 _compiled = compiler("baxter_sysid", [__file__], error_model="numpy")
 
 GRAVITY = 9.81  # [m/s^2]
+TICK_S = 0.002  # of the simulator, and of a replay
 
 
 class ArmBody(NamedTuple):
@@ -42,7 +44,8 @@ class ArmBody(NamedTuple):
 
 
 def arm_body(robot: Robot, side: str) -> ArmBody:
-    """The body of one arm of a Baxter. Raises SysidError for a description without it."""
+    """The body of one arm of a Baxter, with what is on its hand; fingers count as closed. Its damping is that of the
+    simulator, which bounds it where its ticks are too long. Raises SysidError for a description without the arm."""
     merged = merge_fixed(robot)
     try:
         joints = [merged.joints[name] for name in joint_names(side)]
@@ -51,11 +54,25 @@ def arm_body(robot: Robot, side: str) -> ArmBody:
     if any(not np.allclose(joint.axis, [0.0, 0.0, 1.0]) for joint in joints):
         raise SysidError("the description's arm joints do not turn about z; it must be Baxter's")
     links = [merged.links[joint.child].inertial for joint in joints]
-    return ArmBody(np.array([joint.origin[:3, :3] for joint in joints]),
+    links[-1] = combine([(link.mass, place[:3, :3] @ link.centre + place[:3, 3],
+                          place[:3, :3] @ link.inertia @ place[:3, :3].T)
+                         for link, place in _behind(merged, joints[-1].child, np.eye(4))])
+    body = ArmBody(np.array([joint.origin[:3, :3] for joint in joints]),
                    np.array([joint.origin[:3, 3] for joint in joints]),
                    np.array([link.mass for link in links]), np.array([link.centre for link in links]),
                    np.array([link.inertia for link in links]),
                    np.array([joint.damping for joint in joints], dtype=float), np.array([0.0, 0.0, 1.0]))
+    felt = 1.0 / np.diagonal(np.linalg.inv(inertia_matrix(body, np.zeros(len(joints)))))
+    return body._replace(damping=np.minimum(body.damping, largest_stable(felt, TICK_S)))
+
+
+def _behind(merged: MergedRobot, link: str, place: Array) -> list[tuple[Inertial, Array]]:
+    """(inertial, place (4, 4)) of a link, and of all behind its joints, which are at zero."""
+    found = [] if merged.links[link].inertial is None else [(merged.links[link].inertial, place)]
+    for joint in merged.joints.values():
+        if joint.parent == link:
+            found += _behind(merged, joint.child, place @ joint.origin)
+    return found
 
 
 def hand_in_last(robot: Robot, side: str) -> Array:
@@ -161,6 +178,15 @@ def solve(matrix, right, factor):
         for k in range(i + 1, count):
             right[i] -= factor[k, i] * right[k]
         right[i] /= factor[i, i]
+
+
+def inertia_matrix(body: ArmBody, position: Array) -> Array:
+    """(n, n) [kg m^2] the joint-space inertia at position (n,) [rad]."""
+    count = len(position)
+    turned, matrix = np.empty((count, 3, 3)), np.empty((count, count))
+    turn_joints(body, position, turned)
+    fill_inertia(body, turned, np.zeros(count), np.zeros(count), np.empty((count, 6)), matrix)
+    return matrix
 
 
 def holding_torques(body: ArmBody, position: Array) -> Array:

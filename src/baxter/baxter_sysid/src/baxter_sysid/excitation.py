@@ -10,6 +10,8 @@ from .arm_body import Array
 
 PERIOD_S = 0.01
 REST_S = 4.0  # before and after, so that the integral is at rest
+#: How long the motion may be [s].
+SECONDS = (10.0, 180.0)
 #: {joint: amplitude [rad]} around the pose "neutral"; each joint has three frequencies of its own [Hz].
 AMPLITUDES = {"s0": 0.20, "s1": 0.16, "e0": 0.22, "e1": 0.20, "w0": 0.30, "w1": 0.25, "w2": 0.35}
 FREQUENCIES = np.array([[0.17, 0.47, 0.83], [0.23, 0.53, 0.91], [0.19, 0.43, 0.97], [0.29, 0.59, 0.79],

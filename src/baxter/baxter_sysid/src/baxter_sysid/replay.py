@@ -13,11 +13,10 @@ from baxter_sim_hardware.arms.actuators import Wanted, turn
 from disk_cache.compiled import compiler
 
 from . import arm_body
-from .arm_body import GRAVITY, ArmBody, Array, fill_inertia, solve, torques, turn_joints
+from .arm_body import GRAVITY, TICK_S, ArmBody, Array, fill_inertia, solve, torques, turn_joints
 
 _compiled = compiler("baxter_sysid", [__file__, arm_body.__file__, actuators.__file__], error_model="numpy")
 
-TICK_S = 0.002
 INERTIA_TICKS = 5  # the inertia of an arm changes that slowly
 
 

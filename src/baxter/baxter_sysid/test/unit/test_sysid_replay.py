@@ -10,13 +10,14 @@ import xacro
 from baxter_model import JOINTS, SIDES, joint_names, poses
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms.actuators import NUMBERS
-from baxter_sysid.arm_body import arm_body, hand_in_last, holding_torques, with_load
+from baxter_sysid.arm_body import TICK_S, arm_body, hand_in_last, holding_torques, with_load
 from baxter_sysid.errors import SysidError
 from baxter_sysid.excitation import AMPLITUDES, PERIOD_S, motion
 from baxter_sysid.identify import DELAY, LOAD_M, MASS, Model, Settings, identify, table_of
 from baxter_sysid.recording import Recording, start_of
 from baxter_sysid.replay import replay, set_points
 from baxter_sysid.sheet import errors, numbers, worst_seconds
+from bullet_sim import World
 from urdf_model import parse_urdf
 
 POSTURE = np.array([0.349, -0.436, -0.698, 1.047, -0.349, 1.396, 0.0])
@@ -43,6 +44,28 @@ def test_the_weight_of_an_arm_is_that_of_an_independent_computation(robot):
     for side in SIDES:
         np.testing.assert_allclose(holding_torques(arm_body(robot, side), POSTURE),
                                    [0.0, -44.04, -10.57, -9.19, -1.48, 0.62, -0.02], atol=0.02)
+
+
+def test_joints_are_damped_as_in_the_physics(robot):
+    """The wrist is so light that a tick is too long for the damping of its description."""
+    world = World(time_step_s=TICK_S, find_mesh=lambda name: None, warn=lambda text: None)
+    try:
+        model = world.spawn(robot, "baxter", static=True)
+        for side in SIDES:
+            index = model.index(joint_names(side))
+            np.testing.assert_allclose(arm_body(robot, side).damping, model.damping[index], rtol=1e-6)
+            assert model.damping[index[-1]] < 0.5 * robot.joints["%s_w2" % side].damping
+    finally:
+        world.close()
+
+
+def test_fingers_weigh_on_the_last_joint(robot):
+    path = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf/baxter.urdf.xacro"
+    gripping = parse_urdf(xacro.process_file(str(path)).toxml(), source=str(path))
+    links = [name for name in gripping.links if name.startswith(("left_gripper", "l_gripper"))]
+    weight = sum(gripping.links[name].inertial.mass for name in links if gripping.links[name].inertial is not None)
+    more = arm_body(gripping, "left").masses.sum() - arm_body(robot, "left").masses.sum()
+    assert more == pytest.approx(weight, abs=1e-3) and weight > 0.3
 
 
 def test_a_load_pulls_by_its_lever(robot):

@@ -21,6 +21,12 @@ _MARGIN = 0.5
 _OF_A_CHAIN = 4.0
 
 
+def largest_stable(felt_inertia, time_step_s):
+    """(n,) The largest damping [Nm s/rad or N s/m] that is certainly stable for joints that feel `felt_inertia` (n,)
+    [kg m^2 or kg] in ticks of time_step_s [s]."""
+    return _MARGIN * felt_inertia / time_step_s
+
+
 class JointDamping:
     """The damping of each joint of a :class:`Model`, bounded by the length of a tick."""
 
@@ -100,4 +106,4 @@ class JointDamping:
 
     def _stable(self):
         """(n,) The largest damping of each joint that is certainly stable."""
-        return _MARGIN * self.felt_inertia() / self._time_step_s
+        return largest_stable(self.felt_inertia(), self._time_step_s)
