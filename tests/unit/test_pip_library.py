@@ -17,7 +17,7 @@ except ImportError:  # Python 3.10
 
 FRONT_DOORS = ("baxter_lab", "gym_baxter", "demonstrations", "robot_learning")
 #: The parts of these packages that know ROS stay behind.
-LEFT_OUT = {"baxter_sim_hardware.topics", "robot_learning.over_ros"}
+LEFT_OUT = {"baxter_sim_hardware.topics", "demonstrations.over_ros", "robot_learning.over_ros"}
 #: Modules of the dependencies of pyproject.toml under another name.
 RENAMED = {"PyYAML": "yaml", "python-fcl": "fcl", "pycollada": "collada", "pillow": "PIL", "pybullet-arm64": "pybullet"}
 #: Modules that are used where they are there; for what, without them.

@@ -2,5 +2,5 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["demonstrations"], package_dir={"": "src"},
+setup(**generate_distutils_setup(packages=["demonstrations", "demonstrations.over_ros"], package_dir={"": "src"},
                                  package_data={"demonstrations": ["requirements-*.txt"]}))

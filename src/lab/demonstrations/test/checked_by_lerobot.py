@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """LeRobot itself reads, joins, continues, trains on and evaluates a set, and finds the plugins: `checked_by_lerobot.py
-SET SCRATCH`. SET: of at least 3 episodes of `python3 -m demonstrations record`. For a Python 3.12 with
+SET SCRATCH [STEP...]`. SET: of at least 3 episodes of `python3 -m demonstrations record`. For a Python 3.12 with
 `lerobot[dataset,training]`, `baxter-lab[gym,lerobot]` of this workspace, and the plugins beside this folder."""
 import dataclasses
 import json
@@ -139,6 +139,8 @@ if __name__ == "__main__":
     SCRATCH.mkdir(parents=True, exist_ok=True)
     for step in (stand_ins_are_as_lerobot_is, plugins_are_found, set_is_read, sets_are_joined_cut_and_continued,
                  a_policy_is_trained_and_evaluated):
+        if sys.argv[3:] and step.__name__ not in sys.argv[3:]:
+            continue
         begin = time.monotonic()
         step()
         done(step.__name__.replace("_", " "), begin)

@@ -55,7 +55,8 @@ class Collected(NamedTuple):
 def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1, rate_hz: int = 20,
             say: Callable[[str], None] = lambda text: None, spec: Spec | None = None) -> Collected:
     """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
-    with the results of `Demonstrate` and with the expert's own actions. Raises DemonstrationError, JobError."""
+    with the results of `Demonstrate` and with the expert's own actions. Raises DemonstrationError, JobError, the first
+    where the set has no episode then."""
     seeds = list(seeds)
     core = core_of(task, control_freq=rate_hz)
     try:
@@ -84,7 +85,7 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
                     kept, frames = kept + 1, frames + len(result["columns"]["action"])
                 say("%d of %d demonstrations of %s" % (kept + failed, len(seeds), task))
                 following = next(order, None)
-    if not kept:
+    if not writer.episodes:
         raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
     return Collected(kept, failed, frames)
 
@@ -108,7 +109,7 @@ def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...]
                 say("%d of %d demonstrations of %s" % (count, len(seeds), task))
     finally:
         core.close()
-    if not kept:
+    if not writer.episodes:
         raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
     return Collected(kept, len(seeds) - kept, frames)
 

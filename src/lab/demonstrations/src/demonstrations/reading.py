@@ -53,6 +53,11 @@ class DataSet:
     def __len__(self) -> int:
         return int(self._info["total_episodes"])
 
+    @property
+    def seeds(self) -> list[int | None]:
+        """The seed that each episode began by."""
+        return [self._outcomes.get(number, {}).get("seed") for number in range(len(self))]
+
     def _episode_rows(self):
         rows = {}
         for path in sorted((self.folder / "meta/episodes").glob("chunk-*/file-*.parquet")):

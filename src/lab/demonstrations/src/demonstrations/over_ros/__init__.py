@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Demonstrations on a ROS master, and out of its recordings."""

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Record what a robot of a ROS master does, or what a file of rosbag has, as a LeRobot data set."""
+from __future__ import annotations
+
+import argparse
+import queue
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import rosbag
+import rospy
+from std_msgs.msg import String
+
+from command_line.options import Parser, number
+
+from ..frames import MARKS, MAX_RATE_HZ, DemonstrationError
+from ..watching import Recorder, schema_of
+from ..writing import SetWriter
+from .messages import CAMERAS, MARKS_TOPIC, Heard, topics
+
+#: Wall time for the first picture of every camera, and between two looks [s]; messages that wait at most.
+_FOUND_WITHIN_S, _POLL_S, _QUEUE = 20.0, 0.1, 4000
+
+#: Messages as they come: (topic, message), or None while none comes.
+Feed = Iterator[tuple[str, Any] | None]
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """The command line's options."""
+    parser = Parser(
+        prog="rosrun demonstrations record", description=__doc__,
+        epilog="Every success, failure or again on %s ends an episode, and the next begins. States and actions are the "
+               "joints' angles and set-points. Publishes ~state (std_msgs/String). Exit status: 0 done, 1 something is "
+               "missing or broken, 2 wrong options." % MARKS_TOPIC)
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the set, which is made or continued")
+    parser.add_argument("--task", required=True, metavar="TEXT", help="what is shown, in words")
+    parser.add_argument("--rate", type=number(int, 1, MAX_RATE_HZ), default=20, metavar="HZ",
+                        help="frames a second (default: %(default)s)")
+    parser.add_argument("--cameras", nargs="+", default=[], choices=tuple(CAMERAS), metavar="CAMERA",
+                        help="with pictures: %s" % ", ".join(CAMERAS))
+    parser.add_argument("--models", nargs="+", default=[], metavar="MODEL",
+                        help="with the poses of these models of /gazebo/model_states")
+    parser.add_argument("--bag", type=Path, metavar="FILE", help="out of this file, in place of a robot")
+    parser.add_argument("--end", choices=MARKS, default="again", metavar="MARK",
+                        help="what the end of --bag means for the last episode: one of %s (default: %%(default)s, it "
+                             "is thrown away)" % ", ".join(MARKS))
+    return parser.parse_args(argv)
+
+
+def of_bag(path: Path, heard: Mapping[str, Heard]) -> Feed:
+    """The messages of a file in the order of their recording. Raises DemonstrationError."""
+    try:
+        with rosbag.Bag(str(path)) as bag:
+            for topic, message, _ in bag.read_messages(topics=list(heard)):
+                yield topic, message
+    except (OSError, ValueError, rosbag.ROSBagException) as error:
+        raise DemonstrationError("%s cannot be read: %s" % (path, error)) from error
+
+
+def of_robot(heard: Mapping[str, Heard]) -> Feed:
+    """The messages of the master's topics, until the node is shut down."""
+    waiting: queue.Queue[tuple[str, Any]] = queue.Queue(_QUEUE)
+    kept = [rospy.Subscriber(topic, kind.kind, lambda message, name=topic: waiting.put((name, message)),
+                             queue_size=100, tcp_nodelay=True) for topic, kind in heard.items()]
+    while kept and not rospy.is_shutdown():
+        try:
+            yield waiting.get(timeout=_POLL_S)
+        except queue.Empty:
+            yield None
+
+
+def sizes(feed: Feed, heard: Mapping[str, Heard], cameras: Sequence[str]) -> dict[str, tuple[int, int]]:
+    """{camera: (height, width)} of the first pictures of a feed; what comes before them is passed over. Raises
+    DemonstrationError where one is missing."""
+    found: dict[str, tuple[int, int]] = {}
+    end = time.monotonic() + _FOUND_WITHIN_S
+    while set(found) < set(cameras):
+        item = next(feed, ("", None))
+        if item == ("", None) or time.monotonic() > end:
+            raise DemonstrationError("no picture came on %s; is the camera open?" % ", ".join(
+                CAMERAS[name] for name in cameras if name not in found))
+        for key, value, _ in heard[item[0]].says(item[1]) if item else ():
+            if key in cameras:
+                # Films have even sides.
+                found[key] = value.shape[0] // 2 * 2, value.shape[1] // 2 * 2
+    return found
+
+
+def record(feed: Feed, heard: Mapping[str, Heard], recorder: Recorder, size: Mapping[str, tuple[int, int]]) -> None:
+    """Pass a feed to a recorder until it ends. Raises DemonstrationError, OSError."""
+    for item in feed:
+        for key, value, stamp in heard[item[0]].says(item[1]) if item else ():
+            if key == MARKS_TOPIC:
+                recorder.mark(value)
+            elif key in size:
+                recorder.take(key, value[:size[key][0], :size[key][1]])
+            else:
+                recorder.take(key, value, stamp)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Raises DemonstrationError, OSError."""
+    heard = topics(options.cameras, options.models)
+    states = None
+    if options.bag is None:
+        rospy.init_node("demonstrations_record")
+        states = rospy.Publisher("~state", String, queue_size=10, latch=True)
+
+    def say(text: str) -> None:
+        print(text, flush=True)
+        if states is not None:
+            states.publish(text)
+
+    def feed() -> Feed:
+        return of_robot(heard) if options.bag is None else of_bag(options.bag, heard)
+
+    size = sizes(feed(), heard, options.cameras)
+    with SetWriter(options.folder, schema_of(options.rate, size, options.models)) as writer:
+        recorder = Recorder(writer, options.task, say=say)
+        say("recording into %s, which has %d episodes" % (options.folder, writer.episodes))
+        record(feed(), heard, recorder, size)
+        if recorder.length:
+            recorder.mark(options.end)
+        elif recorder.waits:
+            say("nothing more is recorded: %s" % recorder.waits)
+
+
+def main() -> None:
+    """The program."""
+    options = parse(rospy.myargv()[1:])
+    try:
+        run(options)
+    except (DemonstrationError, OSError) as error:
+        sys.exit("record: %s" % error)
