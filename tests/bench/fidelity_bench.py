@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Replays a recording of a physical Baxter through joint_command, with modelled actuators and with ideal drives.
 
-`./baxter.sh bench fidelity [--recording FILE]` prints a line for each joint, and draws commanded, recorded and
-simulated curves. FILE: a CSV file with the columns of recordings/baxter_tracking_100hz.csv.
+`./baxter.sh bench fidelity [--recording FILE] [--from S]` prints a line for each joint, what the model does in its
+worst second, and draws commanded, recorded and simulated curves. FILE: a CSV file with the columns of
+recordings/baxter_tracking_100hz.csv; S: the second of it to begin at, which may be in motion.
 """
 import os
-import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
-from labs import HERE, Lab
+from labs import HERE
 from pictures import curves
 from recording import JOINT_NAMES, Recording, delay_s, overshoots, rest, step_overshoot
+from replaying import Start, bare_robot, replay
+
+from baxter_sysid.replay import Motion
+from baxter_sysid.sheet import worst_seconds
 
 RECORDING = HERE / "recordings" / "baxter_tracking_100hz.csv"
 # Each joint's root mean square of simulated minus recorded position [rad].
@@ -24,8 +27,13 @@ QUICK_S = 4.0
 
 def measure(report, quick, number):
     path = Path(os.environ.get("BENCH_RECORDING") or RECORDING)
-    recording = Recording.read(path, QUICK_S if quick else None)
-    simulated = {effects: replay(path, len(recording.time_s), effects) for effects in ("all", "lag", "none")}
+    whole = Recording.read(path, QUICK_S if quick else None, float(os.environ.get("BENCH_FROM") or 0.0))
+    robot, start = bare_robot(), Start.of(whole)
+    replayed = {effects: replay(whole, effects, robot, meshes=True) for effects in ("all", "none")}
+    judged = whole.time_s >= whole.time_s[0] + start.judged_from_s
+    recording = Recording(*(values[judged] for values in whole))
+    simulated = {effects: done.motion.position[judged] for effects, done in replayed.items()}
+    print("%s: %s" % (path.name, start.sentence()), flush=True)
     steps = [step_overshoot(recording.commanded, values, recording.period_s)
              for values in (recording.sensed, simulated["all"])]
     lines = ["%-9s %8s %8s %8s  %17s  %17s  %17s  %17s" % (
@@ -48,26 +56,18 @@ def measure(report, quick, number):
                    float(abs(steps[1][j] - steps[0][j])), "points", samples=len(error),
                    **({} if quick else {"most": OVERSHOOT_POINTS}))
     print("simulated against recorded; pairs: recorded, simulated", *lines, sep="\n", flush=True)
+    motion, events = replayed["all"]
+    print("the worst second of each joint", *worst_seconds(
+        recording.time_s, simulated["all"] - recording.sensed, Motion(*(values[judged] for values in motion)),
+        list(JOINT_NAMES), events), sep="\n", flush=True)
     if number == 0:
         folder = HERE.parents[1] / ".baxter/bench"
         folder.mkdir(parents=True, exist_ok=True)
         curves(recording.time_s, {name: {"commanded": recording.commanded[:, j], "recorded": recording.sensed[:, j],
-                                         "simulated": simulated["lag"][:, j]}
+                                         "simulated": simulated["all"][:, j]}
                                   for j, name in enumerate(JOINT_NAMES)}, folder / "fidelity.png")
 
 
 def rms(values):
     return float(np.sqrt(np.mean(values ** 2)))
 
-
-def replay(path, count, effects):
-    """Return the positions (count, 14) [rad] from the joint states, at the times of the recording's rows."""
-    with tempfile.TemporaryDirectory() as folder, Lab(
-            ready="/gazebo/advance", gui="false", enable="true", paused="true", joint_state_rate="500", effects=effects,
-            left_electric_gripper="false", right_electric_gripper="false") as lab:
-        found = Path(folder) / "positions.npy"
-        process = lab.part("replay", path, count, found)
-        process.wait()
-        if process.returncode or not found.exists():
-            sys.exit("lab_part.py replay failed with exit code %d" % process.returncode)
-        return np.load(found)

@@ -4,7 +4,6 @@
 `./baxter.sh bench fidelity --fit left|right|both` prints what it finds beside physical_robot.yaml. The recording is
 replayed by the plugin and the physics in this process. `least_squares` knows neither.
 """
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -75,16 +74,8 @@ class Replay:
     """
 
     def __init__(self, recording, rows):
-        # They load the physics; a test of `least_squares` does without.
-        import rospkg
-        from robot_bench import load_lab
-
-        import xacro
-        from urdf_model import parse_urdf
-        file = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf/baxter.urdf.xacro"
-        bare = xacro.process_file(str(file), mappings={"%s_gripper" % side: "none" for side in SIDES}).toxml()
-        self._robot, self._lab_class = parse_urdf(bare, source=str(file)), load_lab()
-        self._recording, self._rows = recording, rows
+        from replaying import bare_robot  # it loads the physics; a test of `least_squares` does without
+        self._robot, self._recording, self._rows = bare_robot(), recording, rows
 
     def with_numbers(self, numbers):
         """Rows of actuators with `numbers` (k, 7) in place of FREE."""
@@ -94,23 +85,15 @@ class Replay:
     def __call__(self, numbers):
         """(samples, 2, 7) simulated less recorded position [rad]."""
         from recording import JOINT_NAMES
+        from replaying import replay
 
         from baxter_sim_hardware.arms.actuators import Actuators
-        recording, period = self._recording, self._recording.period_s
-        lab = self._lab_class(self._robot, parameters={"enable": True, "effects": "lag"}, angles=recording.sensed[0])
-        try:
-            for publisher in lab.publishers.values():
-                publisher.has_listeners = False
-            lab.plugin._baxter.actuators = Actuators(self.with_numbers(numbers), JOINT_NAMES)
-            lab.run(period)
-            positions = np.empty_like(recording.sensed)
-            for k, commanded in enumerate(recording.commanded):
-                positions[k] = lab.position
-                lab.command(4, commanded)
-                lab.run(period)
-        finally:
-            lab.close()
-        return (positions - recording.sensed).reshape(len(positions), len(SIDES), len(JOINTS))
+
+        def change(baxter):
+            baxter.actuators = Actuators(self.with_numbers(numbers), JOINT_NAMES)
+
+        motion = replay(self._recording, "lag", self._robot, change=change).motion
+        return (motion.position - self._recording.sensed).reshape(-1, len(SIDES), len(JOINTS))
 
 
 def lines(start, fit, arm):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Processes that a bench runs beside a lab: lab_part.py swing | press | client | busy | boxes N | empty |
-answers FILE | posture | latency N | lockstep TICKS | replay RECORDING ROWS FILE | hostile.
+answers FILE | posture | latency N | lockstep TICKS | hostile.
 
 Each prints "up" when it is running.
 """
@@ -16,14 +16,12 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
 import roslib.message
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import AdvanceTicks
-from gazebo_msgs.srv import DeleteModel, SetModelConfiguration, SpawnModel
+from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from recording import JOINT_NAMES, Recording
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt16
 from std_srvs.srv import Empty
@@ -233,32 +231,6 @@ def lockstep(ticks):
     print(json.dumps({"digest": digest.hexdigest(), "states": len(counted)}), flush=True)
 
 
-def replay(path, rows, file):
-    """Send a recording's set-points as raw positions in lock-step, starting at its first posture. Write the joints'
-    positions at the times of its first ``rows`` rows, (rows, 14) [rad], into a numpy file."""
-    recording = Recording.read(path)
-    ticks = round(recording.period_s / TICK_S)
-    states = {}
-    rospy.Subscriber("/robot/joint_states", JointState, lambda message: states.setdefault(
-        message.header.stamp.to_nsec(), {}).update(zip(message.name, message.position, strict=True)))
-    place = rospy.ServiceProxy("/gazebo/set_model_configuration", SetModelConfiguration)
-    world = LockStep()
-    up()
-    world.step(FIRST_TICK)
-    answer = place("baxter", "robot_description", list(JOINT_NAMES), recording.sensed[0].tolist())
-    if not answer.success:
-        raise SystemExit(answer.status_message)
-    times = [world.step(ticks).sim_time.to_nsec()]
-    for commanded in recording.commanded[:int(rows) - 1].tolist():
-        angles = dict(zip(JOINT_NAMES, commanded, strict=True))
-        world.send(JointCommand.RAW_POSITION_MODE,
-                   {side: [angles[name] for name in joint_names(side)] for side in SIDES})
-        times.append(world.step(ticks, after_commands=True).sim_time.to_nsec())
-    world.step(ON_WAY_TICKS)
-    wait_until(lambda: max(states, default=0) > times[-1], "joint states after %d ns" % times[-1], 60.0)
-    np.save(file, np.array([[states[time][name] for name in JOINT_NAMES] for time in times]))
-
-
 def hostile():
     """Spawn and delete hostile descriptions: too large, endless, or with a false header. Prints the time to each answer
     [s] as JSON."""
@@ -286,7 +258,7 @@ def hostile():
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without the arguments that roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, replay, hostile)
+    parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, hostile)
     {function.__name__: function for function in parts}[name](*arguments)
 
 

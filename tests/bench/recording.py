@@ -12,6 +12,7 @@ REST_RAD, REST_ROWS = 2e-4, 100
 # Natural frequencies [rad/s] and dampings of the systems of second order that a joint is compared with; steps of their
 # integration in a row.
 FREQUENCIES, DAMPINGS, STEPS = np.geomspace(4.0, 60.0, 40), np.geomspace(0.3, 2.0, 40), 5
+LEAST_ROWS = 20
 # A joint's lag behind its set-point is at most this [rows].
 BEHIND_ROWS = 100
 
@@ -28,8 +29,11 @@ class Recording(NamedTuple):
         return float(np.median(np.diff(self.time_s)))
 
     @classmethod
-    def read(cls, path, seconds=None):
-        """Read a CSV file with a line of names. Raises SystemExit with the reason if the file cannot be used."""
+    def read(cls, path, seconds=None, begin=0.0):
+        """Read a CSV file with a line of names, from its second `begin` on, so many seconds of it.
+
+        Raises SystemExit with the reason if the file cannot be used.
+        """
         try:
             table = np.genfromtxt(path, delimiter=",", names=True)
         except (OSError, ValueError) as error:
@@ -40,8 +44,11 @@ class Recording(NamedTuple):
             raise SystemExit("%s has no column %s" % (path, ", ".join(sorted(missing))))
         if table.size < 2 or not all(np.isfinite(table[name]).all() for name in wanted):
             raise SystemExit("%s must have two rows or more, all of finite numbers" % path)
-        if seconds is not None:
-            table = table[table["time_s"] < table["time_s"][0] + seconds]
+        first = table["time_s"][0] + begin
+        table = table[(table["time_s"] >= first - 1e-9) & (table["time_s"] < first + (seconds or np.inf))]
+        if len(table) < LEAST_ROWS:
+            raise SystemExit("%s has %d rows from its second %g on; it must have %d or more" % (
+                path, len(table), begin, LEAST_ROWS))
         return cls(table["time_s"], *(np.stack([table["%s_%s_rad" % (name, kind)] for name in JOINT_NAMES], axis=1)
                                       for kind in ("commanded", "sensed")))
 

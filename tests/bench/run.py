@@ -21,7 +21,7 @@ from pathlib import Path
 from pictures import distribution, ratios
 from report import Report, as_json, markdown, put_together, table
 
-from command_line.options import Parser, did_you_mean
+from command_line.options import Parser, did_you_mean, seconds
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -76,6 +76,8 @@ def main():
     parser.add_argument("--list", action="store_true", help="list the suites")
     parser.add_argument("--out", type=Path, default=ROOT / ".baxter/bench", help="folder for JSON and pictures")
     parser.add_argument("--recording", type=Path, help="what `fidelity` replays (default: the one in the tree)")
+    parser.add_argument("--from", dest="begin", type=seconds(), metavar="S",
+                        help="fidelity: begin at this second of the recording, in motion if it is")
     parser.add_argument("--fit", choices=("left", "right", "both"),
                         help="fidelity: fit the actuators' numbers to this arm instead, and test them on the other")
     parser.add_argument("--child", help=argparse.SUPPRESS)
@@ -97,6 +99,8 @@ def main():
         if not options.recording.is_file():
             parser.error("--recording: there is no file %s" % options.recording)
         os.environ["BENCH_RECORDING"] = str(options.recording.resolve())
+    if options.begin:
+        os.environ["BENCH_FROM"] = str(options.begin)
     if options.all:
         os.environ["BENCH_ALL"] = "1"
     if options.fit is not None:

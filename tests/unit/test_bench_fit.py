@@ -14,7 +14,7 @@ TRUE = np.array([[0.2, 0.1], [7.0, 30.0]])  # (delay, natural frequency) of two 
 @pytest.fixture(scope="module")
 def modules():
     sys.path.insert(0, str(BENCH))
-    yield {name: importlib.import_module(name) for name in ("fidelity_fit", "recording", "fidelity_bench")}
+    yield {name: importlib.import_module(name) for name in ("fidelity_fit", "recording", "fidelity_bench", "replaying")}
     sys.path.remove(str(BENCH))
 
 
@@ -79,3 +79,23 @@ def test_numbers_of_the_replay_matter(modules):
     changed[0] *= 0.3
     assert np.abs(made(changed) - error).max() > 5e-4
     np.testing.assert_array_equal(made(numbers), error)
+
+
+def test_a_recording_that_begins_in_motion_is_followed_from_where_it_says(modules):
+    replaying, read = modules["replaying"], modules["recording"].Recording.read
+    path, robot = modules["fidelity_bench"].RECORDING, modules["replaying"].bare_robot()
+    resting = replaying.Start.of(read(path, 1.0))
+    assert not resting.moves and resting.judged_from_s == 0.0 and "at rest" in resting.sentence()
+    recording = read(path, 1.2, 15.0)
+    assert recording.time_s[0] == pytest.approx(15.0)
+    start = replaying.Start.of(recording)
+    assert start.moves and "left_w1 at 1.19 rad/s" in start.sentence()
+    done = replaying.replay(recording, "lag", robot)
+    judged = recording.time_s >= recording.time_s[0] + start.judged_from_s
+    assert np.abs(done.motion.position - recording.sensed)[judged].max() < 0.03
+    assert not done.motion.bounded.any() and not any(done.events.values())
+
+
+def test_a_second_beyond_the_recording_is_refused(modules):
+    with pytest.raises(SystemExit, match="0 rows from its second 99"):
+        modules["recording"].Recording.read(modules["fidelity_bench"].RECORDING, None, 99.0)

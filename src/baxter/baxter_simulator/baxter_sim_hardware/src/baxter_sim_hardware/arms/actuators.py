@@ -113,6 +113,11 @@ class Actuators:
         return np.minimum(np.maximum(torque, -limit - carried), limit - carried)
 
     @property
+    def limit(self):
+        """(n,) [Nm] of the motors' torque."""
+        return self._numbers[_LIMIT]
+
+    @property
     def free_speed(self):
         """(n,) [rad/s] of motors without load."""
         return FREE_SPEED * self._numbers[_SPEED]
