@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of models, links and collisions, as Gazebo gives and understands them."""
 import pytest
+from gazebo_msgs.srv import GetModelPropertiesRequest
 
 from bullet_sim import Pose, World
 from gazebo_ros.contact_messages import CollisionNames, contact_states
 from gazebo_ros.entities import Entities, UnknownEntity
+from gazebo_ros.gazebo_services import GazeboServices
+from gazebo_ros.simulation import Simulation
+from loop_ros.request_queue import RequestQueue
+from loop_ros.testing import FakeFaults, FakeLog, FakeRos
 from sdf_model import parse_sdf_model
 from urdf_model import collision_names, gazebo_links, parse_urdf
 
@@ -76,3 +81,16 @@ def test_contacts_have_the_names_of_the_collisions_that_touch(world):
     (state,) = contact_states(world.contacts(), names, about)
     assert {state.collision1_name} == about and all(normal.z > 0.99 for normal in state.contact_normals)
     assert all(position.x == pytest.approx(1.0, abs=0.11) for position in state.contact_positions)
+
+
+def test_models_in_a_model_are_its_children(world):
+    nested = parse_sdf_model(
+        '<sdf version="1.7"><model name="arm"><link name="base"/><model name="hand"><link name="palm"/>'
+        '<model name="tip"><link name="pad"/></model></model><model name="eye"><link name="lens"/></model></model>'
+        "</sdf>", "arm.sdf")
+    ros, log = FakeRos(), FakeLog()
+    world.spawn(nested.robot, "arm")
+    GazeboServices(Simulation(world, RequestQueue(), log, FakeFaults()), None, None, ros, log)
+    found = ros.services["/gazebo/get_model_properties"](GetModelPropertiesRequest("arm"))
+    assert found.child_model_names == ["hand", "eye"]
+    assert found.body_names == ["base", "hand::palm", "hand::tip::pad", "eye::lens"]
