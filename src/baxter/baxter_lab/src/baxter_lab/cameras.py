@@ -2,9 +2,10 @@
 """Pictures of a lab: by the robot's own cameras, and from anywhere."""
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sensor_renderer.best import best_renderer
 from sensor_renderer.mirror import Mirror
@@ -16,6 +17,9 @@ from world_picture.drawing import DrawingCache
 
 from .errors import LabError
 from .planning import FLOOR
+
+if TYPE_CHECKING:
+    from .lab import Lab
 
 #: {camera: the link that is its optical frame}
 LINKS = {"head": "head_camera", "left_hand": "left_hand_camera", "right_hand": "right_hand_camera"}
@@ -35,7 +39,7 @@ class Picture(NamedTuple):
 class Cameras:
     """Draws the world of a lab. lab: `lab.Lab`. What it draws with is made at the first picture."""
 
-    def __init__(self, lab):
+    def __init__(self, lab: Lab) -> None:
         self._lab, self._mirror, self._renderer, self._shown = lab, None, None, None
         self._lenses = {}
 
@@ -45,17 +49,22 @@ class Cameras:
             self._renderer.close()
             self._renderer = None
 
-    def take(self, camera: str, width: int = 640, height: int = 400, depth: bool = False) -> Picture:
-        """A picture by one of the robot's cameras: head, left_hand, right_hand. Raises LabError for another name."""
+    def take(self, camera: str, width: int = 640, height: int = 400, depth: bool = False,
+             moved: npt.NDArray[np.float64] | None = None) -> Picture:
+        """A picture by one of the robot's cameras: head, left_hand, right_hand. moved: where it sits, (4, 4) in its
+        usual frame. Raises LabError for another name."""
         if camera not in LINKS:
             raise LabError("there is no camera '%s'; there are %s" % (camera, ", ".join(LINKS)))
         link = LINKS[camera]
         if not self._lenses:
             self._lenses = _lenses(self._lab.robot_urdf)
         frame = self._lab.robot.simulated.model.link_pose(link).matrix()
+        if moved is not None:
+            frame = frame @ moved
         return self._draw(Pinhole.from_field_of_view(width, height, *self._lenses[link]), frame, depth)
 
-    def look(self, eye, target, width: int = 640, height: int = 480, depth: bool = False) -> Picture:
+    def look(self, eye: npt.ArrayLike, target: npt.ArrayLike, width: int = 640, height: int = 480,
+             depth: bool = False) -> Picture:
         """A picture from `eye` (3,) towards `target` (3,) [m]."""
         pinhole = Pinhole.from_field_of_view(width, height, OUTSIDE_FIELD_RAD, NEAR_M, FAR_M)
         return self._draw(pinhole, looking_at(np.asarray(eye, dtype=float), np.asarray(target, dtype=float)), depth)

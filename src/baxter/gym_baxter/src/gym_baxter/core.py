@@ -13,6 +13,7 @@ from baxter_model import SIDES, poses
 from urdf_model.transforms import quaternion_from_matrix
 
 from .controls import ArmControl, action_size, checked
+from .randomised import Randomised, Randomiser
 from .tasks import TASKS, robosuite_start
 
 # Set-points are streamed at 100 Hz, as programs on the robot do.
@@ -24,7 +25,8 @@ CAMERAS = ("head", "left_hand", "right_hand")
 class Choices(NamedTuple):
     """control: one of `controls.CONTROLS`; control_freq: actions a second [Hz]; physics_step_s: a tick of physics and
     control logic [s], of which an action has a whole number; obs_type: one of OBSERVATIONS; cameras: of CAMERAS, each a
-    picture of `size` x `size`; robosuite_order: the right arm first; options: of the robot.
+    picture of `size` x `size`; robosuite_order: the right arm first; options: of the robot; randomised: what differs
+    from episode to episode.
 
     With ticks of 0.002 s, as in /gazebo, an action takes 2.5 times as long to compute as with 0.005 s. In free motion
     the hands are then within 0.1 mm of where they are with the other."""
@@ -37,6 +39,7 @@ class Choices(NamedTuple):
     size: int = 84
     robosuite_order: bool = False
     options: Options = Options()
+    randomised: Randomised = Randomised()
 
 
 class Stepped(NamedTuple):
@@ -66,6 +69,7 @@ class Core:
         self._controls = [ArmControl(self.lab.robot.arms[side], choices.control,
                                      has_gripper=getattr(options, "%s_gripper" % side) != "none")
                           for side in self.sides]
+        self._randomiser = Randomiser(choices.randomised, self.lab, choices.cameras)
         self._start = self.lab.save()
 
     def _start_robot(self):
@@ -74,6 +78,10 @@ class Core:
             side: np.array(list(table.angles(self.task.POSE, side).values())) for side in SIDES}
         self.lab.robot.enable()
         self.lab.robot.put(start)
+
+    @property
+    def _is_randomised(self):
+        return self.choices.randomised != Randomised()
 
     @property
     def steps(self) -> int:
@@ -88,6 +96,8 @@ class Core:
         """Begin an episode by `random`; returns the observation. What was before has no influence, to the last bit."""
         self.lab.restore(self._start)
         self.task.begin(random)
+        if self._is_randomised:
+            self._randomiser.draw(random)  # after the task, whose places are then those without it
         for control in self._controls:
             control.reset()
         return self.observation()
@@ -116,7 +126,7 @@ class Core:
             return {"state": np.concatenate([self.agent_pos(), self.task.observed()])}
         found: dict = {}
         if "pixels" in kind:
-            found["pixels"] = {name: self.lab.cameras.take(name, size, size).pixels for name in self.choices.cameras}
+            found["pixels"] = {name: self._randomiser.take(name, size) for name in self.choices.cameras}
         if "agent_pos" in kind:
             found["agent_pos"] = self.agent_pos()
         if "environment_state" in kind:
@@ -139,13 +149,16 @@ class Core:
     def save(self):
         """The whole state: the physics, the robot's control logic, the task's."""
         logic = [restorer(vars(control)) for control in self._controls]
-        return self.lab.save(), logic, {name: value for name, value in vars(self.task).items() if name == "goal"}
+        goal = {name: value for name, value in vars(self.task).items() if name == "goal"}
+        return self.lab.save(), logic, goal, self._randomiser.drawn
 
     def restore(self, state) -> dict:
         """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
         for bit. Raises LabError."""
-        saved, logic, task = state
+        saved, logic, task, drawn = state
         self.lab.restore(saved)
+        if self._is_randomised:
+            self._randomiser.put(drawn)
         for again in logic:
             again()
         vars(self.task).update(task)
