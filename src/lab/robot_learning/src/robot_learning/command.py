@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Learn a task of gym_baxter from an expert's demonstrations, and measure how often it is done."""
+"""Learn a task of gym_baxter from an expert's demonstrations and corrections, and measure how often it is done."""
 from __future__ import annotations
 
 import argparse
@@ -13,22 +13,28 @@ from pathlib import Path
 import numpy as np
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
-from demonstrations.collecting import collect
+from demonstrations.collecting import Collected, collect
 from demonstrations.experts import EXPERTS
 from demonstrations.frames import DemonstrationError
 from demonstrations.layout import INFO, write_json
 from demonstrations.reading import DataSet
+from gym_baxter.randomised import Randomised
 from lab_batch import JobError
 
+from .corrections import correct
 from .evaluation import Score, core_for, evaluate
 from .pictures import choose, draw_curve, film
 from .policy import PolicyError, load
-from .training import TrainingSettings, train
+from .training import Curve, TrainingSettings, train
 
-#: Seeds of demonstrations begin here: those of the evaluation are below.
-FIRST_DEMONSTRATION = 100_000
-DEMONSTRATIONS, EPISODES, NOISE = 100, 100, 1.0
+#: Seeds of demonstrations and of corrections begin here: those of the evaluation are below.
+FIRST_DEMONSTRATION, FIRST_CORRECTION, MOST_CORRECTIONS = 100_000, 10_000_000, 100_000
+DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 2, 50, 100, 1.0
 POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
+#: How much differs with --randomised.
+RANDOMISED = Randomised(mass=0.5, friction=0.5)
+#: The policy that is corrected.
+STUDENT = "student.npz"
 
 
 def parse(argv: Sequence[str] | None) -> argparse.Namespace:
@@ -43,6 +49,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
     parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
                         help="of the expert (default %(default)s)")
+    parser.add_argument("--rounds", type=number(int, 0, 100), default=ROUNDS, metavar="N",
+                        help="of corrections: the policy acts, and the expert says what it would have done; not with "
+                             "--data (default %(default)s)")
+    parser.add_argument("--corrections", type=number(int, 1, MOST_CORRECTIONS), default=CORRECTIONS, metavar="N",
+                        help="episodes of a round (default %(default)s)")
     parser.add_argument("--steps", type=number(int, 1, 10**8), default=TrainingSettings.steps, metavar="N",
                         help="of training (default %(default)s)")
     parser.add_argument("--chunk", type=number(int, 1, 1000), default=TrainingSettings.chunk, metavar="N",
@@ -52,6 +63,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                         help="of the evaluation, seeds 0 to N - 1 (default %(default)s; 0: none)")
     parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count() or 1, metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
+    parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
+                        help="of the robot in the evaluation: robot has the physical one's lag and noise "
+                             "(default: %(default)s)")
+    parser.add_argument("--randomised", action="store_true",
+                        help="in the evaluation, things have other weights and frictions in each episode")
     parser.add_argument("--no-film", action="store_true", help="do not film good and bad episodes")
     options = parser.parse_args(argv)
     if options.evaluate is None and options.task not in EXPERTS:
@@ -72,28 +88,52 @@ def _versions() -> dict[str, str]:
     return {"python": platform.python_version(), "numpy": np.__version__}
 
 
-def learn(options: argparse.Namespace, folder: Path) -> Path:
-    """Demonstrations, training, the curve; returns the policy's file. Raises DemonstrationError, JobError, OSError."""
-    source = options.data or folder / SET
-    if options.data is None:
-        have = len(DataSet(source)) if (source / INFO).exists() else 0
-        if have < options.demonstrations:
-            first = FIRST_DEMONSTRATION + have
-            seeds = range(first, FIRST_DEMONSTRATION + options.demonstrations)
-            found = collect(options.task, source, seeds, NOISE, options.workers, say=_say)
-            _say("%d demonstrations of %s: %d frames; the expert failed %d times" % (
-                found.kept, options.task, found.frames, found.failed), True)
+def _tried(source: Path, first: int, end: int) -> int:
+    """How many seeds from `first`, below `end`, are behind a set: the greatest that it has, and all before."""
+    seeds = DataSet(source).seeds if (source / INFO).exists() else []
+    return max((seed + 1 - first for seed in seeds if seed is not None and first <= seed < end), default=0)
+
+
+def _demonstrate(options: argparse.Namespace, source: Path) -> None:
+    have = _tried(source, FIRST_DEMONSTRATION, FIRST_CORRECTION)
+    if have < options.demonstrations:
+        seeds = range(FIRST_DEMONSTRATION + have, FIRST_DEMONSTRATION + options.demonstrations)
+        _told(collect(options.task, source, seeds, NOISE, options.workers, say=_say), "demonstrations", options.task)
+
+
+def _told(found: Collected, what: str, task: str) -> None:
+    _say("%d %s of %s: %d frames; the expert failed %d times" % (found.kept, what, task, found.frames, found.failed),
+         True)
+
+
+def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) -> Curve:
+    """Learn from all that is there, and write the policy."""
     data = DataSet(source)
-    settings = TrainingSettings(chunk=options.chunk, steps=options.steps, seed=options.seed)
+    settings = TrainingSettings(chunk=options.chunk, steps=steps, seed=options.seed)
     made = {"date": datetime.date.today().isoformat(), "demonstrations": len(data), "steps": settings.steps,
             "seed": settings.seed, "versions": _versions()}
     policy, curve = train(data, settings, made, lambda step, training, validation: _say(
         "step %d of %d: loss %.4f, %.4f of episodes that only judge" % (step, settings.steps, training, validation)))
     _say("%d steps in %.0f s: loss %.4f, %.4f of episodes that only judge" % (
         settings.steps, curve.seconds, curve.training[-1], curve.validation[-1]), True)
-    path = folder / POLICY
     policy.save(path)
-    draw_curve(curve, "%s: %d demonstrations" % (policy.contract.task, len(data)), folder / CURVE)
+    return curve
+
+
+def learn(options: argparse.Namespace, folder: Path) -> Path:
+    """Demonstrations, rounds of corrections, training, the curve; returns the policy's file. Demonstrations of an
+    earlier run, and rounds that it began, are not done again. Raises DemonstrationError, JobError, OSError."""
+    source, path = options.data or folder / SET, folder / POLICY
+    if options.data is None:
+        _demonstrate(options, source)
+        for round_ in range(options.rounds):
+            first = FIRST_CORRECTION + round_ * MOST_CORRECTIONS
+            if not _tried(source, first, first + MOST_CORRECTIONS):
+                _train(options, source, folder / STUDENT, max(options.steps // 2, 1))
+                seeds = range(first, first + options.corrections)
+                _told(correct(folder / STUDENT, source, seeds, options.workers, _say), "corrections", options.task)
+    curve, task = _train(options, source, path, options.steps), load(path).contract.task
+    draw_curve(curve, "%s: %d demonstrations" % (task, len(DataSet(source))), folder / CURVE)
     print("policy in %s, learning curve in %s" % (path, folder / CURVE))
     return path
 
@@ -101,7 +141,8 @@ def learn(options: argparse.Namespace, folder: Path) -> Path:
 def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
     """Evaluation and film. Raises PolicyError, JobError, OSError."""
     score = evaluate(path, range(options.episodes), options.workers, lambda done, good: _say(
-        "%d of %d episodes, %d succeeded" % (done, options.episodes, good)))
+        "%d of %d episodes, %d succeeded" % (done, options.episodes, good)), profile=options.profile,
+        randomised=RANDOMISED._asdict() if options.randomised else {})
     _say("", sys.stderr.isatty())
     print("%s: %s" % (load(path).contract.task, score))
     for seed, error in score.errors.items():

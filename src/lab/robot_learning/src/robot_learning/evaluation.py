@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from baxter_lab import Options, Which
 from demonstrations.environment import core_of
 from gym_baxter.core import Core
 from gym_baxter.names import action_names, robot_names
+from gym_baxter.randomised import Randomised
 from lab_batch import Job, Spec
 from lab_batch.processes import Limits, map_seeds
 
@@ -64,10 +66,12 @@ def play(core: Core, policy: Policy, seed: int, each: Callable[[Core], None] = l
 
 
 class Evaluate(Job):
-    """An episode of a policy, for lab_batch. policy: its file; options of the environment by name in `choices`."""
+    """An episode of a policy, for lab_batch. policy: its file; profile: of the robot, sim or robot; randomised: numbers
+    of `gym_baxter.randomised.Randomised` by name."""
 
-    def __init__(self, policy: str = "policy.npz", choices: dict | None = None):
-        self._path, self._choices = policy, choices or {}
+    def __init__(self, policy: str = "policy.npz", profile: str = "sim", randomised: dict[str, float] | None = None):
+        self._path = policy
+        self._choices = {"options": Options(which=Which(profile=profile)), "randomised": Randomised(**randomised or {})}
 
     def start(self) -> None:
         """Read the policy and make its world."""
@@ -107,13 +111,14 @@ class Score:
 
 
 def evaluate(path: Path, seeds: Iterable[int], workers: int = 1,
-             progress: Callable[[int, int], None] = lambda done, good: None) -> Score:
-    """Play the seeds; the same results for any number of workers. Raises JobError, PolicyError."""
+             progress: Callable[[int, int], None] = lambda done, good: None, **choices: Any) -> Score:
+    """Play the seeds; the same results for any number of workers. choices: of `Evaluate`. Raises JobError,
+    PolicyError."""
     load(path)  # a bad file is told before workers start
     seeds = list(seeds)
     results: dict[int, dict[str, Any]] = {}
     errors: dict[int, str] = {}
-    spec = Spec("%s:%s" % (__name__, Evaluate.__name__), {"policy": str(Path(path).resolve())})
+    spec = Spec("%s:%s" % (__name__, Evaluate.__name__), {"policy": str(Path(path).resolve()), **choices})
     for outcome in map_seeds(spec, seeds, Limits(min(workers, max(len(seeds), 1)), _EPISODE_S, None)):
         if outcome.is_done:
             results[outcome.seed] = outcome.result
