@@ -22,8 +22,7 @@ CORE = {"/clock", STATES, STATE, "/robot/limb/left/endpoint_state", "/robot/limb
         "/robot/end_effector/left_gripper/state", "/robot/end_effector/right_gripper/state"}
 # These topics repeat the test's own input: states as transforms, refused requests with the reason.
 ECHOES = {("/tf", "/robot_state_publisher")} | {
-    ("/ExternalTools/%s/PositionKinematicsNode/IKReport" % side, "/baxter_sim_kinematics_" + side)
-    for side in SIDES}
+    ("/ExternalTools/%s/PositionKinematicsNode/IKReport" % side, "/baxter_sim_kinematics") for side in SIDES}
 # Pictures and clouds are only read as bytes; the renderer has the cost.
 BULKY = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2")
 SAMPLE = 15

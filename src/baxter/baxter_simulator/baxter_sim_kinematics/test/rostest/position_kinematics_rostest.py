@@ -11,6 +11,7 @@ import time
 import unittest
 
 import numpy as np
+import rosgraph
 import rospy
 import rostest
 import tf2_ros
@@ -329,6 +330,14 @@ class PositionKinematics(unittest.TestCase):
             self.assertEqual(rospy.get_param("/%s_tip_name" % side), side + "_gripper")
             self.assertEqual(rospy.get_param("/robot_config/%s_config/joint_names" % side),
                              ["%s_%s" % (side, joint) for joint in JOINTS])
+
+    def test_each_arm_is_a_node_although_one_process_serves_both(self):
+        master = rosgraph.Master(rospy.get_name())
+        of_services = dict(master.getSystemState()[2])
+        for side in self.chains:
+            name = "/baxter_sim_kinematics_" + side
+            self.assertEqual(of_services["/ExternalTools/%s/PositionKinematicsNode/IKService" % side], [name])
+            self.assertEqual(master.lookupNode(name), master.lookupNode("/baxter_sim_kinematics"))
 
 
 if __name__ == "__main__":

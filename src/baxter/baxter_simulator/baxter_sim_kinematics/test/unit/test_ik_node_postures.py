@@ -35,7 +35,24 @@ def test_a_parameter_comes_first(node, limb, turn):
 
 
 @pytest.mark.parametrize("limb", ["", "a\x01b", "left arm", "/left", 3, None, ["left"]])
-def test_a_limb_that_is_no_name_is_refused_with_what_is_allowed(node, limb):
+@pytest.mark.parametrize("name, value", [("~limb", lambda limb: limb), ("~limbs", lambda limb: ["right", limb])])
+def test_a_limb_that_is_no_name_is_refused_with_what_is_allowed(node, name, value, limb):
+    node.parameters[name] = value(limb)
     with pytest.raises(node.InvalidRequest) as found:
-        node._build(limb)
-    assert ascii(limb) in str(found.value) and "'left'" in str(found.value)
+        node._limbs()
+    assert ascii(limb) in str(found.value) and name in str(found.value) and "'left'" in str(found.value)
+
+
+@pytest.mark.parametrize("limbs", ["left right", [], ["left", "left"], {"left": "right"}, 7, True])
+def test_limbs_that_are_no_list_of_different_names_are_refused(node, limbs):
+    node.parameters["~limbs"] = limbs
+    with pytest.raises(node.InvalidRequest) as found:
+        node._limbs()
+    assert ascii(limbs) in str(found.value) and "[left, right]" in str(found.value)
+
+
+def test_of_one_limb_the_node_itself_is_listed_and_of_several_each_limb(node):
+    node.parameters["~limb"] = "left"
+    assert node._limbs() == (["left"], False)
+    node.parameters["~limbs"] = ["left", "right"]
+    assert node._limbs() == (["left", "right"], True)
