@@ -11,6 +11,7 @@ from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, che
 from .builder import Blueprint, build, is_wheel, link_collisions
 from .contact import Contact
 from .errors import LOG, BulletSimError, within
+from .hanging import Hanging
 from .model import Model
 from .overlaps import come_out
 from .pose import Pose
@@ -236,6 +237,11 @@ class World:
         static = is_fixed(merged.root, static)
         exact = any(joint.child == link and is_wheel(joint) for joint in merged.joints.values())
         self._shapes.compound(link_collisions(merged, link, static), static and link == merged.root, mesh_cuts, exact)
+
+    def hang(self, model, link, most_n):
+        """Hold a link of a free Model where it is, with a force [N] at most; returns the :class:`.hanging.Hanging` that
+        moves it and lets it go. Raises BulletSimError for an unknown link."""
+        return Hanging(self._client, model, link, most_n)
 
     def add_ground_plane(self, name="ground_plane"):
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""

@@ -47,7 +47,7 @@ def test_every_plugin_that_is_served_has_a_table():
 
 
 # Elements that are put together from pieces, or have no effect in noetic.
-PUT_TOGETHER = ("imu_name|.*([oO]ffset|[dD]rift|[dD]riftFrequency|[nN]oise|[sS]caleError)$|CxPrime|hokuyo|"
+PUT_TOGETHER = ("imu_name|detach|winch|.*([oO]ffset|[dD]rift|[dD]riftFrequency|[nN]oise|[sS]caleError)$|CxPrime|hokuyo|"
                 "autoDistortion|distortion[KT]|(left|right)(Front|Rear)Joint|legacyModeNS")
 
 
