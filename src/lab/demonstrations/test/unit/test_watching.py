@@ -11,9 +11,10 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
 
 from baxter_model import SIDES, joint_names
-from demonstrations.frames import ACTION, ENVIRONMENT, PICTURES, STATE, DemonstrationError
+from demonstrations.frames import ACTION, ENVIRONMENT, PICTURES, STATE, DemonstrationError, Episode, Schema, numbers
 from demonstrations.over_ros import messages, recording
 from demonstrations.reading import DataSet
+from demonstrations.replaying import Limits, Replay, actions_of, reason_to_stop
 from demonstrations.watching import JOINT_ANGLES, MODEL, NAMED, OPENING, SET_POINTS, TOLD, Recorder, schema_of
 from demonstrations.writing import SetWriter
 
@@ -168,3 +169,30 @@ def test_a_recording_without_the_camera_is_named(bag, tmp_path):
     ("calibrate", "", None)])
 def test_commands_of_grippers_say_how_far_they_open(command, args, opening):
     assert messages.opening_told(EndEffectorCommand(command=command, args=args)) == opening
+
+
+def test_a_replay_goes_to_the_start_and_then_as_recorded():
+    actions = np.zeros((5, 16))
+    actions[:, 0] = (0.5, 0.6, 0.7, 0.7, 0.7)
+    actions[3:, 7] = 100.0
+    replay = Replay(actions, 10, np.array([0.2, *[0.0] * 13]), Limits(speed_rad_s=0.3))
+    assert replay.begins_s == pytest.approx(1.0) and replay.ends_s == pytest.approx(1.4)
+    places = [replay.joints(time_s)[0] for time_s in (0.0, 0.5, 1.0, 1.05, 1.1, 1.4, 9.0)]
+    assert places == pytest.approx([0.2, 0.35, 0.5, 0.55, 0.6, 0.7, 0.7])
+    assert [replay.openings(time_s)[0] for time_s in (0.0, 1.25, 1.35, 9.0)] == [0.0, 0.0, 100.0, 100.0]
+
+
+@pytest.mark.parametrize(("found", "text"), [
+    ((False, False, 0.0, 0.0), "enabled"), ((True, True, 0.0, 0.0), "stop"), ((True, False, 0.6, 0.0), "0.6 s old"),
+    ((True, False, 0.0, 0.7), "0.70 rad")])
+def test_a_replay_ends_where_the_robot_cannot_follow(found, text):
+    assert text in reason_to_stop(Limits(), *found)
+    assert reason_to_stop(Limits(), True, False, 0.1, 0.1) == ""
+
+
+def test_a_set_of_other_actions_is_not_replayed_on_a_robot(tmp_path):
+    schema = Schema(20, {ACTION: numbers([("left_hand.dx", "")])}, about={"task": "Reach"})
+    with SetWriter(tmp_path, schema) as writer:
+        writer.add(Episode("Reach.", {ACTION: np.zeros((2, 1), np.float32)}, True, 0))
+    with pytest.raises(DemonstrationError, match="left_hand.dx"):
+        actions_of(DataSet(tmp_path), 0)
