@@ -8,9 +8,17 @@ or vehicle has, and far within the range of the arithmetic.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .model import Robot
+
+
+Numbers = TypeVar("Numbers", float, Sequence[float], np.ndarray)
 
 
 class OutOfBounds(ValueError):
@@ -26,7 +34,7 @@ class Bound:
     unit: str
     reason: str
 
-    def check(self, values, what):
+    def check(self, values: Numbers, what: str) -> Numbers:
         """Return ``values`` (a number or a sequence of numbers) if each is finite and within the bound.
 
         ``what`` names them in the text of OutOfBounds.
@@ -40,7 +48,7 @@ class Bound:
         return values
 
     @property
-    def text(self):
+    def text(self) -> str:
         """The range in words, with the unit."""
         return "%g to %g%s" % (self.low, self.high, self._unit)
 
@@ -92,7 +100,7 @@ MOVABLE_JOINTS = 121
 NAME_LETTERS = 500
 
 
-def check_robot(robot):
+def check_robot(robot: Robot) -> None:
     """Check all numbers of a Robot, and its size. Raises OutOfBounds, with names and line numbers."""
     if len(robot.links) > LINKS:
         raise OutOfBounds("%d links are more than can be read in time; expected at most %d" % (len(robot.links), LINKS))
@@ -109,7 +117,7 @@ def check_robot(robot):
         _check_joint(joint)
 
 
-def check_name(name, what):
+def check_name(name: str, what: str) -> str:
     """Return ``name``; raises OutOfBounds if it is too long to be published at every tick."""
     if len(name) > NAME_LETTERS:
         raise OutOfBounds("%s has %d letters ('%s…'); expected at most %d" % (what, len(name), name[:40], NAME_LETTERS))

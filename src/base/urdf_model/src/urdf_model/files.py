@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read descriptions from files."""
+from __future__ import annotations
+
+from pathlib import Path
 
 from command_line.user_files import PIPE_WAIT_S, check_file, read_file, read_text
 
@@ -9,7 +12,7 @@ from .errors import UrdfError
 __all__ = ["check_file", "description_text", "read_file", "read_text"]
 
 
-def description_text(path):
+def description_text(path: Path) -> str:
     """Return the text of a description in a file (a ``Path``), URDF or SRDF; of xacro, what it expands to.
 
     Raises OSError for a file that cannot be read, ValueError for one that is not UTF-8, and :class:`UrdfError`, a

@@ -7,6 +7,7 @@ Baxter arm wrong by up to 1.7 Nm; so we merge here, by the parallel-axis theorem
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -134,7 +135,7 @@ def _merge_group(robot, body, members, frames):
     return merged
 
 
-def combine(parts):
+def combine(parts: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Inertial:
     """Return the Inertial of several rigidly joined parts, each (mass, centre (3,), inertia (3, 3) about its centre).
 
     All in one frame. Huygens-Steiner: I = sum(I_i + m_i (|d|^2 E - d d^T)), d from the common centre of mass.

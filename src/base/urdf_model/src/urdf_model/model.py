@@ -70,7 +70,7 @@ class Finish:
 class Shape:
     """One visual or collision element: its geometry at ``origin`` (4x4, in the link's frame)."""
 
-    geometry: Any
+    geometry: Box | Cylinder | Sphere | Mesh | Plane
     origin: np.ndarray
     name: str = ""
     colour: tuple[float, float, float, float] | None = None  # rgba, visuals only
@@ -159,7 +159,7 @@ class Joint:
     preserved: bool = False  # fixed, but what it holds stays a link for Gazebo
 
     @property
-    def movable(self):
+    def movable(self) -> bool:
         return self.type in MOVABLE_TYPES
 
 
@@ -217,19 +217,19 @@ class Robot:
     gears: list[Gear] = field(default_factory=list)
     keeps_links: bool = False  # whether fixed links all stay links for Gazebo, as those of an SDF
 
-    def movable_joints(self):
+    def movable_joints(self) -> list[Joint]:
         """Return the joints that move (revolute, continuous, prismatic), in document order."""
         return [joint for joint in self.joints.values() if joint.movable]
 
-    def parent_joint(self, link):
+    def parent_joint(self, link: str) -> Joint | None:
         """Return the joint whose child is ``link``, or None for the root."""
         return self._by_child().get(link)
 
-    def children(self, link):
+    def children(self, link: str) -> list[Joint]:
         """Return the joints whose parent is ``link``, in document order."""
         return [joint for joint in self.joints.values() if joint.parent == link]
 
-    def chain(self, base, tip):
+    def chain(self, base: str, tip: str) -> list[Joint]:
         """Return the joints (fixed ones too) that lead from link ``base`` down to link ``tip``.
 
         Raises UrdfError when a link is unknown or ``tip`` does not hang below ``base``.

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read URDF text into dataclasses; complain in one line with source, line number, what was found, what is right."""
+from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -29,11 +32,17 @@ from .model import (
 from .transforms import pose_matrix
 from .xml_text import XmlRefused, parse_xml
 
+if TYPE_CHECKING:
+    from lxml import etree
+
 JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
+#: Of a material: rgba, and what it has besides.
+Look = tuple[tuple[float, ...] | None, Finish | None]
+Named = TypeVar("Named", Link, Joint)
 _MOMENTS = (((0, 0), "ixx"), ((0, 1), "ixy"), ((0, 2), "ixz"), ((1, 1), "iyy"), ((1, 2), "iyz"), ((2, 2), "izz"))
 
 
-def parse_urdf(xml, source="robot_description"):
+def parse_urdf(xml: str | bytes, source: str = "robot_description") -> Robot:
     """Return the Robot that ``xml`` (str or bytes) describes. ``source`` names it in messages.
 
     What urdfdom, the reader of Gazebo and rviz, accepts is accepted, with its repairs: they are listed in
@@ -50,7 +59,7 @@ def parse_urdf(xml, source="robot_description"):
 
 
 class _Reader:
-    def __init__(self, xml, source):
+    def __init__(self, xml: str | bytes, source: str) -> None:
         self.source = source
         self.warnings = []
         try:
@@ -61,18 +70,18 @@ class _Reader:
             found = "nothing" if self.root is None else "<%s>" % self.root.tag
             raise UrdfError("%s is not a URDF: its root element is %s, expected <robot>" % (source, found))
 
-    def error(self, element, text):
+    def error(self, element: etree._Element, text: str) -> UrdfError:
         return UrdfError("%s, line %s: %s" % (self.source, element.sourceline, text))
 
-    def warn(self, element, text):
+    def warn(self, element: etree._Element, text: str) -> None:
         self.warn_at(element.sourceline, text)
 
-    def warn_at(self, line, text):
+    def warn_at(self, line: int, text: str) -> None:
         self.warnings.append("%s, line %s: %s" % (self.source, line, text))
 
     # -- whole --------------------------------------------------------------------------------------------------
 
-    def robot(self):
+    def robot(self) -> Robot:
         name = self.root.get("name") or "robot"
         looks = self.looks()
         links, joints = {}, {}
@@ -108,14 +117,14 @@ class _Reader:
                 read_joint_block(element, joints[element.get("reference")], self.warn)
         return Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
 
-    def add_unique(self, table, item, element, kind):
+    def add_unique(self, table: dict[str, Named], item: Named, element: etree._Element, kind: str) -> None:
         if item.name in table:
             raise self.error(
                 element, "%s '%s' appears twice (first in line %s)" % (kind, item.name, table[item.name].line)
             )
         table[item.name] = item
 
-    def tree_root(self, name, links, joints):
+    def tree_root(self, name: str, links: dict[str, Link], joints: dict[str, Joint]) -> str:
         """Return the root link's name. Joints and links that are no part of its tree are removed, with a warning."""
         parent_of = {}
         for joint in joints.values():
@@ -158,7 +167,7 @@ class _Reader:
 
     # -- elements -----------------------------------------------------------------------------------------------
 
-    def link(self, element, looks):
+    def link(self, element: etree._Element, looks: dict[str, Look]) -> Link:
         """Return the Link. As urdfdom does, what follows the first part that cannot be read is left out: parts are
         read in the order inertial, visuals, collisions."""
         link = Link(self.name(element), line=element.sourceline)
@@ -186,7 +195,7 @@ class _Reader:
                 (link.visuals if part.tag == "visual" else link.collisions).append(shape)
         return link
 
-    def inertial(self, element, link):
+    def inertial(self, element: etree._Element, link: Link) -> None:
         """Read an <inertial> into ``link``."""
         origin = self.origin(element)
         mass = self.child(element, "mass")
@@ -215,7 +224,7 @@ class _Reader:
         rotation = origin[:3, :3]
         link.inertial.inertia = rotation @ matrix @ rotation.T
 
-    def shape(self, element, looks, link):
+    def shape(self, element: etree._Element, looks: dict[str, Look], link: str) -> Shape | None:
         """Return the Shape of a <visual> or <collision>; None for a mesh whose name is empty."""
         origin = self.origin(element)
         geometry = self.child(element, "geometry")
@@ -232,7 +241,7 @@ class _Reader:
         colour, finish = (None, None) if material is None else self.look(material, looks)
         return None if read is None else Shape(read, origin, element.get("name", ""), colour, link, finish)
 
-    def geometry(self, element, link):
+    def geometry(self, element: etree._Element, link: str) -> Box | Cylinder | Sphere | Mesh | None:
         if element.tag == "box":
             return Box(tuple(self.positive(element, "size", 3, link)))
         if element.tag == "cylinder":
@@ -252,7 +261,7 @@ class _Reader:
             element, "link '%s' has a <%s>; known shapes are box, cylinder, sphere and mesh" % (link, element.tag)
         )
 
-    def joint(self, element):
+    def joint(self, element: etree._Element) -> Joint:
         name = self.name(element)
         kind = element.get("type")
         if kind not in JOINT_TYPES:
@@ -283,7 +292,7 @@ class _Reader:
             element.sourceline,
         )
 
-    def dynamics(self, element, name):
+    def dynamics(self, element: etree._Element, name: str) -> tuple[float, float]:
         """Return damping and friction. Gazebo takes a negative damping for one that it may reduce to keep the joint
         stable, and no negative friction."""
         damping, friction = (self.number(element, key, default=0.0) for key in ("damping", "friction"))
@@ -293,7 +302,7 @@ class _Reader:
                 self.warn(element, "%s of joint '%s' is %g; %g is used" % (key, name, number, instead))
         return used
 
-    def limit(self, joint, name, kind):
+    def limit(self, joint: etree._Element, name: str, kind: str) -> Limit:
         element = joint.find("limit")
         if element is None:
             if kind in ("revolute", "prismatic"):
@@ -325,14 +334,14 @@ class _Reader:
                 limit.lower, limit.upper = -bounds.NO_LIMIT, bounds.NO_LIMIT
         return limit
 
-    def mimic(self, element, name):
+    def mimic(self, element: etree._Element, name: str) -> Mimic:
         other = element.get("joint")
         if not other:
             raise self.error(element, "<mimic> of joint '%s' has no joint attribute" % name)
         multiplier = self.number(element, "multiplier", default=1.0)
         return Mimic(other, multiplier, self.number(element, "offset", default=0.0))
 
-    def transmission(self, element):
+    def transmission(self, element: etree._Element) -> Transmission:
         name = element.get("name", "")
         kind = (element.findtext("type") or element.get("type") or "").strip()
         found = []
@@ -347,7 +356,7 @@ class _Reader:
 
     # -- pieces -------------------------------------------------------------------------------------------------
 
-    def looks(self):
+    def looks(self) -> dict[str, Look]:
         """Return {name: (rgba or None, Finish or None)} of the materials beside the links."""
         table = {}
         for element in self.root.iterchildren("material"):
@@ -358,7 +367,7 @@ class _Reader:
                 self.warn(element, "material '%s' lacks a name, or a colour and a texture" % element.get("name", ""))
         return table
 
-    def look(self, element, looks):
+    def look(self, element: etree._Element, looks: dict[str, Look]) -> Look:
         look, name = self.own_look(element), element.get("name", "")
         if look != (None, None):
             # A material may be defined inside the first visual that uses it and be referred to by name afterwards.
@@ -368,7 +377,7 @@ class _Reader:
             looks[name] = look
         return look if look != (None, None) else looks.get(name, look)
 
-    def colour(self, element, material):
+    def colour(self, element: etree._Element | None, material: str) -> tuple[float, ...] | None:
         """Return the rgba of a <color>, None where it cannot be read."""
         if element is None:
             return None
@@ -387,7 +396,7 @@ class _Reader:
             return (0.0, 0.0, 0.0, 1.0)
         return tuple(rgba)
 
-    def own_look(self, element):
+    def own_look(self, element: etree._Element) -> Look:
         rgba = self.colour(element.find("color"), element.get("name", ""))
         try:
             return rgba, self.finish(element)
@@ -395,7 +404,7 @@ class _Reader:
             self.warnings.append("%s; material '%s' is read without it" % (error, element.get("name", "")))
             return rgba, None
 
-    def finish(self, element):
+    def finish(self, element: etree._Element) -> Finish | None:
         """Return the Finish of a <material>, None where it has none."""
         texture, emission, gloss = (element.find(tag) for tag in ("texture", "emission", "gloss"))
         if texture is None and emission is None and gloss is None:
@@ -409,32 +418,32 @@ class _Reader:
             *(texture is not None and is_true(texture.get(key)) for key in ("cut_out", "two_sided")),
         )
 
-    def origin(self, element):
+    def origin(self, element: etree._Element) -> np.ndarray:
         origin = element.find("origin")
         if origin is None:
             return np.eye(4)
         zero = (0.0, 0.0, 0.0)
         return pose_matrix(self.vector(origin, "xyz", 3, default=zero), self.vector(origin, "rpy", 3, default=zero))
 
-    def name(self, element):
+    def name(self, element: etree._Element) -> str:
         name = element.get("name")
         if not name:
             raise self.error(element, "<%s> has no name" % element.tag)
         return name
 
-    def child(self, element, tag):
+    def child(self, element: etree._Element, tag: str) -> etree._Element:
         child = element.find(tag)
         if child is None:
             raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
         return child
 
-    def link_reference(self, element, role, name):
+    def link_reference(self, element: etree._Element, role: str, name: str) -> str:
         link = self.child(element, role).get("link")
         if not link:
             raise self.error(element, "joint '%s' has a <%s> without a link attribute" % (name, role))
         return link
 
-    def positive(self, element, key, count, link):
+    def positive(self, element: etree._Element, key: str, count: int, link: str) -> list[float]:
         values = self.vector(element, key, count)
         if all(value > 0.0 for value in values):
             return values
@@ -444,7 +453,8 @@ class _Reader:
                   % (key, element.tag, link, _words(values), _words(used)))
         return used
 
-    def vector(self, element, key, count, default=None):
+    def vector(self, element: etree._Element | None, key: str, count: int | None,
+               default: Sequence[float] | None = None) -> list[float]:
         text = None if element is None else element.get(key)
         if text is None:
             if default is None:
@@ -455,7 +465,8 @@ class _Reader:
             raise self.error(element, "%s='%s' holds %d numbers, expected %d" % (key, text, len(words), count))
         return [self.parse_float(word, element, key) for word in words]
 
-    def number(self, element, key, default=None, required=False):
+    def number(self, element: etree._Element, key: str, default: float | None = None,
+               required: bool = False) -> float | None:
         text = element.get(key)
         if text is None:
             if required:
@@ -463,7 +474,7 @@ class _Reader:
             return default
         return self.parse_float(text, element, key)
 
-    def parse_float(self, text, element, key):
+    def parse_float(self, text: str, element: etree._Element, key: str) -> float:
         try:
             value = float(text)
         except ValueError:

@@ -4,13 +4,16 @@
 A matrix ``T_a_b`` maps coordinates in frame b to coordinates in frame a. Quaternions are x, y, z, w. Roll, pitch
 and yaw are rotations about the fixed axes x, y, z, applied in this order (URDF specification, ``origin`` element).
 """
+from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
+import numpy.typing as npt
 
 
-def rpy_matrix(roll, pitch, yaw):
+def rpy_matrix(roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Return the (3, 3) rotation of fixed-axis roll, pitch, yaw [rad]: Rz(yaw) Ry(pitch) Rx(roll)."""
     sr, cr = math.sin(roll), math.cos(roll)
     sp, cp = math.sin(pitch), math.cos(pitch)
@@ -24,7 +27,7 @@ def rpy_matrix(roll, pitch, yaw):
     )
 
 
-def rpy_from_matrix(matrix):
+def rpy_from_matrix(matrix: np.ndarray) -> tuple[float, float, float]:
     """Return fixed-axis roll, pitch, yaw [rad] of a rotation; where pitch is a right angle, roll is taken as zero."""
     level = math.hypot(matrix[0, 0], matrix[1, 0])
     pitch = math.atan2(-matrix[2, 0], level)
@@ -33,12 +36,12 @@ def rpy_from_matrix(matrix):
     return math.atan2(matrix[2, 1], matrix[2, 2]), pitch, math.atan2(matrix[1, 0], matrix[0, 0])
 
 
-def pose_matrix(xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0)):
+def pose_matrix(xyz: npt.ArrayLike = (0.0, 0.0, 0.0), rpy: Iterable[float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """Return the (4, 4) matrix of a URDF ``origin``: translation [m] and fixed-axis roll, pitch, yaw [rad]."""
     return rigid(rpy_matrix(*rpy), xyz)
 
 
-def rigid(rotation, translation):
+def rigid(rotation: npt.ArrayLike, translation: npt.ArrayLike) -> np.ndarray:
     """Return the (4, 4) matrix of a (3, 3) rotation and a translation [m]."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation
@@ -46,13 +49,13 @@ def rigid(rotation, translation):
     return matrix
 
 
-def inverse(matrix):
+def inverse(matrix: np.ndarray) -> np.ndarray:
     """Return the inverse of a (4, 4) rigid transform, using that its rotation is orthogonal."""
     rotation = matrix[:3, :3].T
     return rigid(rotation, -rotation @ matrix[:3, 3])
 
 
-def axis_rotation(axis, angle):
+def axis_rotation(axis: Iterable[float], angle: float) -> np.ndarray:
     """Return the (3, 3) rotation by ``angle`` [rad] about the unit vector ``axis`` (Rodrigues' formula)."""
     x, y, z = axis
     s, c = math.sin(angle), math.cos(angle)
@@ -66,7 +69,7 @@ def axis_rotation(axis, angle):
     )
 
 
-def quaternion_from_matrix(rotation):
+def quaternion_from_matrix(rotation: npt.ArrayLike) -> np.ndarray:
     """Return the unit quaternion (x, y, z, w), w >= 0, of a rotation given as (3, 3) or as (4, 4) transform.
 
     The largest of the four components is computed first (Shepperd 1978), so the result is accurate at all angles.
@@ -92,7 +95,7 @@ def quaternion_from_matrix(rotation):
     return -q if q[3] < 0.0 else q
 
 
-def matrix_from_quaternion(quaternion):
+def matrix_from_quaternion(quaternion: npt.ArrayLike) -> np.ndarray:
     """Return the (3, 3) rotation of a quaternion (x, y, z, w); it is normalised first.
 
     Raises ValueError when it has no direction (zero or not finite).
@@ -111,7 +114,7 @@ def matrix_from_quaternion(quaternion):
     )
 
 
-def rotation_angle(rotation):
+def rotation_angle(rotation: np.ndarray) -> float:
     """Return the angle [rad], 0 to pi, of a (3, 3) rotation; accurate for small angles too."""
     v = (rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1])
     return math.atan2(math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]), np.trace(rotation) - 1.0)

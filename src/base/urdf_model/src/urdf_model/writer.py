@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write a merged robot as URDF text, for the renderer: bodies, joints, shapes and colours, nothing else."""
+from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from lxml import etree
 
 from .model import Box, Cylinder, Mesh, Plane, Sphere
 from .transforms import pose_matrix, rpy_from_matrix
 
+if TYPE_CHECKING:
+    from .merge import MergedRobot
+
 _SHEET_M = 0.002  # how thick a plane is drawn
 
 
-def drawing_urdf(merged):
+def drawing_urdf(merged: MergedRobot) -> str:
     """Return URDF text whose bodies and movable joints are those of ``merged`` (a MergedRobot), in the same order.
 
     Planes become thin boxes that face the same way. Joint limits are left out: the renderer is given positions.

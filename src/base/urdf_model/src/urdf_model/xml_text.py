@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parse untrusted XML: no entities, no network, a limited size."""
+from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from lxml import etree
 
@@ -16,7 +18,8 @@ class XmlRefused(ValueError):
     """The text cannot be used; the message continues after the text's name: "… is not well-formed XML: …"."""
 
 
-def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
+def parse_xml(text: str | bytes, most_bytes: int = bounds.DESCRIPTION_BYTES,
+              repaired: Callable[[str], object] | None = None) -> etree._Element | None:
     """Return the root element of ``text`` (str or bytes), without comments; None where it holds none.
 
     ``repaired``: function called with a description of what was mended, as Gazebo's reader takes it: an element whose
@@ -103,7 +106,7 @@ def _with_end_tags(data, parser):
     return root if root is not None and data.endswith(("</%s>" % root.tag).encode()) else None
 
 
-def refuse_entities(root):
+def refuse_entities(root: etree._Element) -> None:
     """Raise XmlRefused if the document of ``root`` declares entities: their expansion may be endless."""
     declared = root.getroottree().docinfo.internalDTD
     names = [] if declared is None else [entity.name for entity in declared.iterentities()]
