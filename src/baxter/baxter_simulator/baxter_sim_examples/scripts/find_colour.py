@@ -17,7 +17,7 @@ from baxter_sim_examples.scene import BASE_HEIGHT_M, TABLE_TOP_M
 from baxter_sim_examples.vision_scene import COLOURED_M
 
 
-def look(colour):
+def look(colour: str) -> None:
     view = Eyes().view(rospy.get_param("~image", "/kinect/rgb/image_raw"),
                        rospy.get_param("~info", "/kinect/rgb/camera_info"))
     blocks = find_blocks(view, colour, COLOURED_M, TABLE_TOP_M + COLOURED_M - BASE_HEIGHT_M)

@@ -25,7 +25,7 @@ TOLERANCE_M, ABOVE_M = 0.008, (0.015, 0.3)
 MOST = 20_000
 
 
-def look():
+def look() -> None:
     points = Eyes().points(rospy.get_param("~points", "/kinect/depth/points"))
     points = points[(abs(points[:, :2] - MIDDLE_M) < AROUND_M).all(axis=1)]
     points = points[::max(1, len(points) // MOST)]

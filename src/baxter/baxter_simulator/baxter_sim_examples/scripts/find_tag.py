@@ -16,7 +16,7 @@ from baxter_sim_examples.tags import find_tags
 from urdf_model.transforms import quaternion_from_matrix
 
 
-def look(side_m):
+def look(side_m: float) -> None:
     view = Eyes().view(rospy.get_param("~image", "/kinect/rgb/image_raw"),
                        rospy.get_param("~info", "/kinect/rgb/camera_info"))
     found = find_tags(view, side_m)
@@ -26,7 +26,7 @@ def look(side_m):
             number, *pose[:3, 3], *quaternion_from_matrix(pose)))
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("side", type=float, metavar="SIDE", help="of the tags' black border [m], 0.12 for instance")
     side_m = parser.parse_args(rospy.myargv()[1:]).side

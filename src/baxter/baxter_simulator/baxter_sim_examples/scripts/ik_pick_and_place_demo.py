@@ -5,10 +5,14 @@
 Parameters: ~rounds: how many ways, 0 for ever; ~seed: decides where the block lies, its mass and its friction;
 ~looking: the arm is not told where the block lies, but looks with the camera of its hand, and feels for the table.
 """
+from __future__ import annotations
+
 import argparse
 import itertools
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import rospy
 from tf2_ros import TransformException
@@ -23,6 +27,9 @@ from baxter_sim_examples.pick_and_place import aside_angles
 from baxter_sim_examples.scene import ABOUT_M, MIDDLE_M
 from gazebo_ros.gazebo_interface import GazeboInterfaceError
 
+if TYPE_CHECKING:
+    from baxter_sim_examples.looking import View
+
 MISS_M = 0.01  # largest distance of a block that reached its target
 STARTING_S = 30.0  # [wall] for the IK service, which may start beside this program on a busy machine
 SETTLING_S = 1.0  # [ROS time] until a physical arm that has arrived is at rest
@@ -31,54 +38,55 @@ SETTLING_S = 1.0  # [ROS time] until a physical arm that has arrived is at rest
 class SdkArm:
     """An arm with its gripper, as `pick_and_place` wants it."""
 
-    def __init__(self, limb):
+    def __init__(self, limb: str) -> None:
         self.name = limb
         self._limb, self._gripper = Limb(limb), Gripper(limb)
         if not self._gripper.calibrated():
             expect(self._gripper.calibrate(), "the %s gripper cannot be calibrated" % limb)
 
-    def ik(self, position, orientation, seed):
+    def ik(self, position: Sequence[float], orientation: Sequence[float],
+           seed: Mapping[str, float]) -> dict[str, float]:
         return self._limb.ik((position, orientation), seed, timeout=STARTING_S)
 
-    def move_to(self, angles):
+    def move_to(self, angles: dict[str, float]) -> dict[str, float]:
         expect(self._limb.move_to_joint_positions(angles), "the %s arm did not get where it should" % self.name)
         return angles
 
-    def open(self):
+    def open(self) -> None:
         expect(self._gripper.open(block=True), "the %s gripper does not open" % self.name)
 
-    def close(self):
+    def close(self) -> None:
         expect(self._gripper.close(block=True), "the %s gripper does not close" % self.name)
 
-    def holds(self):
+    def holds(self) -> bool:
         return self._gripper.gripping()
 
 
 class SeeingArm(SdkArm):
     """The same with the hand's camera and range sensor, as `locate` wants it, for an arm that comes to rest slowly."""
 
-    def __init__(self, limb):
+    def __init__(self, limb: str) -> None:
         super().__init__(limb)
         self._senses = HandSenses(limb)
 
-    def look(self):
+    def look(self) -> View:
         rospy.sleep(SETTLING_S)
         return self._senses.look()
 
-    def feel(self):
+    def feel(self) -> tuple[float, list[float]]:
         rospy.sleep(SETTLING_S)
         return self._senses.feel()
 
-    def open(self):
+    def open(self) -> None:
         rospy.sleep(SETTLING_S)
         super().open()
 
-    def close(self):
+    def close(self) -> None:
         rospy.sleep(SETTLING_S)
         super().close()
 
 
-def demo():
+def demo() -> None:
     rounds, seed = rospy.get_param("~rounds", 0), rospy.get_param("~seed", 0)
     looks = rospy.get_param("~looking", False)
     trial = Trial.from_seed(seed)

@@ -15,7 +15,7 @@ from baxter_sim_examples.moveit_trial import MoveItTrials, TrialFailed
 from gazebo_ros.gazebo_interface import GazeboInterfaceError
 
 
-def demo():
+def demo() -> None:
     count, first = rospy.get_param("~trials", 0), rospy.get_param("~seed", 0)
     done, misses = 0, []
     with EnabledRobot():

@@ -18,7 +18,7 @@ from baxter_sim_examples.vision_scene import COLOURED, THE_BOARD, Thing, board_u
 from gazebo_ros.gazebo_interface import call, delete_model_client
 
 
-def build():
+def build() -> None:
     models = Path(rospkg.RosPack().get_path("model_files")) / "models"
     table = Thing(TABLE, *TABLE_XY_M, -BASE_HEIGHT_M, 0.0)
     there = call(GAZEBO + "/get_world_properties", GetWorldProperties).model_names

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A block among other things on the table: what a seed decides, and how the block can be grasped and put down.
 Free of ROS."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,15 +58,15 @@ class Thing:
     is_round: bool
 
     @property
-    def radius(self):
+    def radius(self) -> float:
         """Of the circle that it stands in [m]."""
         return 0.5 * self.width * (1.0 if self.is_round else math.sqrt(2.0))
 
-    def with_margin(self):
+    def with_margin(self) -> Thing:
         """The Thing as a planner should know it: larger to all sides."""
         return replace(self, width=self.width + 2.0 * _MARGIN_M, height=self.height + 2.0 * _MARGIN_M)
 
-    def urdf(self):
+    def urdf(self) -> str:
         """Its description, URDF text."""
         geometry = '<cylinder radius="%g" length="%g"/>' % (0.5 * self.width, self.height) if self.is_round else \
             '<box size="%g %g %g"/>' % (self.width, self.width, self.height)
@@ -76,12 +79,12 @@ class Grasp:
     """How a hand comes to the block, or where it lets it go. position [m] of the frame between the finger tips in
     `base`, orientation (x, y, z, w); it comes along its own z axis. quality: the best are tried first."""
 
-    position: tuple
-    orientation: tuple
+    position: tuple[float, float, float]
+    orientation: tuple[float, float, float, float]
     quality: float
 
 
-def clutter(seed):
+def clutter(seed: int) -> list[Thing]:
     """The things of a seed: a list that stands clear of the block, its target, and of each other."""
     trial, random = Trial.from_seed(seed), np.random.default_rng((seed, THINGS))
     block = 0.5 * math.sqrt(2.0) * BLOCK_SIZE_M
@@ -104,7 +107,7 @@ def _thing(name, random):
                  bool(random.integers(2)))
 
 
-def grasps(spot):
+def grasps(spot: Spot) -> list[Grasp]:
     """The Grasps of a block at a Spot: fingers along either pair of its upright faces, the hand upright or leaning."""
     found = []
     straight = grip_yaw(spot.yaw)
@@ -116,13 +119,13 @@ def grasps(spot):
     return found
 
 
-def lean_of(orientation):
+def lean_of(orientation: Sequence[float]) -> float:
     """The angle [rad] between straight down and the z axis of a hand with a quaternion x, y, z, w."""
     x, y, _, _ = orientation
     return math.acos(max(-1.0, min(1.0, 2.0 * (x * x + y * y) - 1.0)))
 
 
-def held_otherwise(offered, orientation):
+def held_otherwise(offered: Iterable[Grasp], orientation: Sequence[float]) -> list[Grasp]:
     """Those Grasps whose hand leans otherwise than one with a quaternion x, y, z, w.
 
     Only these put the block down with the hand elsewhere: a turn by quarters about the vertical is a landing's, too.
@@ -130,7 +133,7 @@ def held_otherwise(offered, orientation):
     return [one for one in offered if abs(lean_of(one.orientation) - lean_of(orientation)) > _SAME_LEAN_RAD]
 
 
-def landings(spot):
+def landings(spot: Spot) -> list[Spot]:
     """Spots at which the block stands on its target, however it is turned by quarters, a hair above the table."""
     return [Spot(spot.x, spot.y, spot.z + _DROP_M, spot.yaw + quarters * math.pi / 2.0) for quarters in range(4)]
 

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Patches of one colour in a camera's picture, by thresholds on hue, saturation and value. Free of ROS."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
+
+if TYPE_CHECKING:
+    from .looking import View
 
 #: Ranges of hue [half degrees, as OpenCV counts: 0 to 179] of each colour.
 HUES = {"red": ((0, 8), (172, 179)), "yellow": ((22, 34),), "green": ((45, 80),), "blue": ((105, 130),)}
@@ -21,7 +26,7 @@ class Patch(NamedTuple):
     area: float
 
 
-def find_patches(picture, colour, least_area=40.0):
+def find_patches(picture: np.ndarray, colour: str, least_area: float = 40.0) -> list[Patch]:
     """Patches of `colour`, one of :data:`HUES`, in a picture (height, width, 3) uint8 red, green, blue, the largest
     first; smaller ones than `least_area` [square pixels] are left out. ``ValueError`` for an unknown colour."""
     if colour not in HUES:
@@ -37,7 +42,7 @@ def find_patches(picture, colour, least_area=40.0):
     return sorted(found, key=lambda patch: -patch.area)
 
 
-def find_blocks(view, colour, side_m, top_m):
+def find_blocks(view: View, colour: str, side_m: float, top_m: float) -> list[tuple[float, float, Patch]]:
     """[(x, y [m] in `base`, Patch)] of the patches of `colour` in a `looking.View` that are as large as blocks of
     `side_m` [m] whose upper faces are at height `top_m` [m] in `base`; so the robot itself, which is red, is left out.
     ``ValueError`` for an unknown colour."""

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The scene in a running simulator: spawn and delete table and block, read the block's pose."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rospkg
 import rospy
@@ -11,6 +15,11 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from gazebo_ros.gazebo_interface import GazeboInterfaceError, call, delete_model_client
 
 from .scene import BASE_HEIGHT_M, TABLE_XY_M, block_urdf
+
+if TYPE_CHECKING:
+    from .clutter import Thing
+    from .pick_and_place import Spot
+    from .scene import Trial
 
 GAZEBO = "/gazebo"
 TABLE, BLOCK = "cafe_table", "block"
@@ -22,11 +31,11 @@ class GazeboScene:
     Raises GazeboInterfaceError.
     """
 
-    def __init__(self, trial, things=()):
+    def __init__(self, trial: Trial, things: Iterable[Thing] = ()) -> None:
         """things: list of clutter.Things."""
         self._trial, self._things = trial, list(things)
 
-    def __enter__(self):
+    def __enter__(self) -> GazeboScene:
         self._remove()
         table = Path(rospkg.RosPack().get_path("model_files")) / "models" / TABLE / "model.sdf"
         self._spawn("sdf", TABLE, table.read_text(), Pose(Point(*TABLE_XY_M, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
@@ -35,21 +44,21 @@ class GazeboScene:
             self._spawn("urdf", thing.name, thing.urdf(), _pose(thing.spot))
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         try:
             self._remove()
         except GazeboInterfaceError as error:
             rospy.logwarn("table and block stay in the world: %s", error)
 
-    def distance(self, spot):
+    def distance(self, spot: Spot) -> float:
         """Distance [m] of the block's middle from a Spot."""
         return math.dist(_where(BLOCK), _point(_pose(spot)))
 
-    def height(self):
+    def height(self) -> float:
         """Height [m] of the block's middle in `base`."""
         return _where(BLOCK)[2] - BASE_HEIGHT_M
 
-    def touched(self, tolerance_m):
+    def touched(self, tolerance_m: float) -> str | None:
         """A sentence on the first thing that has moved by more than `tolerance_m`, None where all stand still."""
         for thing in self._things:
             moved = math.dist(_where(thing.name), _point(_pose(thing.spot)))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Cameras, depth cameras and the range sensors of hands, by topics and tf: the same on the simulator and on the
 robot."""
+from __future__ import annotations
+
 import numpy as np
 import rospy
 import tf2_ros
@@ -28,11 +30,11 @@ class Eyes:
     tf does not know.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer)
 
-    def view(self, image_topic, info_topic):
+    def view(self, image_topic: str, info_topic: str) -> View:
         """The `View` of a camera's next picture, where it was taken."""
         info, = _next_messages(info_topic, CameraInfo)
         image, = _next_messages(image_topic, Image)
@@ -40,14 +42,14 @@ class Eyes:
         return View(picture, np.reshape(info.K, (3, 3)), self.pose(image.header.frame_id, image.header.stamp),
                     tuple(info.D))
 
-    def points(self, topic):
+    def points(self, topic: str) -> np.ndarray:
         """The points (n, 3) [m], in `base`, of the next cloud of a depth camera."""
         cloud, = _next_messages(topic, PointCloud2)
         found = np.array(list(point_cloud2.read_points(cloud, ("x", "y", "z"), skip_nans=True))).reshape(-1, 3)
         pose = self.pose(cloud.header.frame_id, cloud.header.stamp)
         return found @ pose[:3, :3].T + pose[:3, 3]
 
-    def pose(self, frame, stamp):
+    def pose(self, frame: str, stamp: rospy.Time) -> np.ndarray:
         """The pose (4, 4) of a frame in `base` at a time (rospy.Time)."""
         transform = self._buffer.lookup_transform(BASE, frame, stamp, rospy.Duration(TIMEOUT_S)).transform
         turn, place = transform.rotation, transform.translation
@@ -57,15 +59,15 @@ class Eyes:
 class HandSenses:
     """The sensors of the hand of an arm, "left" or "right"; raises as :class:`Eyes`."""
 
-    def __init__(self, limb):
+    def __init__(self, limb: str) -> None:
         self._camera, self._sensor = "%s_hand_camera" % limb, "%s_hand_range" % limb
         self._eyes = Eyes()
 
-    def look(self):
+    def look(self) -> View:
         """The `View` of the camera's next picture, where it was taken."""
         return self._eyes.view("/cameras/%s/image" % self._camera, "/cameras/%s/camera_info" % self._camera)
 
-    def feel(self):
+    def feel(self) -> tuple[float, list[float]]:
         """(mean height of the range sensor in `base` [m], its next readings [m])."""
         messages = _next_messages("/robot/range/%s/state" % self._sensor, Range, READINGS)
         heights = [self._eyes.pose(self._sensor, message.header.stamp)[2, 3] for message in messages]

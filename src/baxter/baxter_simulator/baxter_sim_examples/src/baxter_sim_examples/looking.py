@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Find a block on a table in a camera's picture, and the table's height by a range sensor. Free of ROS."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from command_line.options import counted
 
-from .pick_and_place import Spot, start_angles, tool_down
+from .pick_and_place import Arm, Spot, start_angles, tool_down
 from .scene import BLOCK_SIZE_M
 from .tagged import BLOCK_TAG, BLOCK_TAG_M
 from .tags import find_tags
@@ -36,6 +40,15 @@ class NotSeen(Exception):
     """The object is not there, or is not seen; the text says what was found."""
 
 
+class LookingArm(Arm, Protocol):
+    """The same with the hand's camera and range sensor; `feel()` -> (height of the sensor in `base` [m], its readings
+    [m])."""
+
+    def look(self) -> View: ...
+
+    def feel(self) -> tuple[float, list[float]]: ...
+
+
 class View(NamedTuple):
     """A picture and where it was taken: `picture` (height, width, 3) uint8 red, green, blue; `matrix` (3, 3) and
     `distortion` (n,), K and D of the camera; `pose` (4, 4) of the optical frame in `base` [m]."""
@@ -43,27 +56,27 @@ class View(NamedTuple):
     picture: np.ndarray
     matrix: np.ndarray
     pose: np.ndarray
-    distortion: tuple = ()
+    distortion: tuple[float, ...] = ()
 
-    def rays(self, pixels):
+    def rays(self, pixels: npt.ArrayLike) -> np.ndarray:
         """x / z and y / z (n, 2), in the optical frame, of what pixels (n, 2) show."""
         pixels = np.asarray(pixels, dtype=float).reshape(-1, 1, 2)
         if not np.any(self.distortion):
             return (pixels.reshape(-1, 2) - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
         return cv2.undistortPoints(pixels, self.matrix, np.array(self.distortion, dtype=float)).reshape(-1, 2)
 
-    def on_plane(self, pixels, height):
+    def on_plane(self, pixels: np.ndarray, height: float) -> np.ndarray:
         """(n, 2) x and y [m] in `base` of the points at `height` [m] that pixels (n, 2) show."""
         rays = np.column_stack([self.rays(pixels), np.ones(len(pixels))]) @ self.pose[:3, :3].T
         lengths = (height - self.pose[2, 3]) / rays[:, 2]
         return self.pose[:2, 3] + lengths[:, None] * rays[:, :2]
 
-    def scale(self, height):
+    def scale(self, height: float) -> float:
         """Pixels for one metre at `height` [m] below or above the camera."""
         return abs(self.matrix[0, 0]) / max(abs(self.pose[2, 3] - height), 1e-3)
 
 
-def find_block(view, table_m, side_m=BLOCK_SIZE_M):
+def find_block(view: View, table_m: float, side_m: float = BLOCK_SIZE_M) -> Spot:
     """The Spot of the block on a table whose top is at height `table_m` [m] in `base`. Raises NotSeen.
 
     The block's upper face is the lighter patch of wood whose outline, seen at the height of that face, is a square of
@@ -96,7 +109,7 @@ def find_block(view, table_m, side_m=BLOCK_SIZE_M):
     return best[1]
 
 
-def table_height(sensor_m, readings):
+def table_height(sensor_m: float, readings: Sequence[float]) -> float:
     """Height [m] of what is below a range sensor that looks straight down from height `sensor_m` [m]: by the mean of
     those of its readings [m] that are near their median. Raises NotSeen where fewer than five say something."""
     heard = [reading for reading in readings if reading < _NOTHING_M]
@@ -107,11 +120,10 @@ def table_height(sensor_m, readings):
     return sensor_m - float(heard[np.abs(heard - np.median(heard)) < _OUTLIER_M].mean())
 
 
-def locate(arm, middle, about_m):
+def locate(arm: LookingArm, middle: Sequence[float], about_m: float) -> Spot:
     """The Spot of the block that lies somewhere around `middle` (x, y) [m] in `base`, by looking and feeling.
 
-    arm: as for `pick_and_place`, with `look()` -> View and `feel()` -> (height of the range sensor in `base` [m], list
-    of its readings [m]); about_m: where the table's top is, roughly [m]. Raises NotSeen, and the arm's errors.
+    about_m: where the table's top is, roughly [m]. Raises NotSeen, and the arm's errors.
     """
     pose, heights = start_angles(arm.name), []
     for aside in (_ASIDE_M, 0.0):
@@ -124,7 +136,8 @@ def locate(arm, middle, about_m):
     return find_block(arm.look(), table_m)
 
 
-def find_tagged_block(view, number=BLOCK_TAG, tag_m=BLOCK_TAG_M, side_m=BLOCK_SIZE_M):
+def find_tagged_block(view: View, number: int = BLOCK_TAG, tag_m: float = BLOCK_TAG_M,
+                      side_m: float = BLOCK_SIZE_M) -> Spot:
     """The Spot of the block of `side_m` [m] with tag `number`, of `tag_m` [m], on its upper face; the table's height
     need not be known. Raises NotSeen."""
     found = find_tags(view, tag_m)
@@ -136,7 +149,7 @@ def find_tagged_block(view, number=BLOCK_TAG, tag_m=BLOCK_TAG_M, side_m=BLOCK_SI
     return Spot(float(x), float(y), float(z), float(np.arctan2(pose[1, 0], pose[0, 0])))
 
 
-def locate_tagged(arm, middle, about_m):
+def locate_tagged(arm: LookingArm, middle: Sequence[float], about_m: float) -> Spot:
     """As :func:`locate` for the block with a tag: the arm looks, and need not feel.
 
     From nearer, a finger may hide a corner of the tag: then the first look counts.

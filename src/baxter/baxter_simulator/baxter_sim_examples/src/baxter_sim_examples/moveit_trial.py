@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pick and place among clutter by MoveIt's interface: tells move_group what stands there, and asks for grasps and
 places."""
+from __future__ import annotations
+
 import math
 
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
@@ -38,7 +40,7 @@ class TrialFailed(Exception):
 class MoveItTrials:
     """The left arm, asked for one trial after the other; the right arm waits aside. Raises TrialFailed."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._arm, self._scene = MoveGroupCommander(ARM, wait_for_servers=_SERVERS_S), PlanningSceneInterface()
         self._arm.set_planning_time(_PLANNING_S)
         self._arm.set_support_surface_name(TABLE)
@@ -46,7 +48,7 @@ class MoveItTrials:
         if not MoveGroupCommander(OTHER_ARM, wait_for_servers=_SERVERS_S).go(aside_angles("right")):
             raise TrialFailed("the right arm did not go aside")
 
-    def run(self, seed):
+    def run(self, seed: int) -> float:
         """Carry the block of a seed to its target. Returns how far from there it ends [m]; raises TrialFailed."""
         trial, things = Trial.from_seed(seed), clutter(seed)
         self._scene.clear()

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Take a block from one spot of a table and put it on another: the sequence of steps, for any arm. Free of ROS.
 
-An arm is an object with `name`, `ik(position, orientation, seed)` -> angles by joint name (may raise anything),
-`move_to(angles)`, `open()`, `close()`, which return when the motion is done, and `holds()`. Positions [m] are those of
-the frame between the finger tips, in `base`; orientations are quaternions x, y, z, w.
+Positions [m] are those of the frame between the finger tips, in `base`; orientations are quaternions x, y, z, w.
 """
+from __future__ import annotations
+
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from baxter_model import arm_angles
 
@@ -28,6 +30,24 @@ _UP = _DOWN[-2::-1]
 _QUARTER = math.pi / 2.0
 
 
+class Arm(Protocol):
+    """An arm with its gripper; `ik` may raise anything, and motions return when they are done. Angles are by joint
+    name [rad]."""
+
+    name: str
+
+    def ik(self, position: Sequence[float], orientation: Sequence[float],
+           seed: Mapping[str, float]) -> dict[str, float]: ...
+
+    def move_to(self, angles: dict[str, float]) -> dict[str, float]: ...
+
+    def open(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def holds(self) -> bool: ...
+
+
 class BlockLost(Exception):
     """There is no block between the fingers; the text says in which step that was found."""
 
@@ -42,27 +62,27 @@ class Spot:
     yaw: float = 0.0
 
 
-def start_angles(limb):
+def start_angles(limb: str) -> dict[str, float]:
     """Angles by joint name [rad] in which an arm, "left" or "right", begins."""
     return arm_angles(limb, START_ANGLES)
 
 
-def aside_angles(limb):
+def aside_angles(limb: str) -> dict[str, float]:
     """Angles by joint name [rad] in which an arm, "left" or "right", is out of the other one's way."""
     return arm_angles(limb, ASIDE_ANGLES)
 
 
-def tool_down(yaw):
+def tool_down(yaw: float) -> tuple[float, float, float, float]:
     """Quaternion (x, y, z, w) of a tool that looks straight down, its fingers along y turned by `yaw` [rad]."""
     return math.cos(yaw / 2.0), math.sin(yaw / 2.0), 0.0, 0.0
 
 
-def grip_yaw(yaw):
+def grip_yaw(yaw: float) -> float:
     """The turn in -45 to 45 degrees [rad] in which fingers meet two faces of a square block turned by `yaw`."""
     return yaw - _QUARTER * round(yaw / _QUARTER)
 
 
-def pick_and_place(arm, source, target):
+def pick_and_place(arm: Arm, source: Spot, target: Spot) -> None:
     """Carry the block from `source` to `target` (Spot). Raises BlockLost, and the arm's errors.
 
     The fingers keep their angle to the block, so that it arrives turned by the difference of the two spots' yaw, up to

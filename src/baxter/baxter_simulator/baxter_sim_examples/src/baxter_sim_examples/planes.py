@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The plane that most points of a cloud lie on, and what stands on it. Free of ROS."""
+from __future__ import annotations
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from command_line.options import counted
 
@@ -21,12 +25,13 @@ class Plane(NamedTuple):
     distance: float
     inliers: np.ndarray
 
-    def height(self, points):
+    def height(self, points: npt.ArrayLike) -> np.ndarray:
         """(n,) how far points (n, 3) [m] are above the plane, on the side that its normal points to."""
         return np.asarray(points) @ self.normal - self.distance
 
 
-def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
+def fit_plane(points: npt.ArrayLike, tolerance_m: float, upwards: Sequence[float] = (0.0, 0.0, 1.0), seed: int = 0,
+              tries: int = 200) -> Plane:
     """The :class:`Plane` with the most points (n, 3) [m] within `tolerance_m`; its normal points `upwards`.
 
     Three points at a time are tried (Fischler and Bolles, "Random sample consensus", 1981); the best plane is then

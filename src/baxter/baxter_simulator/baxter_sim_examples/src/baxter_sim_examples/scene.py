@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A block on the cafe table, in front of Baxter: made from a trial's seed. Free of ROS."""
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,10 +49,10 @@ class Trial:
     target: Spot
     mass_kg: float
     friction: float
-    start: dict
+    start: dict[str, float]
 
     @classmethod
-    def from_seed(cls, seed):
+    def from_seed(cls, seed: int) -> Trial:
         """The trial that belongs to an integer, the same one each time."""
         random = np.random.default_rng(seed)
         source = _spot(random)
@@ -68,7 +70,7 @@ def _spot(random):
                 float(random.uniform(-np.pi, np.pi)))
 
 
-def block_urdf(mass_kg, friction):
+def block_urdf(mass_kg: float, friction: float) -> str:
     """The description of the block, URDF text."""
     inertia = mass_kg * BLOCK_SIZE_M**2 / 6.0
     return _BLOCK % {"size": BLOCK_SIZE_M, "mass": mass_kg, "inertia": inertia, "friction": friction}

@@ -4,6 +4,8 @@
 The black cells are thin boxes on a white face, so every program that draws descriptions shows the tag, with edges as
 sharp as its pixels. They are matt, as printed paper: black paint and plastic mirror the sky.
 """
+from __future__ import annotations
+
 import numpy as np
 
 from .scene import BLOCK_SIZE_M
@@ -35,7 +37,8 @@ _THING = """<robot name="%(name)s">
 """
 
 
-def tagged_urdf(name, size, number, mass_kg=0.1, friction=0.7, static=False):
+def tagged_urdf(name: str, size: tuple[float, float, float], number: int, mass_kg: float = 0.1, friction: float = 0.7,
+                static: bool = False) -> str:
     """URDF text of a white box of `size` (x, y, z) [m] about its own middle. Tag `number` fills its upper face, up to
     the white margin of one cell; the tag's x is the box's x."""
     x, y, z = size
@@ -52,7 +55,7 @@ def tagged_urdf(name, size, number, mass_kg=0.1, friction=0.7, static=False):
         "friction": friction, "static": "  <gazebo><static>true</static></gazebo>\n" if static else ""}
 
 
-def tagged_block_urdf(mass_kg, friction):
+def tagged_block_urdf(mass_kg: float, friction: float) -> str:
     """URDF text of the block to pick, with tag :data:`BLOCK_TAG` on its upper face."""
     return tagged_urdf("block", (BLOCK_SIZE_M,) * 3, BLOCK_TAG, mass_kg, friction)
 

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Square tags of the family AprilTag 36h11: what they look like, and where a camera sees them. Free of ROS."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
+
+if TYPE_CHECKING:
+    from .looking import View
 
 #: Cells of a tag's side, the black border included. Around it a white margin of one cell is needed.
 CELLS = 8
@@ -18,7 +25,7 @@ _REACH_PX, _REACH_CELLS = 3.0, 0.45
 _BLUR_PX = 0.8
 
 
-def pattern(number):
+def pattern(number: int) -> np.ndarray:
     """The cells of a tag, (8, 8) of bool from its upper left corner, True for white. ``ValueError`` for a number that
     the family does not have."""
     if not 0 <= number < COUNT:
@@ -28,7 +35,7 @@ def pattern(number):
     return draw(_DICTIONARY, number, CELLS) > 127
 
 
-def find_tags(view, side_m):
+def find_tags(view: View, side_m: float) -> dict[int, np.ndarray]:
     """{number: pose (4, 4) in `base` [m]} of the tags with black borders of `side_m` [m] in a `looking.View`.
 
     A tag's frame is in its middle: x to its right, y to its upper edge, z out of it, towards the camera.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The objects on the table for the programs that look: three coloured blocks and a board with a tag. Free of ROS."""
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -25,7 +27,7 @@ class Thing(NamedTuple):
     yaw: float
 
     @property
-    def world(self):
+    def world(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
         """(x, y, z [m], quaternion x y z w) in the world, whose floor is at z = 0."""
         return (self.x, self.y, self.z + BASE_HEIGHT_M), (0.0, 0.0, math.sin(self.yaw / 2), math.cos(self.yaw / 2))
 
@@ -40,6 +42,6 @@ COLOURED = (_on_table("red_block", 0.60, 0.11, COLOURED_M, 0.3), _on_table("gree
 THE_BOARD = _on_table(BOARD, 0.85, -0.05, BOARD_SIZE_M[2], 0.4)
 
 
-def board_urdf():
+def board_urdf() -> str:
     """URDF text of the board, which stays where it lies."""
     return tagged_urdf(BOARD, BOARD_SIZE_M, BOARD_TAG, static=True)
