@@ -2,9 +2,11 @@
 """Keeps code compiled by numba between runs. Free of ROS."""
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -54,11 +56,41 @@ def _loaded_alone(function: Any) -> Any:
         from numba.core.runtime.nrt import rtsys
 
         rtsys.initialize(target)  # what allocates the arrays of compiled code
-        with cache._guard_against_spurious_io_errors():
+        with cache._guard_against_spurious_io_errors(), _without_its_library():
             return cache._load_overload(signature, target)
 
     cache.load_overload = load_overload
     return function
+
+
+@contextlib.contextmanager
+def _without_its_library() -> Iterator[None]:
+    """While functions are loaded: those of numba's own library that are a part of them do not import their modules.
+
+    numba imports the module of each for its global names, which compiled code does not look at; with them come
+    scipy.linalg and a good part of the tables. Its lock for compiling must be held.
+    """
+    from numba.core import environment as parts
+
+    names = ("_rebuild_env", "lookup_environment", "Environment")
+    original = getattr(parts, names[0], None)
+    if not all(hasattr(parts, name) for name in names) or not hasattr(parts.Environment, "_memo"):
+        yield  # numba has changed inside
+        return
+
+    def rebuilt(module: str, constants: list[Any], name: str) -> Any:
+        if not module.startswith("numba.") or module in sys.modules or parts.lookup_environment(name) is not None:
+            return original(module, constants, name)
+        part: Any = parts.Environment({"__name__": module})
+        part.consts[:], part.env_name = constants, name
+        parts.Environment._memo[name] = part
+        return part
+
+    parts._rebuild_env = rebuilt
+    try:
+        yield
+    finally:
+        parts._rebuild_env = original
 
 
 def folder(name: str, sources: Iterable[str | Path], environment: Mapping[str, str] = os.environ) -> str:

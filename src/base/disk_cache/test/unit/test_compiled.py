@@ -101,13 +101,23 @@ from disk_cache.compiled import compiler
 @compiler("program", [__file__])
 def total(values):
     found = 0.0
-    for value in values * values:
+    for value in values * values[np.argmin(values)]:
         found += value
     return found
 
-print(total(np.arange(3.0)), sum(total.stats.cache_hits.values()), "numba.np.arraymath" in sys.modules)
+def tables():
+    return [name for name in ("arraymath", "arrayobj", "npyimpl") if "numba.np." + name in sys.modules]
+
+def words(text):
+    return text.replace(" ", "_")
+
+print(total(np.arange(1.0, 3.0)), sum(total.stats.cache_hits.values()), bool(tables()) and words(str(tables())))
+try:
+    total(np.empty(0))
+except ValueError as error:
+    print(words(str(error)))
 one_more = numba.njit(lambda values: total(values) + 1.0)
-print(one_more(np.arange(3.0)), total(np.arange(3)))
+print(one_more(np.arange(1.0, 3.0)), total(np.arange(1, 3)))
 """
 
 
@@ -117,6 +127,6 @@ def test_what_comes_from_the_cache_needs_no_compiler_until_something_is_compiled
     runs = [subprocess.run([sys.executable, program], capture_output=True, text=True, check=True).stdout.split()
             for _ in range(2)]
     (value, hits, has_tables, *further), (again, hits_again, has_tables_again, *further_again) = runs
-    assert (hits, has_tables) == ("0", "True")
+    assert hits == "0" and "npyimpl" in has_tables
     assert (hits_again, has_tables_again) == ("1", "False")
-    assert value == again and further == further_again
+    assert value == again and further == further_again and "empty" in further[0]
