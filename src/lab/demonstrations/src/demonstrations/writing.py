@@ -6,6 +6,7 @@ all, whatever ends the program.
 """
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
@@ -26,7 +27,8 @@ class SetWriter:
     """Appends episodes to the set in `folder`, which is made, or continued if it has the same schema.
 
     `frame` takes one frame after the other; `keep` ends the episode and writes it, `drop` forgets it. Raises
-    DemonstrationError for a folder with something else, and for other features. Attribute `episodes`: how many it has.
+    DemonstrationError for a folder with something else, for other features, and where another writer is at work there.
+    Attribute `episodes`: how many it has.
     """
 
     def __init__(self, folder: Path, schema: Schema):
@@ -34,21 +36,29 @@ class SetWriter:
         self.episodes = self._frames = 0
         self._tasks: list[str] = []
         self._statistics: dict[str, Statistics] = {}
-        if (folder / layout.INFO).exists():
-            self._continue()
-        elif folder.exists() and any(path.name != layout.DRAFTS for path in folder.iterdir()):
-            if not (folder / "meta").is_dir() or any((folder / "meta").rglob("episodes/*/*.parquet")):
-                raise DemonstrationError("%s holds something else than a LeRobot data set; give an empty or new folder"
-                                         % folder)
-        need("pyarrow")
-        if schema.cameras:
-            need("av")
+        self._lock: int | None = _locked(folder)
+        try:
+            if (folder / layout.INFO).exists():
+                self._continue()
+            else:
+                _require_empty(folder)
+            need("pyarrow")
+            if schema.cameras:
+                need("av")
+        except Exception:
+            self._unlock()
+            raise
         self._drafts = folder / layout.DRAFTS
         shutil.rmtree(self._drafts, ignore_errors=True)
         self._rows: dict[str, list[np.ndarray]] = {}
         self._films: dict[str, Film] = {}
         self._pictures: dict[str, PictureStatistics] = {}
         self._begin()
+
+    def _unlock(self):
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            os.close(lock)
 
     def _continue(self):
         found, info = layout.schema_of(self.folder)
@@ -120,6 +130,7 @@ class SetWriter:
         """Forget an episode that was not kept."""
         self.drop()
         shutil.rmtree(self._drafts, ignore_errors=True)
+        self._unlock()
 
     def __enter__(self) -> SetWriter:
         return self
@@ -185,6 +196,31 @@ class SetWriter:
         for key, part in as_lists(statistics).items():
             row |= {"stats/%s/%s" % (key, name): value for name, value in part.items()}
         return row | {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
+
+
+def _locked(folder: Path) -> int:
+    """A descriptor that holds the folder for this writer alone, until it is closed or its process ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise DemonstrationError("%s cannot be made: %s" % (folder, error)) from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise DemonstrationError("another program is recording into %s; wait for its end, or give another folder"
+                                 % folder) from None
+    return lock
+
+
+def _require_empty(folder):
+    """A set whose first episode was not completed counts as none."""
+    if not any(path.name != layout.DRAFTS for path in folder.iterdir()):
+        return
+    if not (folder / "meta").is_dir() or any((folder / "meta").rglob("episodes/*/*.parquet")):
+        raise DemonstrationError("%s holds something else than a LeRobot data set; give an empty or new folder"
+                                 % folder)
 
 
 def _listed(features: Mapping[str, Feature]) -> str:

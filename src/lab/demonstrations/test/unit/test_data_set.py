@@ -260,3 +260,21 @@ def test_robomimics_file_has_its_groups(tmp_path):
 
 def test_numbers_of_files_go_on_in_the_next_chunk():
     assert layout.numbered(999) == (0, 999) and layout.numbered(1000) == (1, 0)
+
+
+def test_two_writers_do_not_meet_in_one_folder(tmp_path):
+    filled(tmp_path / "set")
+    with SetWriter(tmp_path / "set", SCHEMA) as first:
+        with pytest.raises(DemonstrationError, match="another program is recording into"):
+            SetWriter(tmp_path / "set", SCHEMA)
+        first.add(episode(4))
+    with SetWriter(tmp_path / "set", SCHEMA) as second:
+        assert second.episodes == 4
+        second.close()
+
+
+def test_a_place_where_no_folder_can_be_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    for folder in (tmp_path / "file" / "set", tmp_path / "file"):
+        with pytest.raises(DemonstrationError, match="file"):
+            SetWriter(folder, SCHEMA)

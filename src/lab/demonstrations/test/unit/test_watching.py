@@ -196,3 +196,21 @@ def test_a_set_of_other_actions_is_not_replayed_on_a_robot(tmp_path):
         writer.add(Episode("Reach.", {ACTION: np.zeros((2, 1), np.float32)}, True, 0))
     with pytest.raises(DemonstrationError, match="left_hand.dx"):
         actions_of(DataSet(tmp_path), 0)
+
+
+def test_a_feed_of_a_robot_that_nobody_reads_any_more_holds_up_no_topic(monkeypatch):
+    listening = []
+
+    class Subscriber:
+        def __init__(self, topic, kind, callback, **_options):
+            listening.append(self)
+            callback(kind())
+
+        def unregister(self):
+            listening.remove(self)
+
+    monkeypatch.setattr(rospy, "Subscriber", Subscriber)
+    feed = recording.of_robot({"/steering/mark": messages.Heard(String, lambda message: [])})
+    assert next(feed)[0] == "/steering/mark" and listening
+    feed.close()
+    assert not listening

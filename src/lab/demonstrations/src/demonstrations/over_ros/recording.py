@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import queue
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from .messages import CAMERAS, MARKS_TOPIC, Heard, topics
 _FOUND_WITHIN_S, _POLL_S, _QUEUE = 20.0, 0.1, 4000
 
 #: Messages as they come: (topic, message), or None while none comes.
-Feed = Iterator[tuple[str, Any] | None]
+Feed = Generator[tuple[str, Any] | None, None, None]
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -65,11 +66,16 @@ def of_robot(heard: Mapping[str, Heard]) -> Feed:
     waiting: queue.Queue[tuple[str, Any]] = queue.Queue(_QUEUE)
     kept = [rospy.Subscriber(topic, kind.kind, lambda message, name=topic: waiting.put((name, message)),
                              queue_size=100, tcp_nodelay=True) for topic, kind in heard.items()]
-    while kept and not rospy.is_shutdown():
-        try:
-            yield waiting.get(timeout=_POLL_S)
-        except queue.Empty:
-            yield None
+    try:
+        while kept and not rospy.is_shutdown():
+            try:
+                yield waiting.get(timeout=_POLL_S)
+            except queue.Empty:
+                yield None
+    finally:
+        # A queue that nobody reads fills up, and then holds up all who hear the same topics.
+        for one in kept:
+            one.unregister()
 
 
 def sizes(feed: Feed, heard: Mapping[str, Heard], cameras: Sequence[str]) -> dict[str, tuple[int, int]]:
@@ -117,7 +123,8 @@ def run(options: argparse.Namespace) -> None:
     def feed() -> Feed:
         return of_robot(heard) if options.bag is None else of_bag(options.bag, heard)
 
-    size = sizes(feed(), heard, options.cameras)
+    with contextlib.closing(feed()) as first:
+        size = sizes(first, heard, options.cameras)
     with SetWriter(options.folder, schema_of(options.rate, size, options.models)) as writer:
         recorder = Recorder(writer, options.task, say=say)
         say("recording into %s, which has %d episodes" % (options.folder, writer.episodes))

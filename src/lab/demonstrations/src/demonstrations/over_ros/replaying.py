@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -47,7 +48,7 @@ class Robot:
     def __init__(self) -> None:
         self.state: AssemblyState | None = None
         self.angles: np.ndarray | None = None
-        self.seen_s = 0.0
+        self._seen_s = 0.0
         self._ids: dict[str, int] = {}
         self._openings: dict[str, float] = {}
         self._arms = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1,
@@ -60,17 +61,22 @@ class Robot:
         self._kept += [rospy.Subscriber(name + "state", EndEffectorState,
                                         lambda message, side=side: self._ids.__setitem__(side, message.id))
                        for side, name in grippers.items()]
-        end = rospy.get_time() + _FOUND_WITHIN_S
+        end = time.monotonic() + _FOUND_WITHIN_S
         while self.state is None or self.angles is None or any(
                 not publisher.get_num_connections() for publisher in self._arms.values()):
-            if rospy.is_shutdown() or rospy.get_time() > end:
+            if rospy.is_shutdown() or time.monotonic() > end:
                 raise DemonstrationError("no robot is heard on /robot/state and /robot/joint_states")
-            rospy.sleep(0.02)
+            time.sleep(0.02)  # simulated time may not go on
+
+    @property
+    def silent_s(self) -> float:
+        """For how long no joint states have come [s]. Not by their stamps: a robot's clock is another one."""
+        return rospy.get_time() - self._seen_s
 
     def _on_joints(self, message: JointState) -> None:
         found = joints(message)
         if found is not None:
-            self.angles, self.seen_s = np.array(found), message.header.stamp.to_sec()
+            self.angles, self._seen_s = np.array(found), rospy.get_time()
 
     def send(self, set_points: np.ndarray, openings: np.ndarray) -> None:
         """One message of each arm, and of each gripper that is to change."""
@@ -106,7 +112,7 @@ def run(options: argparse.Namespace) -> None:
         now = rospy.get_time()
         state, off = robot.state, float(np.abs(told - robot.angles).max())
         if state is not None and (why := reason_to_stop(limits, state.enabled, bool(state.stopped or state.error),
-                                                        now - robot.seen_s, off)):
+                                                        robot.silent_s, off)):
             raise DemonstrationError("stopped after %.1f s: %s" % (now - begin, why))
         furthest = max(furthest, off)
         told = replay.joints(min(now - begin, replay.ends_s))
