@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from baxter_model import SIDES
 from command_line.options import did_you_mean
-from rf_checks import tasks, tasks_planning, tasks_printed
+from rf_checks import tasks, tasks_planning, tasks_printed, tasks_steering
 
 #: Points of 100 from which an exercise counts as done.
 PASS_MARK = 80.0
@@ -46,6 +46,8 @@ EXERCISES = (
              "joint_command.py Q0 ... Q6", tasks.JointCommand(), ("joint", "command", "stream"), ("right",)),
     Exercise("moveit", "plan_around", "plan the left arm's way around a pillar, to its state left_neutral",
              "plan_around.py X Y Z LX LY LZ", tasks_planning.PlanAround(), ("plan", "around", "pillar"), ("left",)),
+    Exercise("steering", "steer_to", "steer the left gripper to a place by twists", "steer_to.py X Y Z",
+             tasks_steering.SteerTo(), ("steer", "twist", "servo"), ("left",)),
 )
 LABS = tuple(dict.fromkeys(exercise.lab for exercise in EXERCISES))
 # Texts that only programs of one exercise contain, the most specific first.

@@ -15,10 +15,12 @@ from typing import Any
 import rosgraph
 
 import master_calls
+from baxter_model import SIDES
 from rf_checks.recording import Changes
 
-#: Topics on which programs may publish.
-SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics"))
+#: Topics on which programs may publish. A lab with a servo or a trajectory server has nodes that command arms, too.
+SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics",
+                           *("/robot/limb/%s/joint_command" % side for side in SIDES)))
 _CALLER = "/lab_judge"
 # Time limit for the master's response: a stopped one never answers.
 _ANSWER_S = 5.0

@@ -209,14 +209,15 @@ class Judge:
 
     def _fresh_lab(self, call: Call, deadline: float) -> Lab:
         # Nobody resets a move_group.
-        if self._lab is not None and (call.obstacle or self._lab.obstacle):
+        if self._lab is not None and (call.obstacle or self._lab.obstacle or call.steered != self._lab.steered):
             self.close()
         for attempt in (1, 2):
             if self._lab is not None and not self._lab.is_as_it_was():
                 self.close()
             try:
                 if self._lab is None:
-                    self._lab = Lab(self._description, self.has_walls, self._which, call.obstacle)
+                    self._lab = Lab(self._description, self.has_walls, self._which, call.obstacle,
+                                    call.steered)
                     self._lab.start(deadline)
                 self._lab.reset(call.posture, deadline)
                 return self._lab

@@ -49,12 +49,12 @@ _SHORTEST_RECORD_S = 0.0025
 #: Programs whose responses a student's program waits for, or that still process its messages: time must wait for them,
 #: too.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver", "move_group",
-           "joint_trajectory_action_server")
+           "joint_trajectory_action_server", "servo_server")
 SIMULATOR = "/gazebo"
 #: The nodes that spawn the robot and an obstacle, and then end.
 SPAWNER, OBSTACLE_SPAWNER = "/urdf_spawner", "/obstacle_spawner"
-#: What move_group serves, once it can plan.
-PLANNING_SERVICE = "/plan_kinematic_path"
+#: What move_group serves, once it can plan; and a servo, once it can be steered.
+PLANNING_SERVICE, SERVO_SERVICE = "/plan_kinematic_path", "/left_servo/reset_servo_status"
 #: How the IK nodes report their requests to the recorder.
 OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _NAME = b"__name:="
@@ -83,11 +83,12 @@ class Lab:
 
     def __init__(self, description_xml: str, walls: bool = True,
                  which: WhichRobot = WhichRobot(),  # noqa: B008 (a tuple)
-                 obstacle: Obstacle | None = None) -> None:
+                 obstacle: Obstacle | None = None, steered: bool = False) -> None:
         """`description_xml`: the robot's URDF text. `walls`: in a separate sandbox, as isolation.py says. `which`:
-        a WhichRobot. `obstacle`: tasks_planning.Obstacle, which comes with move_group."""
+        a WhichRobot. `obstacle`: tasks_planning.Obstacle, which comes with move_group. `steered`: with a servo of the
+        left arm."""
         self.uri = ""
-        self.obstacle = obstacle
+        self.obstacle, self.steered = obstacle, steered
         #: The lab's Graph, once it has started.
         self.graph = None
         self._walls, self._which = walls, which
@@ -159,7 +160,7 @@ class Lab:
                                           count=1), encoding="utf-8")
             self._run(["roslaunch", "-p", str(port), str(_share() / "launch" / "lab.launch"),
                        "description:=%s" % description, *("%s:=%s" % item for item in self._which._asdict().items()),
-                       *self._obstacle_arguments()], environment)
+                       "steered:=%s" % str(self.steered).lower(), *self._obstacle_arguments()], environment)
             self._own_time.restart()
             self._connection = self._await(lambda: _accept(listener), "the simulator", deadline)
         self._connection.settimeout(None)
@@ -336,6 +337,10 @@ class Lab:
             PLANNING_SERVICE in self.graph.services() and OBSTACLE_SPAWNER not in self.graph.nodes()
             and OBSTACLE_SPAWNER[1:] in self._ended_nodes())
 
+    def _is_steerable(self, services: set) -> bool:
+        """Whether the servo is there; True where the lab has none."""
+        return not self.steered or SERVO_SERVICE in services
+
     def _ended_nodes(self):
         """Names of nodes that ended well according to roslaunch."""
         return {name.rpartition("-")[0] for name in
@@ -343,8 +348,8 @@ class Lab:
 
     def _all_there(self):
         services, nodes = self.graph.services(), self.graph.nodes()
-        return (self._plans() and all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
-                    for side in SIDES)
+        return (self._plans() and self._is_steerable(services)
+                and all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services for side in SIDES)
                 and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
                 # The spawner still waits for the response of a service that the first reset withdraws.
                 and SPAWNER not in nodes)

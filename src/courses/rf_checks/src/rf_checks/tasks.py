@@ -39,7 +39,7 @@ AMPLITUDE_M, PERIODS = 0.045, 2.5
 class Call:
     """One run of the program: its arguments, the arms' posture before, the time limit [sim s], and the right answer.
 
-    obstacle: Obstacle in a lab that has move_group, or None.
+    obstacle: Obstacle in a lab that has move_group, or None. steered: whether the lab has a servo of the left arm.
     """
 
     arguments: tuple
@@ -48,6 +48,7 @@ class Call:
     expected: object = None
     lasts_s: float = field(default=0.0)
     obstacle: object = None
+    steered: bool = False
 
 
 def postures(rng: Generator, spread: float = 0.12) -> dict[str, float]:

@@ -99,6 +99,15 @@ def test_who_else_publishes_the_labs_topics_is_an_intruder(graph, me):
     assert graph.changes().intruders == {"/clock": ["/me"]}
 
 
+def test_who_commands_an_arm_beside_a_node_of_the_lab_is_none(uri, me):
+    servo = Node("/servo", uri)
+    servo.publish("/robot/limb/left/joint_command")
+    graph = Graph(uri)
+    graph.remember({})
+    me.publish("/robot/limb/left/joint_command")
+    assert not graph.changes()
+
+
 def test_a_node_that_is_gone_is_missing(graph, ik):
     ik.unpublish("/rosout")
     ik.unpublish("/report")
