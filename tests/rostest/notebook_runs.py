@@ -27,7 +27,7 @@ ROUNDS = int(os.environ.get("LAB_NOTEBOOK_ROUNDS", "1"))
 # Those that leave Baxter's arms alone, those that move them, and those whose robot is another one.
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
-OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning")
+OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning", "steering")
 # The one that starts the physical robot's profile, and takes minutes.
 ROBOT = ("8_before_the_real_robot",)
 # The pictures of docs/labs.md, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib

@@ -18,7 +18,7 @@ NAMES = ["1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro", "5_moving_baxter"
 
 def test_there_is_a_notebook_for_every_part_of_the_courses():
     found = [path.stem for path in tool.notebooks()]
-    assert sorted(found) == sorted([*NAMES, "joint_states_and_trajectories", "ros_control", "planning"])
+    assert sorted(found) == sorted([*NAMES, "joint_states_and_trajectories", "ros_control", "planning", "steering"])
 
 
 @pytest.mark.parametrize("path", tool.notebooks(), ids=lambda path: path.stem)
