@@ -151,7 +151,7 @@ WITHOUT_EFFECT = (
     ("visual", {"plugin": None}, "visuals have no plugins"),
     ("geometry/heightmap", {"texture": None, "blend": None}, "heightmaps have one colour"),
     ("geometry", {"image": None}, "this shape is left out"),
-    ("surface/bounce", {"threshold": "100000"}, "bodies bounce at any speed"),
+    ("surface/bounce", {"threshold": "100000|1e6|<=0.2"}, "bodies bounce from 0.2 m/s on"),
     ("surface/friction/ode", {"mu2": "@mu=1|+fdir1|>mu=1"}, _ONE_MU),
     ("surface/friction/ode", {"slip1": "0", "slip2": "0"}, "contacts do not slip"),
     ("surface/friction/torsional", {"coefficient": "1", "use_patch_radius": "1", "patch_radius": "0",

@@ -14,6 +14,8 @@ from .document import SdfError
 from .materials import read_material
 from .polylines import polyline_file
 
+# Bodies bounce from this <threshold> on, by default; nothing is as fast as the second one [m/s].
+_NO_BOUNCE_M_PER_S, _NEVER_M_PER_S = 100000.0, 1000.0
 # Of a surface.
 _MOST = {"damping": bounds.DAMPING.high, "restitution": 1.0}
 _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 1, 1, 1.0), ("iyz", 1, 2, 0.0))
@@ -153,6 +155,9 @@ def _surface(document, collision):
             if used != value:
                 document.mend(part, "<%s> of %g, for which %g is used" % (tag, value, used))
             found[name] = used
+    bounce = element.find("bounce")
+    if bounce is not None and document.number(bounce, "threshold", _NO_BOUNCE_M_PER_S) >= _NEVER_M_PER_S:
+        found.pop("restitution", None)
     direction = _direction(document, collision, element.find("friction/ode"))
     if direction is not None:
         found["direction"] = direction

@@ -53,7 +53,7 @@ def test_a_link_has_its_shapes_inertia_surface_and_colours():
       <gravity>false</gravity>
       <collision name="c"><pose>1 2 3 0 0 0</pose><geometry><box><size>1 2 3</size></box></geometry>
         <surface><friction><ode><mu>0.4</mu></ode></friction><contact><ode><kp>1e5</kp><kd>2</kd></ode></contact>
-          <bounce><restitution_coefficient>0.7</restitution_coefficient></bounce></surface></collision>
+          <bounce><restitution_coefficient>0.7</restitution_coefficient><threshold>0</threshold></bounce></surface></collision>
       <visual name="a"><geometry><cylinder><radius>1</radius><length>2</length></cylinder></geometry>
         <material><script><name>Gazebo/Red</name></script></material></visual>
       <visual name="b"><geometry><sphere><radius>1</radius></sphere></geometry>
@@ -69,6 +69,17 @@ def test_a_link_has_its_shapes_inertia_surface_and_colours():
     assert (surface.friction, surface.stiffness, surface.damping, surface.restitution) == (0.4, 1e5, 2, 0.7)
     assert [shape.geometry for shape in link.visuals] == [Cylinder(1, 2), Sphere(1), Mesh("model://x/y.stl", (2, 2, 2))]
     assert [shape.colour for shape in link.visuals] == [(0.9, 0.1, 0.1, 1.0), (0, 1, 0, 0.75), None]
+
+
+@pytest.mark.parametrize(("threshold", "restitution"), [
+    ("", None), ("<threshold>1e+06</threshold>", None), ("<threshold>0.1</threshold>", 0.9)])
+def test_a_body_bounces_where_its_threshold_lets_it(threshold, restitution):
+    """In Gazebo the threshold is 100000 m/s where a description says none."""
+    found = parse_sdf_model(
+        '<sdf version="1.7"><model name="m"><link name="l"><collision name="c"><geometry><box><size>1 1 1'
+        "</size></box></geometry><surface><bounce><restitution_coefficient>0.9</restitution_coefficient>%s</bounce><contact><ode>"
+        "<kp>1</kp></ode></contact></surface></collision></link></model></sdf>" % threshold, "m.sdf")
+    assert found.robot.links["l"].surface.restitution == restitution and found.warning == ""
 
 
 @pytest.mark.parametrize("mu", ["inf", "Inf", "-1"])
@@ -434,7 +445,7 @@ def test_names_may_have_the_models_own_in_front():
 def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
     found = world(tmp_path, """<physics><max_step_size>0.1</max_step_size></physics>
 <model name="m"><link name="a"><collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry><surface>
-<contact><ode><kp>-1</kp><kd>1e13</kd></ode></contact><bounce><restitution_coefficient>2</restitution_coefficient>
+<contact><ode><kp>-1</kp><kd>1e13</kd></ode></contact><bounce><threshold>0</threshold><restitution_coefficient>2</restitution_coefficient>
 </bounce></surface></collision></link><link name="b"/>%s</model>""" % joint(
         "j", "a", "b", axis="<axis><xyz>0 0 0</xyz><limit><lower>1</lower><upper>-1</upper></limit>"
                             "<dynamics><damping>-0.5</damping><friction>-1</friction></dynamics></axis>"))
