@@ -25,6 +25,7 @@ OPTIONAL = {
     "rospkg": "finds packages in a workspace; installed packages have their own list",
     "gymnasium": "extra `gym`: the environments' registration",
     "pyarrow": "extra `lerobot`: data sets", "av": "extra `lerobot`: films of cameras",
+    "onnxruntime": "extra `onnx`: policies in files of ONNX",
     "scipy": "multiplies faster than Debian's NumPy",
     "h5py": "maps of reach as HDF5", "ompl": "planners by their names in ompl_planning.yaml",
     "llvmlite": "part of numba",

@@ -21,6 +21,7 @@ from demonstrations.reading import DataSet
 from gym_baxter.randomised import Randomised
 from lab_batch import JobError
 
+from . import onnx_writing
 from .corrections import correct
 from .evaluation import Score, core_for, evaluate
 from .pictures import choose, draw_curve, film
@@ -44,7 +45,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         epilog="Without --data the expert shows the task first. Exit status: 0 done, 1 something is missing or broken, "
                "2 wrong options, 130 after Ctrl-C. `python3 -m robot_learning` is the same without ROS.")
     parser.add_argument("task", metavar="TASK", nargs="?", help="one of %s" % ", ".join(EXPERTS))
-    parser.add_argument("--evaluate", type=Path, metavar="POLICY", help="only measure this policy file")
+    parser.add_argument("--evaluate", type=Path, metavar="POLICY", help="only measure this policy file, npz or ONNX")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="of the results (default: .baxter/learned/TASK)")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
     parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
@@ -117,6 +118,7 @@ def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) ->
     _say("%d steps in %.0f s: loss %.4f, %.4f of episodes that only judge" % (
         settings.steps, curve.seconds, curve.training[-1], curve.validation[-1]), True)
     policy.save(path)
+    onnx_writing.save(policy, path.with_suffix(".onnx"))
     return curve
 
 

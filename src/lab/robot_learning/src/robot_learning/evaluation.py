@@ -18,7 +18,7 @@ from gym_baxter.randomised import Randomised
 from lab_batch import Job, Spec
 from lab_batch.processes import Limits, map_seeds
 
-from .policy import Contract, Policy, Runner, load
+from .policy import Acting, Contract, Runner, load
 
 #: Quantile of the normal distribution for 95 % between both ends.
 _Z = 1.959964
@@ -54,7 +54,7 @@ def observation_of(core: Core) -> np.ndarray:
     return np.concatenate([core.agent_pos(), core.task.observed()])
 
 
-def play(core: Core, policy: Policy, seed: int, each: Callable[[Core], None] = lambda core: None) -> dict[str, Any]:
+def play(core: Core, policy: Acting, seed: int, each: Callable[[Core], None] = lambda core: None) -> dict[str, Any]:
     """One episode: {success, steps, reward of the last step}. each: called after every action."""
     core.reset(np.random.default_rng(seed))
     runner, steps, reward, succeeded = Runner(policy), 0, 0.0, False

@@ -13,7 +13,7 @@ from demonstrations.layout import write_whole
 from gym_baxter.core import Core
 
 from .evaluation import Score, play
-from .policy import Policy
+from .policy import Acting
 from .training import Curve
 
 _SIZE, _LEFT, _TOP, _RIGHT, _BOTTOM = (720, 420), 70, 40, 20, 50
@@ -64,7 +64,7 @@ def choose(score: Score, each: int = 3) -> list[int]:
     return good + [seed for seed, one in score.results.items() if not one["success"]][:each]
 
 
-def film(core: Core, policy: Policy, seeds: list[int], path: Path) -> None:
+def film(core: Core, policy: Acting, seeds: list[int], path: Path) -> None:
     """Play episodes again and film them side by side, three in a row: the frame becomes green or red when they end.
     Raises OSError, DemonstrationError."""
     every = max(round(core.choices.control_freq / _FILM_HZ), 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -69,6 +69,11 @@ def _same_names(name, wanted, found):
         raise PolicyError("the policy needs %d numbers as %s; here are %d" % (len(wanted), name, len(found)))
 
 
+def contract_of(text: Mapping[str, Any]) -> Contract:
+    """A contract as JSON has it. Raises KeyError, TypeError."""
+    return Contract(**{**text, **{name: tuple(text[name]) for name in ("observation", "units", "action")}})
+
+
 def normalised(values: np.ndarray, mean: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """(frames, inputs) float32 as the network sees them: far from everything that was shown is as far as MOST."""
     return np.clip((values - mean) / scale, -MOST, MOST).astype(np.float32)
@@ -91,8 +96,8 @@ class Policy:
         if contract.inputs != inputs.KIND:
             raise PolicyError("the policy's inputs are of kind %r; this version has %r"
                               % (contract.inputs, inputs.KIND))
-        self._inputs = Inputs(contract.observation, contract.control != "osc_pose")
-        expected = (len(self._inputs), contract.chunk * len(contract.action))
+        self.inputs = Inputs(contract.observation, contract.control != "osc_pose")
+        expected = (len(self.inputs), contract.chunk * len(contract.action))
         found = (self.network.layers[0][0].shape[0], self.network.layers[-1][0].shape[1])
         if found != expected:
             raise PolicyError("the network goes from %d to %d numbers; its contract needs %d to %d"
@@ -100,7 +105,7 @@ class Policy:
 
     def chunks(self, observations: np.ndarray) -> np.ndarray:
         """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""
-        seen = normalised(self._inputs.of(observations), self.input_mean, self.input_scale)
+        seen = normalised(self.inputs.of(observations), self.input_mean, self.input_scale)
         said = self.network(seen).reshape(len(observations), self.contract.chunk, -1)
         return np.clip(said * self.action_scale + self.action_mean, -1.0, 1.0)
 
@@ -119,8 +124,23 @@ class Policy:
         write_whole(Path(path), write)
 
 
-def load(path: Path) -> Policy:
-    """A policy from its file. Raises PolicyError."""
+class Acting(Protocol):
+    """What a `Runner` runs."""
+
+    @property
+    def contract(self) -> Contract:
+        """What it takes in and gives out."""
+
+    def chunks(self, observations: np.ndarray) -> np.ndarray:
+        """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""
+
+
+def load(path: Path) -> Acting:
+    """A policy from its file, npz or ONNX. Raises PolicyError."""
+    if Path(path).suffix == ".onnx":
+        from .onnx_reading import load as load_onnx
+
+        return load_onnx(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
@@ -132,12 +152,12 @@ def load(path: Path) -> Policy:
         text = json.loads(str(arrays["contract"]))
         if text.pop("format") != FORMAT:
             raise PolicyError("%s has another format than %d, which this version reads" % (path, FORMAT))
-        lists = {name: tuple(text[name]) for name in ("observation", "units", "action")}
+        contract = contract_of(text)
         layers = [(arrays["weights_%d" % index], arrays["offsets_%d" % index])
                   for index in range(sum(name.startswith("weights_") for name in arrays))]
         if not layers or not all(np.isfinite(array).all() for layer in layers for array in layer):
             raise PolicyError("%s has no weights, or weights that are not finite" % path)
-        return Policy(Contract(**{**text, **lists}), Network(layers),
+        return Policy(contract, Network(layers),
                       *(arrays[name] for name in ("input_mean", "input_scale", "action_mean", "action_scale")))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise PolicyError("%s is no policy file of this version: %s %s"
@@ -148,7 +168,7 @@ class Runner:
     """Does a policy action by action: each action is the mean of all that was predicted for it, the younger the more
     (temporal ensembling: Zhao et al., 2023, where older ones count more)."""
 
-    def __init__(self, policy: Policy):
+    def __init__(self, policy: Acting):
         self.policy = policy
         self.begin()
 

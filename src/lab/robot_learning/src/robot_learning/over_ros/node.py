@@ -24,7 +24,7 @@ from gym_baxter.tasks import TASKS, robosuite_start
 from rospy_nodes.start import limit_ports
 
 from ..driving import ACTING, FAILED, STOPPED, SUCCEEDED, WAITING, DrivingLimits, Situation, limited, reason_to_wait
-from ..policy import Policy, PolicyError, Runner, load
+from ..policy import Acting, PolicyError, Runner, load
 from .robot import RosRobot
 from .scene import RosLab
 
@@ -50,7 +50,7 @@ class PolicyNode:
     sides = SIDES
     agent_pos = Core.agent_pos  # the same numbers as in the environments, from `lab.robot`
 
-    def __init__(self, policy: Policy, limits: DrivingLimits, lock_step: bool, without_switch: bool):
+    def __init__(self, policy: Acting, limits: DrivingLimits, lock_step: bool, without_switch: bool):
         self._policy, self._limits, self._lock_step = policy, limits, lock_step
         contract = policy.contract
         self.sides = SIDES[::-1] if contract.robosuite_order else SIDES
