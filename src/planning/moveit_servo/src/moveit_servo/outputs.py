@@ -10,7 +10,7 @@ import rospy
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from moveit_servo.settings import ARRAY, BAXTER, SettingsError
+from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, SettingsError
 
 if TYPE_CHECKING:
     from moveit_servo.servo import Step
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 # Points of a trajectory for Gazebo, whose controller may drop those that are late.
 _POINTS_FOR_GAZEBO = 30
+# How much longer than its step a period of a controller is, from rest until points are due a command_lead later: so
+# that the arm begins to move at once.
+_SLOWER_FIRST = 0.25
 # Velocities without positions drift; this share of the distance to the set-point is added to them [1/s].
 _RETURN_RATE = 2.0
 
@@ -38,8 +41,9 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
     one, and its way in one period would be faster than the servo allows. With a command_lead it is due at a time:
     otherwise one that comes late, or together with the next, is hurried by what it is late.
     """
-    positions, accelerations = step.position.tolist(), step.acceleration.tolist()
-    velocities = step.velocity
+    lead, pace = _lead(step, settings)
+    positions, accelerations = step.position.tolist(), (pace**2 * step.acceleration).tolist()
+    velocities = pace * step.velocity
     if not settings.publish_joint_positions and not step.rests:
         velocities = velocities + _RETURN_RATE * (step.position - measured)
     velocities = velocities.tolist()
@@ -54,7 +58,7 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
     trajectory = JointTrajectory(joint_names=list(joints))
     trajectory.header.frame_id = settings.planning_frame
     if settings.command_lead > 0.0:
-        trajectory.header.stamp, first = rospy.Time.from_sec(now), settings.command_lead
+        trajectory.header.stamp, first = rospy.Time.from_sec(now), lead
     else:
         first = max(seconds, settings.publish_period)  # from when it comes: the stamp is 0
     for number in range(_POINTS_FOR_GAZEBO if settings.use_gazebo else 1):
@@ -64,3 +68,11 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
             accelerations=accelerations if settings.publish_joint_accelerations else [],
             time_from_start=rospy.Duration(first + number * settings.publish_period)))
     return trajectory
+
+
+def _lead(step: Step, settings: ServoSettings) -> tuple[float, float]:
+    """How long after its step a trajectory's point is due [s], and the pace at which the controller then follows."""
+    grown = settings.publish_period + _SLOWER_FIRST * step.moving
+    if settings.command_out_type != TRAJECTORY or grown >= settings.command_lead:
+        return settings.command_lead, 1.0
+    return grown, 1.0 / (1.0 + _SLOWER_FIRST)

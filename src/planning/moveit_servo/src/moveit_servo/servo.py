@@ -4,6 +4,7 @@ those wanted. Time and state are arguments.
 """
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
@@ -55,6 +56,7 @@ class Step(NamedTuple):
     """Set-points (k,) of the arm's joints after a step, and what held them back.
 
     reason: a sentence, empty for NO_WARNING. rests: nothing moves and nothing is wanted. reached: the pose is there.
+    moving: time since the arm last rested, until it does again [s].
     """
 
     position: np.ndarray
@@ -64,6 +66,7 @@ class Step(NamedTuple):
     reason: str
     rests: bool
     reached: bool
+    moving: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class Servo:
         self.surroundings: Surroundings | None = None
         self._motion: Motion | None = None
         self._tracker, self._target, self._way = PoseTracker(), None, StraightWay()
+        self._rests, self._moving = True, 0.0
         self.settings = settings
 
     @property
@@ -141,7 +145,7 @@ class Servo:
 
     def reset(self) -> None:
         """Forget the motion: the next step begins at the measured posture, at rest."""
-        self._motion, self._target = None, None
+        self._motion, self._target, self._rests = None, None, True
         self._way.reset()
 
     def pose(self, q: np.ndarray, link: str = "") -> np.ndarray:
@@ -171,8 +175,12 @@ class Servo:
             command = self._along(whole, command, seconds)
         if not command and self._at_rest():
             motion.rest_at(motion.position)
+            self._rests = True
             return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), Status.NO_WARNING,
-                        "", True, reached)
+                        "", True, reached, self._moving)
+        if self._rests:
+            self._rests, self._moving = False, 0.0
+        self._moving += seconds
         wanted = _Wanted(np.zeros(len(measured)))
         if command:
             wanted = self._wanted(whole, velocity, measured, command)
@@ -185,7 +193,7 @@ class Servo:
             motion.rest_at(motion.position)
             status, reason = Status.INVALID, str(error)
         return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), status, reason, False,
-                    reached)
+                    reached, self._moving)
 
     def _at_rest(self) -> bool:
         motion = self._motion

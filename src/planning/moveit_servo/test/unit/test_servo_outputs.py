@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-points as the messages of controllers."""
 import dataclasses
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,22 @@ from baxter_core_msgs.msg import JointCommand
 from joint_trajectory.action_edge import command_of
 from joint_trajectory.follower import Follower
 from moveit_servo.outputs import message_of, message_type
-from moveit_servo.servo import Status, Step
+from moveit_servo.servo import Command, Status, Step
 from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, ServoSettings, SettingsError
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from steered_arms import Driven, probot_model  # noqa: E402
+
 CONFIG = Path(__file__).resolve().parents[2] / "config"
-SPEED = 0.25
+SPEED, BEGUN_RAD = 0.25, 1e-4
 JOINTS = ("a", "b")
 STEP = Step(np.array((0.1, 0.2)), np.array((0.5, -0.5)), np.zeros(2), Status.NO_WARNING, "", False, False)
 MEASURED = np.array((0.1, 0.1))
+
+
+def probot():
+    text = (CONFIG / "probot.yaml").read_text().replace("$(arg command_in_type)", "unitless")
+    return ServoSettings.from_mapping(yaml.safe_load(text))
 
 
 def sent(**settings):
@@ -68,11 +77,44 @@ def speeds_of_a_controller(settings):
 
 
 def test_a_busy_machine_makes_no_peaks_of_speed_at_the_trajectory_controller_of_probot():
-    text = (CONFIG / "probot.yaml").read_text().replace("$(arg command_in_type)", "unitless")
-    settings = ServoSettings.from_mapping(yaml.safe_load(text))
+    settings = probot()
     speeds = speeds_of_a_controller(settings)
     assert 0.8 * SPEED < min(speeds) and max(speeds) < 1.2 * SPEED
     assert max(speeds_of_a_controller(dataclasses.replace(settings, command_lead=0.0))) > 3.0 * SPEED
+
+
+@pytest.mark.parametrize("moving", [0.0, 0.008, 0.05, 0.2, 1.0])
+def test_a_lead_grows_from_rest(moving):
+    settings = ServoSettings(command_out_type=TRAJECTORY, command_lead=0.04, publish_joint_velocities=True)
+    point, = message_of(STEP._replace(moving=moving), MEASURED, JOINTS, settings, 0.008, now=7.5).points
+    due = 0.008 + 0.25 * moving
+    assert point.time_from_start.to_sec() == pytest.approx(min(due, 0.04), abs=1e-6)
+    assert point.velocities == pytest.approx([0.4, -0.4] if due < 0.04 else [0.5, -0.5])
+
+
+def motion_from_rest(settings, with_lead):
+    """(positions [rad], speeds [rad/s]) that a trajectory controller of 1 kHz commands, one a millisecond, while the
+    first joint is steered from rest."""
+    driven = Driven(probot_model(), "manipulator", {}, command_out_type=TRAJECTORY,
+                    max_acceleration=settings.max_acceleration)
+    follower, still, commanded = Follower(driven.servo.joints), np.zeros(6), []
+    follower.start(0.0, still, still)
+    for number, step in enumerate(driven.go(Command(joints=np.array([SPEED, *5 * [0.0]])), 0.4)):
+        made = number * settings.publish_period
+        step = step if with_lead else step._replace(moving=np.inf)
+        message = message_of(step, step.position, driven.servo.joints, settings, settings.publish_period, made)
+        follower.accept(command_of(message), made, still)
+        for now in made + 0.001 * np.arange(1, 9):
+            follower.update(now, still, still)
+            commanded.append((follower.desired[0][0], follower.desired[1][0]))
+    return np.array(commanded).T
+
+
+def test_an_arm_moves_at_once_and_evenly_from_rest():
+    positions, speeds = motion_from_rest(probot(), True)
+    later, _ = motion_from_rest(probot(), False)
+    assert np.argmax(positions > BEGUN_RAD) < 20 <= np.argmax(later > BEGUN_RAD)
+    assert speeds.max() < 1.05 * SPEED and np.diff(speeds).max() < 0.025
 
 
 def test_a_trajectory_with_velocities():
