@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds controller managers in the ROS graph, and filters controllers by their properties."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 import rosgraph
 import rospy
 import rosservice
 
+from controller_manager_msgs.msg import ControllerState
 from controller_manager_msgs.srv import ListControllers
 
 _TYPES = {
@@ -16,7 +21,7 @@ _TYPES = {
 }
 
 
-def is_controller_manager(namespace):
+def is_controller_manager(namespace: str) -> bool:
     """Whether ``namespace`` has all services of a controller manager, of the right types, e.g.
     ``"/robot/controller_manager"``."""
     try:
@@ -26,7 +31,7 @@ def is_controller_manager(namespace):
         return False
 
 
-def get_controller_managers(namespace="/", initial_guess=None):
+def get_controller_managers(namespace: str = "/", initial_guess: Iterable[str] | None = None) -> list[str]:
     """Sorted list of the controller managers below ``namespace``. Entries of ``initial_guess``, an earlier result, that
     are still advertised are not checked again."""
     below = rosgraph.names.canonicalize_name(namespace).rstrip("/") + "/"
@@ -40,11 +45,11 @@ def get_controller_managers(namespace="/", initial_guess=None):
 class ControllerManagerLister:
     """Call it for the controller managers below a namespace; it remembers what it has found before."""
 
-    def __init__(self, namespace="/"):
+    def __init__(self, namespace: str = "/") -> None:
         self._namespace = namespace
         self._found = []
 
-    def __call__(self):
+    def __call__(self) -> list[str]:
         self._found = get_controller_managers(self._namespace, self._found)
         return self._found
 
@@ -52,36 +57,41 @@ class ControllerManagerLister:
 class ControllerLister:
     """Call it for the list of ``ControllerState`` of the controller manager in a namespace."""
 
-    def __init__(self, namespace="/controller_manager"):
+    def __init__(self, namespace: str = "/controller_manager") -> None:
         self._list = rospy.ServiceProxy(namespace.rstrip("/") + "/list_controllers", ListControllers)
 
-    def __call__(self):
+    def __call__(self) -> list[ControllerState]:
         return self._list().controller
 
 
-def filter_by_name(ctrl_list, ctrl_name, match_substring=False):
+def filter_by_name(ctrl_list: Iterable[ControllerState], ctrl_name: str,
+                   match_substring: bool = False) -> list[ControllerState]:
     """The controllers of that name, or with that text in their name."""
     return _filtered(ctrl_list, "name", ctrl_name, match_substring)
 
 
-def filter_by_type(ctrl_list, ctrl_type, match_substring=False):
+def filter_by_type(ctrl_list: Iterable[ControllerState], ctrl_type: str,
+                   match_substring: bool = False) -> list[ControllerState]:
     """The controllers of that type, or with that text in their type."""
     return _filtered(ctrl_list, "type", ctrl_type, match_substring)
 
 
-def filter_by_state(ctrl_list, ctrl_state, match_substring=False):
+def filter_by_state(ctrl_list: Iterable[ControllerState], ctrl_state: str,
+                    match_substring: bool = False) -> list[ControllerState]:
     """The controllers in that state."""
     return _filtered(ctrl_list, "state", ctrl_state, match_substring)
 
 
-def filter_by_hardware_interface(ctrl_list, hardware_interface, match_substring=False):
+def filter_by_hardware_interface(ctrl_list: Iterable[ControllerState], hardware_interface: str,
+                                 match_substring: bool = False) -> list[ControllerState]:
     """The controllers that use that hardware interface, e.g. "hardware_interface::PositionJointInterface"."""
     return [controller for controller in ctrl_list
             if any(_matches(claim.hardware_interface, hardware_interface, match_substring)
                    for claim in controller.claimed_resources)]
 
 
-def filter_by_resources(ctrl_list, resources, hardware_interface=None, match_any=False):
+def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterable[str],
+                        hardware_interface: str | None = None, match_any: bool = False) -> list[ControllerState]:
     """The controllers that claim all of ``resources`` (with ``match_any``: one of them), through that hardware
     interface if one is given."""
     wanted = set(resources)
@@ -94,7 +104,7 @@ def filter_by_resources(ctrl_list, resources, hardware_interface=None, match_any
     return found
 
 
-def get_rosparam_controller_names(namespace="/"):
+def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
     """Names on the parameter server below ``namespace`` that have a ``type``, as controllers do."""
     try:
         # Read from the master itself: rospy answers "/" from a cache that may be nearly empty.

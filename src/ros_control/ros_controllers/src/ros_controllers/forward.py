@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that pass a command on to the joints unchanged."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from std_msgs.msg import Float64, Float64MultiArray
 
 from controller_manager import EFFORT, POSITION, VELOCITY, Controller
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
 
 
 class ForwardController(Controller):
@@ -15,21 +23,21 @@ class ForwardController(Controller):
 
     interface = None
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self.joints = self._read_joints()
         self.index = self.claim(self.interface, self.joints)
         self._command = np.zeros(len(self.joints))
         self._subscription = context.subscription("command", self.msg_class)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._subscription.take()  # drop commands from before the start
         if self.interface == POSITION:
             self._command = self.hardware.position[self.index]
         else:
             self._command = np.zeros(len(self.joints))
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._subscription.handle(self._accept)
         self.hardware.command[self.interface][self.index] = self._command
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A vehicle that drives and steers all of its four wheels."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -45,12 +47,12 @@ class FourWheelSteeringController(VehicleController):
         self._moved = (0.0, 0.0, 0.0)  # as it is commanded: forwards, to the left [m/s], turn [rad/s]
         self._axle_commands = self.context.subscription("cmd_four_wheel_steering", FourWheelSteering)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._axle_commands.take()
         self._axles = None
         super().starting(time_s)
 
-    def stopping(self, time_s):
+    def stopping(self, time_s: float) -> None:
         self._axles = None
         super().stopping(time_s)
 

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A gripper of one joint that opens, closes, and detects that it holds something."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from control_msgs.msg import GripperCommandAction, GripperCommandResult
@@ -8,6 +11,10 @@ from control_msgs.msg import GripperCommandAction, GripperCommandResult
 from controller_manager import EFFORT, POSITION, Controller, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
 from loop_ros.action_server import ActionServer
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
 
 
 class GripperController(Controller):
@@ -21,7 +28,7 @@ class GripperController(Controller):
 
     interface = None
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self.joint = context.text("joint", "the name of the gripper's joint")
         self.index = self.claim(self.interface, [self.joint])
@@ -36,22 +43,22 @@ class GripperController(Controller):
         self._time_s = 0.0
         self._server = ActionServer(context, "gripper_cmd", GripperCommandAction, self._on_goal, self._on_cancel)
 
-    def idle(self, time_s):
+    def idle(self, time_s: float) -> None:
         self._time_s = time_s
         self._server.spin(time_s)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._running = True
         self._hold()
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._time_s = time_s
         self._server.spin(time_s)
         self._drive(dt)
         if self._goal is not None:
             self._watch(time_s)
 
-    def stopping(self, time_s):
+    def stopping(self, time_s: float) -> None:
         self._running = False
         self._end_goal("the controller was stopped")
 
@@ -114,13 +121,13 @@ class EffortGripperActionController(GripperController):
 
     interface = EFFORT
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         names = ["gains/" + self.joint]
         self._pid = Pid(Gains.from_params(context.entry, names))
         self._tuning = TunablePids.of_controller(context, self._pid, names)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         super().starting(time_s)
         self._pid.reset()
 

@@ -1,11 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishes the joints of the robot."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from sensor_msgs.msg import JointState
 
 from controller_manager import JOINT_STATE, Controller
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
 
 _COLUMNS = "position", "velocity", "effort"
 
@@ -17,7 +25,7 @@ class JointStateController(Controller):
     ``extra_joints``, a list of {name, position, velocity, effort} that never change, numbers default 0.
     """
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         rate = context.number("publish_rate", expected="the rate of /joint_states in Hz, e.g. 50")
         if rate <= 0.0:
@@ -34,12 +42,12 @@ class JointStateController(Controller):
         self._pace = Pace(rate) if rate > 0.0 else None
         self._publisher = context.publisher(context.in_root("joint_states"), JointState)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         # The first update publishes at once.
         if self._pace is not None:
             self._pace.restart()
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         if self._pace is None or not self._pace.take(time_s) or not self._publisher.has_listeners:
             return
         hardware, index = self.hardware, self._index

@@ -3,6 +3,9 @@
 
 The package ``joint_trajectory`` has the core; this module connects it with messages and joints.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -35,6 +38,10 @@ from loop_ros.action_server import ActionServer
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
 
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
+
 
 class JointTrajectoryController(Controller):
     """Follows trajectories of the joints in parameter ``joints``; base of the classes at the end of this file.
@@ -57,7 +64,7 @@ class JointTrajectoryController(Controller):
     Inside, times are the seconds for which the controller has run; they never run backwards.
     """
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self._joints = context.texts("joints", "a list of joint names")
         self._index = self.claim(self.interface, self._joints)
@@ -113,7 +120,7 @@ class JointTrajectoryController(Controller):
 
     # -- life -------------------------------------------------------------------------------------------------------
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._commands.take()  # drop commands from before the start
         self._time_s, self._uptime, self._began = time_s, 0.0, 0.0
         self._measure()
@@ -122,7 +129,7 @@ class JointTrajectoryController(Controller):
         self._start_adapter()
         self._runs = True
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._time_s, self._dt = time_s, dt
         self._uptime += dt
         self._measure()
@@ -137,10 +144,10 @@ class JointTrajectoryController(Controller):
         self._write(dt)
         self._publish(time_s)
 
-    def idle(self, time_s):
+    def idle(self, time_s: float) -> None:
         self._server.spin(time_s)
 
-    def stopping(self, time_s):
+    def stopping(self, time_s: float) -> None:
         self._runs = False
         if self._follower.goal is not None:
             goal = self._follower.goal

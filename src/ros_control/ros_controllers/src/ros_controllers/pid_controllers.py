@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that hold a position or a velocity with a PID whose output is an effort or a velocity."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from control_msgs.msg import JointControllerState
@@ -9,6 +12,10 @@ from std_msgs.msg import Float64, Float64MultiArray
 from controller_manager import EFFORT, VELOCITY, Controller, ControllerError, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
 from sim_time.stamps import stamp
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
 
 # A state message goes out with every tenth update.
 STATE_EVERY = 10
@@ -24,7 +31,7 @@ class PidController(Controller):
 
     interface = EFFORT
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self.joints, gain_names = self._read_joints()
         self.index = self.claim(self.interface, self.joints)
@@ -34,12 +41,12 @@ class PidController(Controller):
         self._command = np.zeros(len(self.joints))
         self._subscription = context.subscription("command", self.msg_class)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._subscription.take()  # drop commands from before the start
         self._command = self._limited(self._start_command())
         self.pid.reset()
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._subscription.handle(self._accept)
         error = self._error()
         output = self.pid.update(error, dt)
@@ -70,7 +77,7 @@ class _Single:
 
     msg_class = Float64
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self._updates = 0
         self._publisher = context.publisher("state", JointControllerState)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that publish the measurements of the robot's sensors."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from geometry_msgs.msg import Quaternion, Vector3, Wrench, WrenchStamped
 from sensor_msgs.msg import Imu
 
@@ -7,6 +11,12 @@ from controller_manager import Controller, ControllerError
 from controller_manager.interfaces import FORCE_TORQUE_SENSOR, IMU_SENSOR
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
 
 
 class _SensorController(Controller):
@@ -17,7 +27,7 @@ class _SensorController(Controller):
 
     interface = message_class = None
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         rate = context.number("publish_rate", expected="the rate of the sensors' topics in Hz, e.g. 50")
         if rate <= 0.0:
@@ -32,10 +42,10 @@ class _SensorController(Controller):
         self._sensors = [(sensor, context.publisher(context.in_root(sensor_name), self.message_class))
                          for sensor_name, sensor in sensors.items()]
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._pace.restart()
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         # Read at each tick: a sensor computes differences between ticks.
         readings = [(sensor.read(), sensor, publisher) for sensor, publisher in self._sensors
                     if publisher.has_listeners]
@@ -46,7 +56,7 @@ class _SensorController(Controller):
                 message.header.stamp, message.header.frame_id = stamp(time_s), sensor.frame
                 publisher.publish(message)
 
-    def message(self, values):
+    def message(self, values: tuple[np.ndarray, ...]) -> Imu | WrenchStamped:
         """The message of a measurement."""
         raise NotImplementedError
 
@@ -56,7 +66,7 @@ class ImuSensorController(_SensorController):
 
     interface, message_class = IMU_SENSOR, Imu
 
-    def message(self, values):
+    def message(self, values: tuple[np.ndarray, ...]) -> Imu:
         turned, rate, felt = values
         return Imu(orientation=Quaternion(*turned), angular_velocity=Vector3(*rate), linear_acceleration=Vector3(*felt))
 
@@ -66,6 +76,6 @@ class ForceTorqueSensorController(_SensorController):
 
     interface, message_class = FORCE_TORQUE_SENSOR, WrenchStamped
 
-    def message(self, values):
+    def message(self, values: tuple[np.ndarray, ...]) -> WrenchStamped:
         force, torque = values
         return WrenchStamped(wrench=Wrench(Vector3(*force), Vector3(*torque)))

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Limits of a commanded speed: velocity, acceleration and jerk. ROS-free."""
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from controller_manager import ControllerError
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
 
 _KINDS = ("velocity", "acceleration", "jerk")
 
@@ -13,11 +19,11 @@ class SpeedLimits:
     """Bounds of one direction, (least, greatest) each: velocity [m/s or rad/s], acceleration, jerk; infinite where
     there is none."""
 
-    velocity: tuple = (-math.inf, math.inf)
-    acceleration: tuple = (-math.inf, math.inf)
-    jerk: tuple = (-math.inf, math.inf)
+    velocity: tuple[float, float] = (-math.inf, math.inf)
+    acceleration: tuple[float, float] = (-math.inf, math.inf)
+    jerk: tuple[float, float] = (-math.inf, math.inf)
 
-    def limit(self, wanted, last, before, dt):
+    def limit(self, wanted: float, last: float, before: float, dt: float) -> float:
         """The command ``wanted``, limited; ``last`` and ``before`` are the commands one and two ticks ago.
 
         Jerk is bounded first, then acceleration, then velocity; so the velocity limit always holds.
@@ -34,7 +40,7 @@ def _clip(value, low, high):
     return min(max(value, low), high)
 
 
-def read_speed_limits(context, direction):
+def read_speed_limits(context: ControllerContext, direction: str) -> SpeedLimits:
     """The :class:`SpeedLimits` below a controller's parameter ``direction`` ("linear/x", "angular/z").
 
     ``has_velocity_limits``, ``max_velocity``, ``min_velocity`` (default the negative of the greatest), and the same for

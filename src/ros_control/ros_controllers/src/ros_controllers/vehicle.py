@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Base of vehicle controllers: the command and its time-out, limits, odometry and tf."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, TransformStamped, Twist, TwistStamped
@@ -15,6 +18,10 @@ from sim_time.pace import Pace
 from sim_time.stamps import stamp
 from urdf_model import Cylinder, Sphere
 
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
+
 
 class VehicleController(Controller):
     """Base of the controllers below. Subscribes to geometry_msgs/Twist on ``cmd_vel``, of which x [m/s] and the
@@ -28,7 +35,7 @@ class VehicleController(Controller):
     are a stop), and the limits below ``linear/x`` and ``angular/z``, see :mod:`.speed_limits`.
     """
 
-    def __init__(self, name, hardware, context):
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self._pace = Pace(self._positive("publish_rate", 50.0, "Hz"))
         self._timeout_s = self._positive("cmd_vel_timeout", 0.5, "s")
@@ -76,17 +83,17 @@ class VehicleController(Controller):
 
     # -- the loop ----------------------------------------------------------------------------------------------------
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._commands.take()
         self._halt(time_s)
         self._odometry.rest()
         self._pace.restart()
         self._note_wheels()
 
-    def stopping(self, time_s):
+    def stopping(self, time_s: float) -> None:
         self._drive(0.0, 0.0)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         driven, commanded = self._driven(), self._commanded(dt)
         if dt > 0.0:
             distance, turn, *sideways = commanded if self._open_loop else driven

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pose of a vehicle from the rotation of its wheels. ROS-free."""
+from __future__ import annotations
+
 import math
 from collections import deque
 
@@ -14,19 +16,19 @@ class WheelOdometry:
     Attributes: ``x``, ``y``, ``heading``, ``linear``, ``lateral``, ``angular``.
     """
 
-    def __init__(self, window=10):
+    def __init__(self, window: int = 10) -> None:
         """``window``: number of ticks in the average of the speeds."""
         self.x = self.y = self.heading = 0.0
         self._linears, self._laterals, self._angulars = (deque(maxlen=window) for _ in range(3))
         self.rest()
 
-    def rest(self):
+    def rest(self) -> None:
         """The vehicle rests."""
         self.linear = self.lateral = self.angular = 0.0
         for speeds in (self._linears, self._laterals, self._angulars):
             speeds.clear()
 
-    def move(self, distance, turn, dt, sideways=0.0):
+    def move(self, distance: float, turn: float, dt: float, sideways: float = 0.0) -> None:
         """The vehicle has gone ``distance`` [m] forwards and ``sideways`` [m] to its left while it turned by ``turn``
         [rad], in ``dt`` [s].
 
