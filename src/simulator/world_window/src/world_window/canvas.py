@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The widget with the picture: shows frames, and passes mouse and wheel on."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from PyQt5.QtCore import QPointF, Qt
 from PyQt5.QtGui import QColor, QFont, QImage, QPainter, QPen
 from PyQt5.QtWidgets import QWidget
 
 from world_window import overlay
 from world_window.stage import LEFT, MIDDLE, RIGHT
+
+if TYPE_CHECKING:
+    import numpy as np
+    from PyQt5.QtGui import QMouseEvent, QPaintEvent, QResizeEvent, QWheelEvent
+
+    from world_window.window import CanvasEvents
 
 _BUTTONS = {Qt.LeftButton: LEFT, Qt.MiddleButton: MIDDLE, Qt.RightButton: RIGHT}
 _SKY = QColor(158, 178, 204)
@@ -16,7 +27,7 @@ class Canvas(QWidget):
     """``events``: has ``press``, ``move``, ``release``, ``wheel`` and ``resize`` with the arguments of
     :class:`world_window.stage.Stage`'s."""
 
-    def __init__(self, events, parent=None):
+    def __init__(self, events: CanvasEvents, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._events = events
         self._image = None
@@ -28,7 +39,7 @@ class Canvas(QWidget):
         self.setAttribute(Qt.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 150)
 
-    def show_frame(self, pixels, shapes):
+    def show_frame(self, pixels: np.ndarray, shapes: Sequence[overlay.Shape]) -> None:
         """Show ``pixels`` (height, width, 3) with ``shapes`` of :mod:`world_window.overlay` over them."""
         height, width = pixels.shape[:2]
         self._shapes = shapes
@@ -37,12 +48,12 @@ class Canvas(QWidget):
             QImage.Format_RGB32)
         self.update()
 
-    def show_nothing(self, words):
+    def show_nothing(self, words: str) -> None:
         """Show ``words`` instead of a picture."""
         self._image, self.words = None, words
         self.update()
 
-    def paintEvent(self, event):
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         if self._image is None:
             painter.fillRect(self.rect(), _SKY)
@@ -58,25 +69,25 @@ class Canvas(QWidget):
         for shape in self._shapes:
             _paint(painter, shape)
 
-    def resizeEvent(self, event):
+    def resizeEvent(self, event: QResizeEvent) -> None:
         self._events.resize(event.size().width(), event.size().height())
 
-    def mousePressEvent(self, event):
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         button = _BUTTONS.get(event.button())
         if button is not None:
             keys = event.modifiers()
             self._events.press(button, event.x(), event.y(), bool(keys & Qt.ShiftModifier),
                                bool(keys & Qt.ControlModifier))
 
-    def mouseMoveEvent(self, event):
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self._events.move(event.x(), event.y())
 
-    def mouseReleaseEvent(self, event):
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         button = _BUTTONS.get(event.button())
         if button is not None:
             self._events.release(button, event.x(), event.y())
 
-    def wheelEvent(self, event):
+    def wheelEvent(self, event: QWheelEvent) -> None:
         steps = event.angleDelta().y() / _PER_NOTCH
         if steps:
             self._events.wheel(steps, event.x(), event.y())

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node of the window, ``/gazebo_gui``."""
+from __future__ import annotations
+
 import os
 import signal
 import subprocess
@@ -25,7 +27,7 @@ _ALONE_S = 5.0
 _ASK_MASTER_S = 1.0
 
 
-def main():
+def main() -> int:
     """Show the world until the user closes the window; returns the exit code.
 
     Without a screen it prints one line and returns 0: the lab goes on without a window. With ``_offscreen:=true`` on

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The body under a pixel: the ray through it, and the first thing that it hits. ROS-free."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from sensor_renderer.mirror import Mirror
+    from sensor_renderer.pinhole import Pinhole
 
 _PARALLEL = 1e-12
 
@@ -17,7 +23,7 @@ class Hit(NamedTuple):
     distance: float
 
 
-def ray(pinhole, pose, x, y):
+def ray(pinhole: Pinhole, pose: np.ndarray, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
     """(origin (3,), unit direction (3,)) in the world of the ray through the pixel ``x``, ``y`` of a camera whose
     optical frame is at ``pose`` (4, 4)."""
     local = np.array([(x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy, 1.0])
@@ -25,7 +31,7 @@ def ray(pinhole, pose, x, y):
     return pose[:3, 3].copy(), direction / np.linalg.norm(direction)
 
 
-def first_hit(mirror, origin, direction):
+def first_hit(mirror: Mirror, origin: np.ndarray, direction: np.ndarray) -> Hit | None:
     """The :class:`Hit` of a ray with the triangles of a :class:`sensor_renderer.mirror.Mirror`; None if there is none.
     """
     nearest = None
@@ -42,7 +48,7 @@ def first_hit(mirror, origin, direction):
     return nearest
 
 
-def on_plane(origin, direction, point, normal):
+def on_plane(origin: np.ndarray, direction: np.ndarray, point: np.ndarray, normal: np.ndarray) -> np.ndarray | None:
     """Where a ray meets the plane through ``point`` (3,) with ``normal`` (3,); None if it does not."""
     slope = float(direction @ normal)
     distance = float((point - origin) @ normal) / slope if abs(slope) > _PARALLEL else -1.0

@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The window's pictures as a topic, for browsers and recordings."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import rospy
 from sensor_msgs.msg import Image
+
+if TYPE_CHECKING:
+    from world_window.viewer import Frame
 
 
 class PictureTopic:
     """``~image``: the newest picture, without what is drawn over it. A late subscriber gets it at once."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._publisher = rospy.Publisher("~image", Image, queue_size=1, latch=True)
 
     @property
-    def has_listeners(self):
+    def has_listeners(self) -> bool:
         """Whether a program subscribes."""
         return self._publisher.get_num_connections() > 0
 
-    def take(self, frame):
+    def take(self, frame: Frame) -> None:
         """Publish a :class:`world_window.viewer.Frame`, if it has a new picture."""
         if frame.pixels is None or frame.clock is None:
             return

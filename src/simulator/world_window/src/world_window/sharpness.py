@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How many pixels a picture gets where drawing is slow: motion is worth more than sharpness. ROS-free."""
+from __future__ import annotations
 
 #: Sizes of a picture, as shares of the window's width and height.
 SCALES = (1.0, 0.75, 0.5, 0.375, 0.25)
@@ -16,11 +17,11 @@ _ROOM = 0.8
 class Sharpness:
     """``scale``: the share of the window's width and height to draw at."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.scale = SCALES[0]
         self._slow = self._quick = 0
 
-    def take(self, spent_s, pixels):
+    def take(self, spent_s: float, pixels: int) -> None:
         """A picture of the present size took ``spent_s`` [s, wall]; the window has so many ``pixels``."""
         allowed = [scale for scale in SCALES if scale >= 0.5 or scale ** 2 * pixels >= MIN_PIXELS]
         place = min(SCALES.index(self.scale), len(allowed) - 1)

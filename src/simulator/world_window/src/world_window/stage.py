@@ -5,7 +5,9 @@ The mouse moves the eye as in Gazebo's window: the left button pans, the middle 
 about the point under the pointer, the wheel and the right button zoom. With control, or with the tool "pull", the left
 button pulls the thing under the pointer by a spring.
 """
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,12 @@ from sensor_renderer.viewpoint import extent, overview
 from world_window import picking
 from world_window.eye import Eye
 from world_window.overlay import Overlay, bounds_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from sensor_renderer.mirror import Mirror
+    from world_window.overlay import Contact, Shape
 
 LEFT, MIDDLE, RIGHT = "left", "middle", "right"
 #: What may be drawn over the picture.
@@ -45,14 +53,14 @@ class Pull(NamedTuple):
 class _Gesture(NamedTuple):
     kind: str
     button: str
-    start: tuple
+    start: tuple[float, float]
     point: np.ndarray  # under the pointer at the press
 
 
 class Stage:
     """The eye, the selection, a pull, and the layers; ``version`` counts changes of the picture that they cause."""
 
-    def __init__(self, width=1000, height=700):
+    def __init__(self, width: int = 1000, height: int = 700) -> None:
         """``width``, ``height`` of the picture [pixels]."""
         self.version = 0
         self.eye = FIRST_EYE
@@ -74,17 +82,17 @@ class Stage:
 
     # -- the picture ----------------------------------------------------------------------------------------------
 
-    def resize(self, width, height):
+    def resize(self, width: int, height: int) -> None:
         """The picture has another size [pixels]."""
         self.pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, _NEAR_M, _FAR_M)
         self.version += 1
 
-    def smaller_pinhole(self, scale):
+    def smaller_pinhole(self, scale: float) -> Pinhole:
         """The same view in a picture of ``scale`` times the width and height."""
         width, height = (max(round(scale * size), 1) for size in self.pinhole[:2])
         return Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, _NEAR_M, _FAR_M)
 
-    def take(self, mirror, has_new_scene):
+    def take(self, mirror: Mirror, has_new_scene: bool) -> None:
         """The world has moved, or is another one; call it after each change of the mirror."""
         self._mirror = mirror
         if has_new_scene:
@@ -93,7 +101,7 @@ class Stage:
                 self._fit()
         self._follow()
 
-    def shapes(self):
+    def shapes(self) -> list[Shape]:
         """The shapes to draw over the picture, :mod:`world_window.overlay`'s shapes."""
         overlay = Overlay(self.pinhole, self.eye.pose())
         if self._mirror is None:
@@ -117,7 +125,7 @@ class Stage:
                 overlay.spring(matrix[:3, :3] @ self.pull.grip + matrix[:3, 3], self.pull.target)
         return overlay.shapes
 
-    def link_pose(self, model, link):
+    def link_pose(self, model: str, link: str) -> np.ndarray | None:
         """Pose (4, 4) of a link, of the model's root for ""; None if it is gone."""
         body = self._mirror.bodies.get(model) if self._mirror is not None else None
         if body is None or (link and link not in body.link_names):
@@ -126,7 +134,7 @@ class Stage:
 
     # -- mouse and wheel ------------------------------------------------------------------------------------------
 
-    def press(self, button, x, y, shift=False, control=False):
+    def press(self, button: str, x: float, y: float, shift: bool = False, control: bool = False) -> None:
         """A button goes down at ``x``, ``y`` [pixels]."""
         if self._gesture is not None:
             return
@@ -143,7 +151,7 @@ class Stage:
             self.version += 1
         self._gesture = _Gesture(kind, button, (x, y), point)
 
-    def move(self, x, y):
+    def move(self, x: float, y: float) -> None:
         """The pointer is at ``x``, ``y`` [pixels] now."""
         if self._gesture is None:
             return
@@ -164,7 +172,7 @@ class Stage:
         else:
             self._look(self.eye.zoomed(point, _ZOOM_PER_PX ** -down))
 
-    def release(self, button, x, y):
+    def release(self, button: str, x: float, y: float) -> picking.Hit | None:
         """A button goes up. Returns the :class:`picking.Hit` under a click, None for a drag or for nothing."""
         gesture = self._gesture
         if gesture is None or gesture.button != button:
@@ -181,7 +189,7 @@ class Stage:
             self.select(*((hit.model, hit.link) if self._is_thing(hit) else (None, "")))
         return hit
 
-    def wheel(self, steps, x, y):
+    def wheel(self, steps: float, x: float, y: float) -> None:
         """The wheel turns by ``steps``, forwards positive: nearer to what is under the pointer. During a pull: the
         thing goes away from the eye or comes nearer."""
         if self.pull:
@@ -191,7 +199,7 @@ class Stage:
             return
         self._look(self.eye.zoomed(self._under(x, y)[1], _ZOOM_PER_STEP ** steps))
 
-    def let_go(self):
+    def let_go(self) -> None:
         """End a pull."""
         self.pull = None
         if self._gesture is not None and self._gesture.kind == "pull":
@@ -200,17 +208,17 @@ class Stage:
 
     # -- keys and buttons -----------------------------------------------------------------------------------------
 
-    def select(self, model, link=""):
+    def select(self, model: str | None, link: str = "") -> None:
         """Select a link of a model, a whole model, or, with None, nothing."""
         self.selected = (model, link) if model else None
         self.version += 1
 
-    def follow(self, target):
+    def follow(self, target: tuple[str, str] | None) -> None:
         """Let the eye move along with ``target``, (model, link), or with nothing for None."""
         self.followed, self._followed_at = target, None
         self._follow()
 
-    def go_to_selected(self):
+    def go_to_selected(self) -> None:
         """Look at the selected thing from nearby, in the present direction."""
         place = self.selected and self._centre(*self.selected)
         if place is not None:
@@ -218,18 +226,18 @@ class Stage:
             ahead = self.eye.rotation()[:, 2]
             self._look(self.eye.at(centre - ahead * max(3.0 * radius, 0.3)))
 
-    def home(self):
+    def home(self) -> None:
         """Look at the whole world again, or, if it is empty, from where Gazebo's camera is."""
         self._moved_by_user = False
         self.followed = None
         self._fit()
 
-    def show(self, layer, on):
+    def show(self, layer: str, on: bool) -> None:
         """Draw one of :data:`LAYERS`, or do not."""
         self.layers[layer] = on
         self.version += 1
 
-    def take_contacts(self, contacts):
+    def take_contacts(self, contacts: Sequence[Contact]) -> None:
         """The present contacts, a list of :class:`world_window.overlay.Contact`; shown by the layer "contacts"."""
         self._contacts = contacts
         self.version += self.layers["contacts"]

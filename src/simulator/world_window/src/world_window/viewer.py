@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The thread that draws: follows a simulator's snapshot, across its restarts, and hands pictures over. ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import queue
 import threading
 import time
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +17,14 @@ from world_picture.snapshot import SnapshotError
 from world_window.clock import Clock
 from world_window.sharpness import Sharpness
 from world_window.stage import Stage
+
+if TYPE_CHECKING:
+    import os
+
+    from sensor_renderer.gl_renderer import GlRenderer
+    from sensor_renderer.tiny_renderer import TinyRenderer
+    from world_window.overlay import Shape
+    from world_window.stage import Pull
 
 #: At most so many pictures a second; where drawing takes longer, it takes at most this share of the time.
 MAX_RATE, DRAWING_SHARE = 30.0, 0.8
@@ -30,19 +41,21 @@ class Frame(NamedTuple):
     ``clock``: (simulated time [s], paused, real-time factor or None), None without a simulator; ``models``: {name: its
     links}; ``selected``, ``followed``: (model, link) or None; ``rate`` [pictures/s]."""
 
-    pixels: np.ndarray
-    shapes: list
-    clock: tuple
-    models: dict
-    selected: tuple
-    followed: tuple
+    pixels: np.ndarray | None
+    shapes: list[Shape]
+    clock: tuple[float, bool, float | None] | None
+    models: dict[str, list[str]]
+    selected: tuple[str, str] | None
+    followed: tuple[str, str] | None
     rate: float
 
 
 class Viewer(threading.Thread):
     """Draws until :meth:`end`. Work for its thread comes through :meth:`post`."""
 
-    def __init__(self, find_folder, make_renderer, on_frame, pull, warn):
+    def __init__(self, find_folder: Callable[[], str | os.PathLike[str] | None],
+                 make_renderer: Callable[[], GlRenderer | TinyRenderer], on_frame: Callable[[Frame], object],
+                 pull: Callable[[Pull | None], object], warn: Callable[[str], object]) -> None:
         """``find_folder()``: the folder of the simulator's snapshot, or None; ``make_renderer()``: as
         :func:`sensor_renderer.best.best_renderer`'s; ``on_frame(frame)`` gets each :class:`Frame`; ``pull(pull)``: the
         simulator's spring, a :class:`world_window.stage.Pull` or None for its end; ``warn(text)``. All are called in
@@ -62,22 +75,22 @@ class Viewer(threading.Thread):
         self._drawn_at = []
         self._pull_told = None, 0.0
 
-    def post(self, function, *arguments):
+    def post(self, function: Callable[..., object], *arguments: Any) -> None:
         """Any thread: call ``function(stage, *arguments)`` in the viewer's thread."""
         self._work.put((function, arguments))
 
-    def set_visible(self, visible):
+    def set_visible(self, visible: bool) -> None:
         """Any thread: whether the pictures are visible; none are drawn otherwise."""
         self.post(lambda _: setattr(self, "_visible", visible))
 
-    def end(self):
+    def end(self) -> None:
         """Any thread: stop, and wait for it."""
         self._ending.set()
         self.post(lambda _: None)
         if self is not threading.current_thread() and self.is_alive():
             self.join(5.0)
 
-    def run(self):
+    def run(self) -> None:
         """The thread's loop."""
         next_at = seek_at = 0.0
         while not self._ending.is_set():

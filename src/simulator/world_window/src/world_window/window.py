@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The window: the canvas, its buttons and keys, the list of models, the status line."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 from PyQt5.QtCore import QPoint, Qt, pyqtSignal
 from PyQt5.QtGui import QKeySequence
 from PyQt5.QtWidgets import (
@@ -19,6 +24,12 @@ from PyQt5.QtWidgets import (
 from world_window.canvas import Canvas
 from world_window.simulator import MAX_STEPS
 from world_window.stage import RIGHT, Stage
+
+if TYPE_CHECKING:
+    from PyQt5.QtCore import QEvent
+
+    from world_window.simulator import Simulator
+    from world_window.viewer import Frame, Viewer
 
 _MESSAGE_MS = 8000
 HELP = """<table cellspacing="4">
@@ -42,25 +53,25 @@ HELP = """<table cellspacing="4">
 </table>"""
 
 
-class _Events:
+class CanvasEvents:
     """The canvas' events, for the viewer's thread."""
 
-    def __init__(self, viewer, on_menu):
+    def __init__(self, viewer: Viewer, on_menu: Callable[[str, str, int, int], object]) -> None:
         self._post, self._on_menu = viewer.post, on_menu
 
-    def resize(self, width, height):
+    def resize(self, width: int, height: int) -> None:
         self._post(Stage.resize, width, height)
 
-    def press(self, button, x, y, shift, control):
+    def press(self, button: str, x: int, y: int, shift: bool, control: bool) -> None:
         self._post(Stage.press, button, x, y, shift, control)
 
-    def move(self, x, y):
+    def move(self, x: int, y: int) -> None:
         self._post(Stage.move, x, y)
 
-    def wheel(self, steps, x, y):
+    def wheel(self, steps: float, x: int, y: int) -> None:
         self._post(Stage.wheel, steps, x, y)
 
-    def release(self, button, x, y):
+    def release(self, button: str, x: int, y: int) -> None:
         self._post(self._release, button, x, y)
 
     def _release(self, stage, button, x, y):
@@ -77,7 +88,7 @@ class Window(QMainWindow):
     _menu_wanted = pyqtSignal(str, str, int, int)
     _viewer = None  # Qt sends events before the window is built
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Gazebo")
         self._simulator = None
@@ -87,10 +98,10 @@ class Window(QMainWindow):
         self._told.connect(lambda text: self.statusBar().showMessage(text, _MESSAGE_MS))
         self._menu_wanted.connect(self._open_menu)
 
-    def build(self, viewer, simulator):
+    def build(self, viewer: Viewer, simulator: Simulator) -> None:
         """Fill the window."""
         self._viewer, self._simulator = viewer, simulator
-        self.canvas = Canvas(_Events(viewer, self._menu_wanted.emit), self)
+        self.canvas = Canvas(CanvasEvents(viewer, self._menu_wanted.emit), self)
         self.setCentralWidget(self.canvas)
         self._add_buttons()
         self._add_list()
@@ -101,7 +112,7 @@ class Window(QMainWindow):
 
     # -- any thread -----------------------------------------------------------------------------------------------
 
-    def frame(self, frame):
+    def frame(self, frame: Frame) -> None:
         """The viewer has a new frame."""
         before, self._waiting = self._waiting, frame
         if before is not None and frame.pixels is None:
@@ -109,7 +120,7 @@ class Window(QMainWindow):
         if before is None:
             self._frame_came.emit()
 
-    def tell(self, text):
+    def tell(self, text: str) -> None:
         """Show a line of text in the status line for some seconds."""
         self._told.emit(text)
 
@@ -260,7 +271,7 @@ class Window(QMainWindow):
             menu.addAction(action)
         menu.popup(self.canvas.mapToGlobal(QPoint(x, y)))
 
-    def changeEvent(self, event):
+    def changeEvent(self, event: QEvent) -> None:
         if self._viewer is not None:
             self._viewer.set_visible(not self.isMinimized())
         super().changeEvent(event)
