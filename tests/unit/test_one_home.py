@@ -17,8 +17,10 @@ pytestmark = pytest.mark.tree
 HOME = "src/baxter/baxter_common/baxter_model/"
 LIBRARY = "src/courses/baxter_traj_streamer/src/cpp/baxter_traj_streamer.cpp"
 IK_LAUNCH = "src/baxter/baxter_simulator/baxter_sim_kinematics/launch/baxter_sim_kinematics.launch"
+#: A plugin for a Python without ROS; test_lerobot_plugins.py compares it.
+WIRE = "src/lab/demonstrations/lerobot_plugins/lerobot_robot_baxter/lerobot_robot_baxter/wire.py"
 #: They cannot import the package; tests below compare their content.
-COPIES = (LIBRARY, IK_LAUNCH)
+COPIES = (LIBRARY, IK_LAUNCH, WIRE)
 #: Written out for readers; pages are prose.
 FOR_READERS = ("src/courses/rf_checks/exercises/", ".md", ".rst", ".ipynb", ".svg")
 #: Files about the physical robot's own data.

@@ -14,7 +14,7 @@ from bullet_sim.quiet_pybullet import pybullet
 from urdf_model.transforms import pose_matrix
 
 #: Bullet multiplies both frictions of a contact; more than 1 would make it greater than either.
-_MOST_FRICTION = 1.0
+_MAX_FRICTION = 1.0
 #: Of the curve between levels and light of a picture, IEC 61966-2-1.
 _GAMMA = 2.4
 
@@ -83,7 +83,7 @@ class Randomiser:
                 if self._much.friction:
                     usual = 1.0 if surface is None or surface.friction is None else surface.friction
                     pybullet.changeDynamics(*model.parts.places[model._link_index[body]],
-                                            lateralFriction=min(friction * usual, max(usual, _MOST_FRICTION)),
+                                            lateralFriction=min(friction * usual, max(usual, _MAX_FRICTION)),
                                             physicsClientId=self._lab.world._client)
         self.drawn = drawn
 

@@ -15,6 +15,8 @@ from .environment import core_of, expert_of, record, schema_of
 from .frames import DemonstrationError, Episode
 from .writing import SetWriter
 
+#: Actions a second.
+RATE_HZ = 20
 #: An episode of an expert takes less than this [s of wall time].
 _EPISODE_S = 300.0
 
@@ -22,7 +24,7 @@ _EPISODE_S = 300.0
 class Demonstrate(Job):
     """An episode of the expert of a task, for lab_batch. noise: as for `record`."""
 
-    def __init__(self, task: str = "Reach", noise: float = 0.0, control_freq: int = 20):
+    def __init__(self, task: str = "Reach", noise: float = 0.0, control_freq: int = RATE_HZ):
         self._task, self._noise, self._rate = task, noise, control_freq
 
     def start(self) -> None:
@@ -52,16 +54,19 @@ class Collected(NamedTuple):
     frames: int
 
 
-def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1, rate_hz: int = 20,
+def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1,
             say: Callable[[str], None] = lambda text: None, spec: Spec | None = None) -> Collected:
     """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
-    with the results of `Demonstrate` and with the expert's own actions. Raises DemonstrationError, JobError, the first
-    where the set has no episode then."""
+    with the parameters and results of `Demonstrate`, and with the expert's own actions. Raises DemonstrationError,
+    JobError, the first where the set has no episode then."""
     seeds = list(seeds)
-    core = core_of(task, control_freq=rate_hz)
+    with_expert = noise > 0.0 or spec is not None
+    spec = spec or Spec("%s:%s" % (__name__, Demonstrate.__name__),
+                        {"task": task, "noise": noise, "control_freq": RATE_HZ})
+    core = core_of(task, control_freq=spec.parameters["control_freq"])
     try:
         expert_of(core)
-        schema = schema_of(core, noise > 0.0 or spec is not None)
+        schema = schema_of(core, with_expert)
     finally:
         core.close()
     kept = failed = frames = 0
@@ -70,9 +75,7 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
     with SetWriter(folder, schema) as writer:
         order = iter(seeds)
         following = next(order, None)
-        usual = Spec("%s:%s" % (__name__, Demonstrate.__name__),
-                     {"task": task, "noise": noise, "control_freq": rate_hz})
-        for outcome in map_seeds(spec or usual, seeds, limits):
+        for outcome in map_seeds(spec, seeds, limits):
             if outcome.error:
                 say("seed %d: %s" % (outcome.seed, outcome.error))
             waiting[outcome.seed] = outcome.result if outcome.is_done else None
@@ -91,10 +94,10 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
 
 
 def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...], size: int, noise: float = 0.0,
-         rate_hz: int = 20, say: Callable[[str], None] = lambda text: None) -> Collected:
+         say: Callable[[str], None] = lambda text: None) -> Collected:
     """As `collect`, in this process, with pictures (size, size) of cameras of gym_baxter. Raises DemonstrationError."""
     seeds = list(seeds)
-    core = core_of(task, cameras=cameras, size=size, control_freq=rate_hz)
+    core = core_of(task, cameras=cameras, size=size, control_freq=RATE_HZ)
     kept = frames = 0
     try:
         expert = expert_of(core)

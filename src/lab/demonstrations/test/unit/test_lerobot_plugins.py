@@ -20,6 +20,8 @@ from lerobot_robot_baxter import Baxter, BaxterConfig, cameras, wire  # noqa: E4
 from lerobot_robot_baxter.rosbridge import Bridge, BridgeError  # noqa: E402
 from lerobot_teleoperator_baxter import BaxterTeleop, BaxterTeleopConfig  # noqa: E402
 
+from baxter_model import SIDES, joint_names  # noqa: E402
+from demonstrations.watching import NAMED  # noqa: E402
 from gym_baxter.core import Choices, Core  # noqa: E402
 
 ANGLES = dict(zip((name for side in wire.SIDES for name in wire.JOINTS[side]), np.linspace(-0.6, 0.6, 14), strict=True))
@@ -121,6 +123,11 @@ def there(**changed):
     """The action that keeps the robot where it is."""
     found = {"%s.pos" % name: angle for name, angle in ANGLES.items()}
     return {**found, "left_gripper.pos": 40.0, "right_gripper.pos": 40.0, **changed}
+
+
+def test_numbers_have_the_names_and_the_order_of_the_recorders():
+    assert tuple(name for name, _ in NAMED) == wire.NUMBERS and wire.SIDES == SIDES
+    assert {side: tuple(joint_names(side)) for side in SIDES} == wire.JOINTS
 
 
 def test_what_is_observed_has_the_names_and_values_of_the_features(robot):

@@ -29,7 +29,7 @@ from .policy import PolicyError, load
 from .training import Curve, TrainingSettings, train
 
 #: Seeds of demonstrations and of corrections begin here: those of the evaluation are below.
-FIRST_DEMONSTRATION, FIRST_CORRECTION, MOST_CORRECTIONS = 100_000, 10_000_000, 100_000
+FIRST_DEMONSTRATION, FIRST_CORRECTION, MAX_CORRECTIONS = 100_000, 10_000_000, 100_000
 DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 2, 50, 100, 1.0
 POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
 #: How much differs with --randomised.
@@ -53,7 +53,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--rounds", type=number(int, 0, 100), default=ROUNDS, metavar="N",
                         help="of corrections: the policy acts, and the expert says what it would have done; not with "
                              "--data (default %(default)s)")
-    parser.add_argument("--corrections", type=number(int, 1, MOST_CORRECTIONS), default=CORRECTIONS, metavar="N",
+    parser.add_argument("--corrections", type=number(int, 1, MAX_CORRECTIONS), default=CORRECTIONS, metavar="N",
                         help="episodes of a round (default %(default)s)")
     parser.add_argument("--steps", type=number(int, 1, 10**8), default=TrainingSettings.steps, metavar="N",
                         help="of training (default %(default)s)")
@@ -129,8 +129,8 @@ def learn(options: argparse.Namespace, folder: Path) -> Path:
     if options.data is None:
         _demonstrate(options, source)
         for round_ in range(options.rounds):
-            first = FIRST_CORRECTION + round_ * MOST_CORRECTIONS
-            if not _tried(source, first, first + MOST_CORRECTIONS):
+            first = FIRST_CORRECTION + round_ * MAX_CORRECTIONS
+            if not _tried(source, first, first + MAX_CORRECTIONS):
                 _train(options, source, folder / STUDENT, max(options.steps // 2, 1))
                 seeds = range(first, first + options.corrections)
                 _told(correct(folder / STUDENT, source, seeds, options.workers, _say), "corrections", options.task)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from demonstrations.collecting import Collected, Demonstrate, collect
+from demonstrations.collecting import RATE_HZ, Collected, Demonstrate, collect
 from demonstrations.environment import record
 from demonstrations.frames import Episode
 from lab_batch import Spec
@@ -17,7 +17,7 @@ from .policy import Runner, load
 class Correct(Demonstrate):
     """An episode that a policy begins and the expert ends, for lab_batch. policy: its file."""
 
-    def __init__(self, task: str = "Reach", policy: str = "policy.npz", control_freq: int = 20):
+    def __init__(self, task: str = "Reach", policy: str = "policy.npz", control_freq: int = RATE_HZ):
         super().__init__(task, control_freq=control_freq)
         self._path = policy
 
@@ -37,4 +37,4 @@ def correct(path: Path, folder: Path, seeds: Iterable[int], workers: int = 1,
     contract = load(path).contract
     spec = Spec("%s:%s" % (__name__, Correct.__name__), {
         "task": contract.task, "policy": str(Path(path).resolve()), "control_freq": contract.rate_hz})
-    return collect(contract.task, folder, seeds, workers=workers, rate_hz=contract.rate_hz, say=say, spec=spec)
+    return collect(contract.task, folder, seeds, workers=workers, say=say, spec=spec)

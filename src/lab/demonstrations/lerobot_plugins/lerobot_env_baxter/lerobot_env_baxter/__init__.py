@@ -8,8 +8,9 @@ from typing import Any
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 
-# Worker processes of vector environments import this module alone, and need the environments' names as well.
-import gym_baxter  # noqa: F401
+from baxter_model import SIDES
+
+# Worker processes of vector environments import this module alone; gym_baxter makes its names known to them as well.
 from gym_baxter.controls import action_size
 from gym_baxter.core import CAMERAS
 from gym_baxter.names import robot_names
@@ -46,7 +47,7 @@ class BaxterEnvConfig(EnvConfig):
             raise ValueError("env.obs_type is %r; choices are environment_state_agent_pos and pixels_agent_pos"
                              % self.obs_type)
         features = {_ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(action_size(self.control),)),
-                    "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(len(robot_names(("left", "right"))),))}
+                    "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(len(robot_names(SIDES)),))}
         names = {_ACTION: _ACTION, "agent_pos": _STATE}
         if self.obs_type == "pixels_agent_pos":
             for camera in self.cameras:

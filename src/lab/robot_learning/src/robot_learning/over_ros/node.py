@@ -176,7 +176,7 @@ class PolicyNode:
         if not answer.success:
             raise GazeboInterfaceError(answer.status_message)
         now = answer.sim_time.to_sec()
-        self._wait(lambda: (self.lab.robot.seen or 0.0) > now - _PERIOD_S, "joint states of %.3f s" % now)
+        self._wait(lambda: self.lab.robot.stamp > now - _PERIOD_S, "joint states of %.3f s" % now)
 
 
 def main() -> None:

@@ -69,7 +69,8 @@ class RosArm:
 
 class RosRobot:
     """Both arms. Raises KeyError where there is no /robot_description. Attributes: `arms`, `left`, `right`, `enabled`,
-    `stopped`; `seen`: time of the last joint states with both arms [s], or None."""
+    `stopped`; `seen`: when the last joint states with both arms came [s], or None; `stamp`: theirs, by the robot's
+    clock [s]."""
 
     def __init__(self) -> None:
         description = parse_urdf(rospy.get_param("/robot_description"), source="/robot_description")
@@ -78,6 +79,7 @@ class RosRobot:
         self.left, self.right = (self.arms[side] for side in SIDES)
         self.enabled = self.stopped = False
         self.seen: float | None = None
+        self.stamp = 0.0
         self._kept = [
             rospy.Subscriber("/robot/state", AssemblyState, self._on_state, queue_size=1),
             rospy.Subscriber("/robot/joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)]
@@ -94,7 +96,8 @@ class RosRobot:
             arm.angles = np.array([message.position[n] for n in index])
             if message.velocity:
                 arm.velocities = np.array([message.velocity[n] for n in index])
-        self.seen = message.header.stamp.to_sec()
+        # A physical robot's clock is another one.
+        self.seen, self.stamp = rospy.get_time(), message.header.stamp.to_sec()
 
     @property
     def age_s(self) -> float:
