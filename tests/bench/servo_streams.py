@@ -24,6 +24,7 @@ from controller_manager.interfaces import POSITION
 from gazebo_ros_control.hardware import SimulatedHardware
 from joint_trajectory import Command as TrajectoryCommand
 from joint_trajectory import Follower
+from loop_ros.testing import FakeLog
 from model_files.resources import ResourceFinder
 from motion_planning.constraints.regions import rotation_vector
 from motion_planning.exact import ExactChecker
@@ -195,7 +196,7 @@ class ProbotPhysics:
         self.world.add_ground_plane()
         robot = parse_urdf(urdf, source="probot")
         self._robot = self.world.spawn(robot, "probot", Pose(), static=True)
-        self._hardware = SimulatedHardware(self._robot, robot, urdf)
+        self._hardware = SimulatedHardware(self._robot, robot, urdf, FakeLog())
         self._follower = Follower(self._hardware.joint_names)
         self._things: list[str] = []
 

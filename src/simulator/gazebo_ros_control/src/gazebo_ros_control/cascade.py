@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints whose commands of several controllers add up, and the efforts that carry a chain of links. ROS-free."""
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from controller_manager.hardware import RobotHardware
 from controller_manager.interfaces import COMMAND, EFFORT, POSITION, VELOCITY
+
+if TYPE_CHECKING:
+    from bullet_sim import Model
+    from urdf_model import Joint, Robot
 
 GRAVITY_M_S2 = 9.81  # as robot_controllers' gravity compensation has it, whatever the world's
 
@@ -21,7 +30,7 @@ class CascadeHardware(RobotHardware):
     from the description; controllers may lower it for a step.
     """
 
-    def __init__(self, model, robot, gains):
+    def __init__(self, model: Model, robot: Robot, gains: npt.ArrayLike) -> None:
         """``gains`` (n,): velocity per position error [1/s], in the order of ``model.joint_names``."""
         super().__init__(dict.fromkeys(model.joint_names, COMMAND))
         joints = [robot.joints[name] for name in self.joint_names]
@@ -35,19 +44,19 @@ class CascadeHardware(RobotHardware):
         self.read()
         self.clear()
 
-    def read(self):
+    def read(self) -> None:
         """Take the model's joint state, as it is after the last physics step."""
         for ours, theirs in zip((self.position, self.velocity, self.effort), self._model.read_joints(), strict=True):
             ours[:] = theirs[self._every]
 
-    def clear(self):
+    def clear(self) -> None:
         """Drop all commands."""
         self.command[POSITION][:] = math.nan
         self.command[VELOCITY][:] = math.nan
         self.command[EFFORT][:] = 0.0
         self.largest_effort[:] = self._effort_limit
 
-    def write(self, dt):
+    def write(self, dt: float) -> None:
         """Drive the model's joints for the next physics step of ``dt`` seconds."""
         position, velocity = self.command[POSITION], self.command[VELOCITY]
         placed, fed = ~np.isnan(position), ~np.isnan(velocity)
@@ -65,7 +74,7 @@ class CascadeHardware(RobotHardware):
             limit = self._effort_limit[~driven]
             self._model.drive_effort(self._every[~driven], np.clip(self.command[EFFORT][~driven], -limit, limit))
 
-    def hold_all(self):
+    def hold_all(self) -> None:
         """Keep all joints where they are."""
         self._model.drive_velocity(self._every, np.zeros(len(self._every)), self._effort_limit)
 
@@ -77,7 +86,7 @@ class CarriedChain:
     robot or is not behind ``root``.
     """
 
-    def __init__(self, robot, root, tip):
+    def __init__(self, robot: Robot, root: str, tip: str) -> None:
         chain = []
         while tip != root:
             joint = robot.parent_joint(robot.links[tip].name)
@@ -90,7 +99,7 @@ class CarriedChain:
         #: Names of the joints that move, from the root on.
         self.joints = [joint.name for joint in chain if joint.movable]
 
-    def efforts(self, position):
+    def efforts(self, position: Sequence[float] | np.ndarray) -> np.ndarray:
         """(k,) efforts [Nm, N] that hold the chain at ``position`` (k,), both in the order of ``joints``.
 
         By virtual work: the force m g on each link behind a joint, times the way of its centre of mass per unit of the
@@ -117,7 +126,7 @@ class CarriedChain:
         return efforts
 
 
-def motion(joint, amount):
+def motion(joint: Joint, amount: float) -> np.ndarray:
     """Matrix (4, 4) of a joint moved by ``amount`` [rad, m]; rotation by Rodrigues' formula."""
     moved = np.eye(4)
     if joint.type == "prismatic":

@@ -1,35 +1,48 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The base class of controllers that goals of an action start, as those of robot_controllers."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
 from controller_manager import Controller
 from loop_ros.action_server import ActionServer
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from controller_manager.hardware import RobotHardware
+
+
+class Crew(Protocol):
+    """Starts controllers: None, or why one may not start."""
+
+    def start(self, controller: GoalController) -> str | None: ...
 
 
 class GoalController(Controller):
     """A controller with one goal at a time; ``busy``: whether it has one. Subclasses have ``_on_goal(handle)`` and
     ``_on_cancel(handle)``, and write ``_goal``, the handle of the goal that they follow."""
 
-    def __init__(self, name, hardware, context, crew):
-        """``crew``: what starts controllers; its ``start(controller)`` returns None, or why it may not start."""
+    def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext, crew: Crew) -> None:
         super().__init__(name, hardware, context)
         self._crew, self._runs, self._time_s = crew, False, 0.0
         self._goal = self._server = None
 
-    def serve(self, action, action_class):
+    def serve(self, action: str, action_class: type) -> None:
         """Open the action, at the end of a subclass's constructor."""
         self._server = ActionServer(self.context, action, action_class, self._on_goal, self._on_cancel)
 
     @property
-    def busy(self):
+    def busy(self) -> bool:
         return self._goal is not None
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         self._runs = True
 
-    def stopping(self, time_s):
+    def stopping(self, time_s: float) -> None:
         self._runs = False
         self._end("the controller was stopped")
 
-    def idle(self, time_s):
+    def idle(self, time_s: float) -> None:
         self._time_s = time_s
         self._server.spin(time_s)
 

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The joints of a simulated model as hardware for controllers: state in, limits, drives out. ROS-free."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +21,11 @@ from controller_manager.limits import (
 )
 from controller_manager.pid import Gains, Pid
 from controller_manager.transmissions import read_soft_limits, read_transmissions
+
+if TYPE_CHECKING:
+    from bullet_sim import Model
+    from loop_ros.protocol import Log
+    from urdf_model import Robot
 
 # Practically unlimited effort [N m, N]: Gazebo's position interface is kinematic, and descriptions with link inertias
 # of 10 kg m2 and motors of 100 N m rely on it.
@@ -47,7 +56,8 @@ class SimulatedHardware(RobotHardware):
     Until the first command joints with a position interface stay where they were spawned.
     """
 
-    def __init__(self, model, robot, urdf_xml, limit_parameters=None, gain_parameters=None, namespace="", log=None):
+    def __init__(self, model: Model, robot: Robot, urdf_xml: str, log: Log, limit_parameters: Any = None,
+                 gain_parameters: Any = None, namespace: str = "") -> None:
         """``robot``, ``urdf_xml``: the description that names transmissions and limits. ``limit_parameters``,
         ``gain_parameters``: {joint: ...} the parameters under ``joint_limits`` and ``gazebo_ros_control/pid_gains`` of
         ``namespace``. ``log``: ``warn`` and ``error`` of one text. Raises :class:`HardwareError`.
@@ -76,14 +86,14 @@ class SimulatedHardware(RobotHardware):
         self.read()
         self.joints_set()
 
-    def read(self):
+    def read(self) -> None:
         """Take the model's joint state, as it is after the last physics step."""
         for ours, theirs in zip((self.position, self.velocity, self.effort), self._model.read_joints(), strict=True):
             ours[:] = theirs[self._model_index]
         for group in self._groups:
             group.read()
 
-    def write(self, dt):
+    def write(self, dt: float) -> None:
         """Drive the model's joints for the next physics step of ``dt`` seconds."""
         for group in self._groups:
             index = group.index
@@ -96,7 +106,7 @@ class SimulatedHardware(RobotHardware):
             held = self._held
             self._model.drive_position(self._model_index[held], self._held_at[held], self._brakes[held])
 
-    def hold(self, claims):
+    def hold(self, claims: Mapping[str, Iterable[str]]) -> None:
         """Hold the joints of ``claims`` with brakes, against any load."""
         super().hold(claims)
         index = self._braked(claims)
@@ -105,7 +115,7 @@ class SimulatedHardware(RobotHardware):
             self._held_at[index] = self.position[index]
             self._held[index] = True
 
-    def let_go(self, claims):
+    def let_go(self, claims: Mapping[str, Iterable[str]]) -> None:
         if self._held is not None:
             self._held[self._braked(claims)] = False
             # The next commands take the brakes off, zeros too.
@@ -113,11 +123,11 @@ class SimulatedHardware(RobotHardware):
                 group.write_all()
             self._held = self._held if self._held.any() else None
 
-    def hold_all(self):
+    def hold_all(self) -> None:
         """As :meth:`hold`, for all joints."""
         self.hold(self.interface_joints)
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         """The joints were moved by a service, or spawned: hold them there, and apply limits from there."""
         self.read()
         for interface in POSITIONS:
@@ -135,7 +145,7 @@ class SimulatedHardware(RobotHardware):
         joints = {joint for interface in (VELOCITY, EFFORT) for joint in claims.get(interface, ())}
         return [i for i, name in enumerate(self.joint_names) if name in joints]
 
-    def stop(self, stopped):
+    def stop(self, stopped: bool) -> None:
         """Emergency stop: while ``stopped``, joints hold the positions that they had when it came."""
         if stopped and self._frozen is None:
             self._frozen = self.position.copy()
@@ -143,7 +153,7 @@ class SimulatedHardware(RobotHardware):
             self._frozen = None
 
     @property
-    def pids(self):
+    def pids(self) -> list[tuple[Pid, list[str]]]:
         """List of (:class:`controller_manager.pid.Pid`, its joints' names) of the joints that are driven by one."""
         return [(group.pid, [self.joint_names[i] for i in group.index]) for group in self._groups
                 if isinstance(group, _PidGroup)]
@@ -198,7 +208,8 @@ class SimulatedHardware(RobotHardware):
 class _Group:
     """Joints of one interface that are driven the same way. ``index`` is into the hardware's arrays."""
 
-    def __init__(self, hardware, interface, index, model_index, limiter, effort):
+    def __init__(self, hardware: SimulatedHardware, interface: str, index: np.ndarray, model_index: np.ndarray,
+                 limiter: PositionLimiter | VelocityLimiter | EffortLimiter, effort: np.ndarray) -> None:
         self.interface = interface
         self.index = index
         self.limiter = limiter
@@ -207,23 +218,23 @@ class _Group:
         self._model_index = model_index
         self._effort = effort
 
-    def read(self):
+    def read(self) -> None:
         """Correct the model's state of these joints where PyBullet does not know it."""
 
-    def reset(self):
+    def reset(self) -> None:
         self.limiter.reset()
         self.write_all()
 
-    def write_all(self):
+    def write_all(self) -> None:
         """Write the next commands, whatever they are."""
 
 
 class _PositionGroup(_Group):
-    def __init__(self, *arguments):
+    def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._unlimited = np.full(len(self.index), _UNLIMITED)
 
-    def drive(self, command, position, velocity, dt):
+    def drive(self, command: np.ndarray, position: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         # The velocity that reaches the command in this step; stable at any inertia, because the solver computes the
         # effort.
         self._model.drive_velocity(self._model_index, (command - position) / dt, self._unlimited)
@@ -232,19 +243,19 @@ class _PositionGroup(_Group):
 class _CarriedGroup(_Group):
     """Position interface on a free-standing model."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._velocity = np.zeros(len(self.index))
 
-    def read(self):
+    def read(self) -> None:
         # In the physics these joints have no velocity, since they are repositioned.
         self._hardware.velocity[self.index] = self._velocity
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._velocity[:] = 0.0
 
-    def drive(self, command, position, velocity, dt):
+    def drive(self, command: np.ndarray, position: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         self._velocity = (command - position) / dt
         self._model.carry(self._model_index, command)
 
@@ -252,14 +263,14 @@ class _CarriedGroup(_Group):
 class _YieldingGroup(_Group):
     """Only the first of several zeros is written."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._due = np.ones(len(self.index), dtype=bool)  # joints whose next command is written even if it is 0
 
-    def write_all(self):
+    def write_all(self) -> None:
         self._due[:] = True
 
-    def drive(self, command, position, velocity, dt):
+    def drive(self, command: np.ndarray, position: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         acts = command != 0.0
         written, self._due = acts | self._due, acts
         if written.all():
@@ -279,15 +290,16 @@ class _EffortGroup(_YieldingGroup):
 
 
 class _PidGroup(_Group):
-    def __init__(self, hardware, interface, index, model_index, limiter, effort, gains):
+    def __init__(self, hardware: SimulatedHardware, interface: str, index: np.ndarray, model_index: np.ndarray,
+                 limiter: PositionLimiter | VelocityLimiter | EffortLimiter, effort: np.ndarray, gains: Gains) -> None:
         super().__init__(hardware, interface, index, model_index, limiter, effort)
         self.pid = Pid(gains)
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self.pid.reset()
 
-    def drive(self, command, position, velocity, dt):
+    def drive(self, command: np.ndarray, position: np.ndarray, velocity: np.ndarray, dt: float) -> None:
         if self.interface in POSITIONS:
             error = command - position
             around = self._hardware._continuous[self.index]

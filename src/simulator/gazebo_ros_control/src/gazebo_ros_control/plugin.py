@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """libgazebo_ros_control.so as a model plugin of /gazebo: a controller manager on the model's joints."""
+from __future__ import annotations
+
 import math
 import os
+from typing import TYPE_CHECKING
 
 import rospkg
 import rospy
@@ -16,6 +19,9 @@ from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros_control.hardware import SimulatedHardware
 from gazebo_ros_control.sensors import simulated_sensors
 from urdf_model import UrdfError, parse_urdf
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 DEFAULT_SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
 #: Private parameter of /gazebo: a mapping of controller type to "module:Class" that adds to ros_controllers' table.
@@ -32,7 +38,7 @@ class GazeboRosControl(ModelPlugin):
     A description that cannot be used gives one error in the log; the model stays, without controllers.
     """
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._hardware = None
         try:
@@ -49,8 +55,8 @@ class GazeboRosControl(ModelPlugin):
             context.log.warn("model '%s': robotSimType '%s' is not known and taken as %s"
                              % (context.model.name, sim_type, DEFAULT_SIM_TYPE))
         hardware = SimulatedHardware(
-            context.model, robot, urdf_xml, context.param("joint_limits"),
-            context.param(PID_GAINS), context.namespace, context.log)
+            context.model, robot, urdf_xml, context.log, context.param("joint_limits"),
+            context.param(PID_GAINS), context.namespace)
         if not hardware.joint_names:
             context.log.warn("model '%s': its description has no <transmission> that can be used, so no joint can be "
                              "controlled"
@@ -68,7 +74,7 @@ class GazeboRosControl(ModelPlugin):
         self._services = ControllerManagerServices(self._manager, self._types.table, context, robot)
         self._hardware = hardware
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         hardware = self._hardware
         if hardware is None:
             return
@@ -83,10 +89,10 @@ class GazeboRosControl(ModelPlugin):
             self._last_update_s = time_s
         hardware.write(dt)
 
-    def step_changed(self, step_s):
+    def step_changed(self, step_s: float) -> None:
         self._period_s = self._control_period(self.context)
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         if self._hardware is None:
             return
         self._hardware.joints_set()
@@ -94,21 +100,21 @@ class GazeboRosControl(ModelPlugin):
         # command before the next tick is not lost.
         self._manager.restart(self.context.world.time_s)
 
-    def reset(self):
+    def reset(self) -> None:
         self._last_update_s = None
         self.joints_set()
 
-    def restarted(self):
+    def restarted(self) -> GazeboRosControl:
         # Loaded controllers stay: they restart from the joints' positions, as after a reset.
         self.reset()
         return self
 
-    def hold(self):
+    def hold(self) -> None:
         if self._hardware is not None:
             self._hardware.hold_all()
             self._hardware.write(self.context.world.time_step_s)
 
-    def close(self):
+    def close(self) -> None:
         if self._hardware is not None:
             self._services.close()
 
@@ -166,13 +172,13 @@ class GazeboRosControl(ModelPlugin):
 class _Types:
     """The table of controller types: ros_controllers' file, with the present entries of the node's parameter."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         path = os.path.join(rospkg.RosPack().get_path("ros_controllers"), "config", "controllers.yaml")
         with open(path, encoding="utf-8") as file:
             self._own = yaml.safe_load(file)
         self._entries, self._table = None, None
 
-    def table(self):
+    def table(self) -> ControllerTable:
         """Any thread, one at a time: the :class:`ControllerTable`."""
         more = rospy.get_param(MORE_TYPES, {})
         if not isinstance(more, dict):

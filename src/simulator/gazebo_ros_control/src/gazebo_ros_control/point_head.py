@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """robot_controllers/PointHeadController: a head that pans and tilts looks at a point."""
+from __future__ import annotations
+
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from control_msgs.msg import PointHeadAction, PointHeadFeedback
 
 from controller_manager import POSITION, VELOCITY, ControllerError
@@ -12,6 +17,12 @@ from gazebo_ros_control.goal_controller import GoalController
 from sim_time.pace import Pace
 from urdf_model import UrdfError
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from controller_manager import ControllerContext
+    from gazebo_ros_control.cascade import CascadeHardware
+    from gazebo_ros_control.goal_controller import Crew
+    from urdf_model import Robot
 
 FEEDBACK_HZ = 50.0
 # A joint has arrived within so much [rad]; it may be late by so long, and so may the transform of a target's frame [s].
@@ -25,13 +36,13 @@ LARGEST = 1e9
 class HeadGeometry:
     """Where a pan joint and the tilt joint on its child point: along x of the tilt joint's child."""
 
-    def __init__(self, robot, pan, tilt):
+    def __init__(self, robot: Robot, pan: str, tilt: str) -> None:
         """``robot``: ``urdf_model.Robot``. Raises KeyError or UrdfError where it has no such joints."""
         self._robot = robot
         self._pan, self._tilt = robot.joints[pan], robot.joints[tilt]
         robot.chain(self._pan.child, self._tilt.parent)
 
-    def angles(self, point, positions):
+    def angles(self, point: npt.ArrayLike, positions: Mapping[str, float]) -> tuple[float, float]:
         """(pan, tilt) [rad] that point at ``point`` (3,) in the robot's root frame, with the other joints at
         ``positions`` {name: [rad, m]}.
 
@@ -42,14 +53,14 @@ class HeadGeometry:
         x, _, z = self._seen_from(self._tilt, point, {**positions, self._pan.name: pan})
         return pan, math.copysign(1.0, self._tilt.axis[1]) * math.atan2(-z, x)
 
-    def error(self, point, positions):
+    def error(self, point: npt.ArrayLike, positions: Mapping[str, float]) -> float:
         """The angle between where it points and ``point``, as in :meth:`angles` [rad]."""
         frame = self.pose(self._tilt.child, positions)
         way = np.asarray(point) - frame[:3, 3]
         length = float(np.linalg.norm(way))
         return math.acos(min(1.0, max(-1.0, float(frame[:3, 0] @ way) / length))) if length > 0.0 else 0.0
 
-    def pose(self, link, positions):
+    def pose(self, link: str, positions: Mapping[str, float]) -> np.ndarray:
         """Pose (4, 4) of a link's frame in the root's. Raises UrdfError for an unknown link."""
         frame = np.eye(4)
         for joint in self._robot.chain(self._robot.root, link):
@@ -67,7 +78,7 @@ class PointHead(GoalController):
     pointing frame and axis do not count: x of the tilted link points at the target.
     """
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: Crew) -> None:
         super().__init__(name, hardware, context, crew)
         joints = context.param("pan_joint", "head_pan_joint"), context.param("tilt_joint", "head_tilt_joint")
         self._index = self.claim(POSITION, joints)
@@ -88,17 +99,17 @@ class PointHead(GoalController):
         self._pace = Pace(FEEDBACK_HZ)
         self.serve("point_head", PointHeadAction)
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         super().starting(time_s)
         self._from = self._to = self.hardware.position[self._index].copy()
         self._length_s = 0.0
 
-    def idle(self, time_s):
+    def idle(self, time_s: float) -> None:
         super().idle(time_s)
         if self._waiting is not None:
             self._begin()
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self.idle(time_s)
         share = 1.0
         if self._length_s > 0.0:
@@ -110,7 +121,7 @@ class PointHead(GoalController):
         if self._goal is not None:
             self._watch(time_s, share)
 
-    def close(self):
+    def close(self) -> None:
         self._stop_listening()
 
     def _on_goal(self, handle):

@@ -3,7 +3,11 @@
 
 Their names, parameters, topics and actions; the trajectories, the vehicle and the joint states are ros_controllers'.
 """
+from __future__ import annotations
+
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
@@ -18,6 +22,10 @@ from ros_controllers.joint_state import JointStateController
 from ros_controllers.joint_trajectory_controller import JointTrajectoryController
 from sim_time.pace import Pace
 
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
+    from loop_ros.protocol import Log
+
 #: The node whose private parameters name the controllers and the joints' gains, as Gazebo's node is called.
 NODE = "/gazebo"
 JOINT_STATES_HZ = 100.0
@@ -30,7 +38,8 @@ REACHED_M, STALL_M, STALL_S, FEEDBACK_HZ = 0.002, 0.005, 2.0, 50.0
 class _Context(ControllerContext):
     """A controller's place whose topics and actions may have other names than ros_controllers'."""
 
-    def __init__(self, name, host, parameters, names=None):
+    def __init__(self, name: str, host: PluginContext, parameters: Mapping[str, Any],
+                 names: Mapping[str, str] | None = None) -> None:
         """``parameters``: the controller's own, nested; ``names``: {ros_controllers' name: absolute name}."""
         tree = parameters
         for part in reversed(name.split("/")):
@@ -38,7 +47,7 @@ class _Context(ControllerContext):
         super().__init__(name, host.namespace, tree, host.branch(), host.log, host.robot)
         self._names = names or {}
 
-    def resolve(self, name):
+    def resolve(self, name: str) -> str:
         first, slash, rest = name.partition("/")
         return self._names[first] + slash + rest if first in self._names else super().resolve(name)
 
@@ -48,12 +57,12 @@ class _Follower(JointTrajectoryController):
 
     interface = POSITION
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context)
         self._crew = crew
 
     @property
-    def busy(self):
+    def busy(self) -> bool:
         return self._follower.goal is not None
 
     def _on_goal(self, handle):
@@ -77,7 +86,7 @@ class _Gripper(GoalController):
     ``centering``, a PID from the difference of the fingers' positions to the difference of their efforts.
     """
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context, crew)
         self._index = self.claim(POSITION, [context.param(side + "_gripper_joint", side + "_gripper_finger_joint")
                                             for side in ("l", "r")])
@@ -94,11 +103,11 @@ class _Gripper(GoalController):
         """How far apart the fingers are [m]."""
         return float(self.hardware.position[self._index].sum())
 
-    def starting(self, time_s):
+    def starting(self, time_s: float) -> None:
         super().starting(time_s)
         self._target, self._effort = self._opening, self._most_n
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self.idle(time_s)
         hardware, index = self.hardware, self._index
         hardware.command[POSITION][index] = self._target / 2.0
@@ -145,7 +154,7 @@ class _Weight(Controller):
 
     busy = False
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context)
         root, tip = context.param("root", "torso_lift_link"), context.param("tip", "wrist_roll_link")
         try:
@@ -155,7 +164,7 @@ class _Weight(Controller):
                                   % (context.namespace, root, tip)) from error
         self._index = hardware.index(EFFORT, self._chain.joints, context.namespace)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self.hardware.command[EFFORT][self._index] += self._chain.efforts(self.hardware.position[self._index])
 
 
@@ -164,13 +173,13 @@ class _Mimic(Controller):
 
     busy = False
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context)
         self._scale = context.number("mimic_scale", 1.0)
         self._index = self.claim(POSITION, [context.param("controlled_joint", "bellows_joint")])
         self._other = hardware.index(POSITION, [context.param("mimic_joint", "torso_lift_joint")], context.namespace)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self.hardware.command[POSITION][self._index] = self._scale * self.hardware.position[self._other]
 
 
@@ -179,7 +188,7 @@ class _Base(DiffDriveController):
 
     busy = False
 
-    def __init__(self, name, hardware, context, crew):
+    def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context)
 
 
@@ -237,17 +246,17 @@ _TYPES = {
 class _Crew:
     """The controllers, and which of them run: a controller that starts stops those with whom it shares joints."""
 
-    def __init__(self, hardware, log):
+    def __init__(self, hardware: CascadeHardware, log: Log) -> None:
         self._hardware, self._log = hardware, log
         self._all, self._running = [], []
         self._time_s = 0.0
 
-    def add(self, controller, runs):
+    def add(self, controller: Controller, runs: bool) -> None:
         self._all.append(controller)
         if runs:
             self.start(controller)
 
-    def start(self, controller):
+    def start(self, controller: Controller) -> str | None:
         """Start a controller, and return None, or the reason why it may not: one that shares a joint has a goal."""
         joints = _claimed(controller)
         rivals = [other for other in self._running if joints & _claimed(other)]
@@ -261,7 +270,7 @@ class _Crew:
         self._running = [other for other in self._running if other not in rivals] + [controller]
         return None
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._time_s = time_s
         self._hardware.clear()
         for controller in self._all:
@@ -270,13 +279,13 @@ class _Crew:
         for controller in self._running:
             controller.update(time_s, dt)
 
-    def restart(self):
+    def restart(self) -> None:
         """Goals end, and all that run start again where the joints are."""
         for controller in self._running:
             controller.stopping(self._time_s)
             controller.starting(self._time_s)
 
-    def close(self):
+    def close(self) -> None:
         for controller in self._all:
             controller.close()
 
@@ -288,7 +297,7 @@ class RobotControllers(ModelPlugin):
     ``/gazebo/<joint>`` the p of the position counts; the velocity is kept by a motor with the joint's largest effort.
     """
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         hardware = CascadeHardware(context.model, context.robot, [
             _number(context.param("%s/%s/position/p" % (NODE, joint)), 0.0) for joint in context.model.joint_names])
@@ -322,22 +331,22 @@ class RobotControllers(ModelPlugin):
             raise
         self._crew.add(controller, runs or given.get("autostart") is True)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._hardware.read()
         self._crew.update(time_s, dt)
         self._hardware.write(dt)
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         self._hardware.read()
         self._crew.restart()
 
-    def reset(self):
+    def reset(self) -> None:
         self.joints_set()
 
-    def hold(self):
+    def hold(self) -> None:
         self._hardware.hold_all()
 
-    def close(self):
+    def close(self) -> None:
         self._crew.close()
 
 

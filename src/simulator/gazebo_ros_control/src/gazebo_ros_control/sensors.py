@@ -1,21 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The sensors of a simulated model as hardware for controllers: IMUs on links, force and torque at joints. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from controller_manager.interfaces import FORCE_TORQUE_SENSOR, IMU_SENSOR
 from gazebo_plugins.joint_wrench import JointWrench
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from bullet_sim import Model, World
+
 
 class SimulatedImu:
     """Call ``read`` before each step: its result is that of the previous step. ``frame``: the link that it is on, at
     ``place`` (4, 4) in it."""
 
-    def __init__(self, world, model, link, place):
+    def __init__(self, world: World, model: Model, link: str, place: np.ndarray) -> None:
         self._world, self._model, self.frame, self._place = world, model, link, place
         self._last = None
 
-    def read(self):
+    def read(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Quaternion (4,) in the world, turn rate (3,) [rad/s], and acceleration (3,) [m/s2] in its axes, gravity up
         at rest; None if it was not called at the previous step."""
         linear, angular = (np.asarray(part) for part in self._model.link_twist(self.frame))
@@ -36,7 +45,7 @@ class SimulatedForceTorque:
     its ``<pose>``), and ``<measure_direction>``: child_to_parent or parent_to_child.
     """
 
-    def __init__(self, world, model, joint, sensor):
+    def __init__(self, world: World, model: Model, joint: str, sensor: etree._Element) -> None:
         self._world, self._model, self._wrench = world, model, JointWrench(world, model, joint)
         self.frame = child = self._wrench.child
         self._turn = np.eye(3)  # from the child's axes
@@ -49,7 +58,7 @@ class SimulatedForceTorque:
         self._sign = -1.0 if direction == "parent_to_child" else 1.0
         self._child, self._noted = child, None
 
-    def read(self):
+    def read(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Force (3,) [N] and torque (3,) [Nm] that the child exerts on the parent, or None."""
         found = self._wrench.measure() if self._noted == self._world.steps - 1 else None
         self._wrench.note()
@@ -63,7 +72,7 @@ class SimulatedForceTorque:
         return tuple(self._sign * (turn @ part) for part in found)
 
 
-def sensor_place(sensor):
+def sensor_place(sensor: etree._Element) -> np.ndarray:
     """The pose (4, 4) of a ``<sensor>`` in its link; as in the link's frame where it gives none or no six numbers."""
     try:
         values = [float(word) for word in (sensor.findtext("pose") or "").split()]
@@ -72,7 +81,7 @@ def sensor_place(sensor):
     return pose_matrix(values[:3], values[3:]) if len(values) == 6 and np.isfinite(values).all() else np.eye(4)
 
 
-def simulated_sensors(world, model):
+def simulated_sensors(world: World, model: Model) -> dict[str, dict[str, SimulatedImu | SimulatedForceTorque]]:
     """{interface: {sensor's name: sensor}} of the ``<sensor type="imu">`` on links and the ``<sensor
     type="force_torque">`` on joints of a description, by their names in the description."""
     found = {IMU_SENSOR: {}, FORCE_TORQUE_SENSOR: {}}

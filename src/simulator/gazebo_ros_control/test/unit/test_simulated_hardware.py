@@ -56,7 +56,7 @@ class Arm:
         self.all = np.arange(len(self.model.joint_names))
         self.model.set_joint_positions(self.all, np.full(len(self.all), start))
         self.log = FakeLog()
-        self.hardware = SimulatedHardware(self.model, robot, xml, limit_parameters, gain_parameters, "/arm", self.log)
+        self.hardware = SimulatedHardware(self.model, robot, xml, self.log, limit_parameters, gain_parameters, "/arm")
 
     def run(self, seconds, command=None, interface=None, watch=None):
         for _ in range(round(seconds / DT)):
