@@ -12,7 +12,7 @@ LEVELS = (*range(0, 100, 10), *range(100, -1, -10))
 PERIOD_S = 0.5
 
 
-def ramp(name):
+def ramp(name: str) -> None:
     output = AnalogIO(name)
     for level in LEVELS:
         print("%s: %d" % (name, level), flush=True)
@@ -20,7 +20,7 @@ def ramp(name):
         RosClock().sleep(PERIOD_S)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_component(parser, "torso_fan")
     arguments = parse(parser)

@@ -11,7 +11,7 @@ from baxter_interface.programs import run
 PERIOD_S = 1.0
 
 
-def blink(name):
+def blink(name: str) -> None:
     output = DigitalIO(name)
     print("%s: %s at first" % (name, output.state), flush=True)
     for value in (True, False):
@@ -20,7 +20,7 @@ def blink(name):
         RosClock().sleep(PERIOD_S)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_component(parser, "left_outer_light")
     arguments = parse(parser)

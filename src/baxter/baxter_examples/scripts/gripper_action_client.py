@@ -15,7 +15,7 @@ GOALS = ((0.0, 50.0), (100.0, 50.0), (25.0, 40.0), (75.0, 20.0), (0.0, 30.0), (1
 TIMEOUT_S = 5.0
 
 
-def move(side):
+def move(side: str) -> None:
     client = ActionClient("robot/end_effector/%s_gripper/gripper_action" % side, GripperCommandAction,
                           "rosrun baxter_interface gripper_action_server.py")
     with EnabledRobot():
@@ -27,7 +27,7 @@ def move(side):
             print("commanded %.0f %%: the %s gripper is at %.1f %%" % (position, side, result.position), flush=True)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     parser.add_argument("-g", "--gripper", required=True, choices=SIDES, help="the gripper")
     side = parse(parser).gripper

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Open and close grippers with the buttons at the cuffs; squeezing a cuff lights the arm's navigator."""
 import sys
+from collections.abc import Callable, Sequence
 
 from baxter_examples.arguments import new_parser, parse
 from baxter_examples.cuff_control import CuffControl
@@ -11,7 +12,7 @@ from baxter_model import SIDES
 RATE_HZ = 10.0
 
 
-def control(sides, lights, say):
+def control(sides: Sequence[str], lights: bool, say: Callable[[str], object]) -> None:
     with EnabledRobot() as robot:
         controls = [CuffControl(side, lights, say) for side in sides]
         print("round button: open, dash button: close; Ctrl-C: quit", flush=True)
@@ -20,7 +21,7 @@ def control(sides, lights, say):
                 cuff.work()
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     parser.add_argument("-g", "--gripper", choices=("both", *SIDES), default="both",
                         help="the gripper (default: %(default)s)")

@@ -27,7 +27,7 @@ STICKS = {"left": "leftStickVert", "right": "rightStickVert"}
 STEP_PERCENT = 5.0
 
 
-def steer(kind):
+def steer(kind: str) -> None:
     with EnabledRobot() as robot:
         table = JoystickTable("the grippers' controls:", JOYSTICKS[kind]())
         for side, gripper in mounted_grippers(SIDES, calibrate=True).items():
@@ -39,7 +39,7 @@ def steer(kind):
         joystick_loop(table, robot)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_joystick(parser)
     kind = parse(parser).joystick

@@ -26,7 +26,7 @@ KEYS = (
 SHIFTED = {"[": "{", "]": "}"}
 
 
-def steer():
+def steer() -> None:
     with EnabledRobot() as robot:
         table = KeyTable("the grippers' keys:")
         grippers = mounted_grippers(SIDES)
@@ -39,7 +39,7 @@ def steer():
         keyboard_loop(table, robot)
 
 
-def main():
+def main() -> int:
     parse(new_parser(__doc__))
     return run("rsdk_gripper_keyboard", steer)
 

@@ -14,7 +14,7 @@ GOALS = ((0.0, 1.0), (1.57, 0.1), (0.0, 0.8), (-1.0, 0.4), (0.0, 0.6))
 TIMEOUT_S = 5.0
 
 
-def turn():
+def turn() -> None:
     client = ActionClient("robot/head/head_action", SingleJointPositionAction,
                           "rosrun baxter_interface head_action_server.py")
     with EnabledRobot():
@@ -24,7 +24,7 @@ def turn():
             print("the head is at %.2f rad" % angle, flush=True)
 
 
-def main():
+def main() -> int:
     parse(new_parser(__doc__))
     return run("rsdk_head_action_client", turn)
 

@@ -17,7 +17,7 @@ SPEED = 0.3
 DURATION_S = 10.0
 
 
-def wobble():
+def wobble() -> None:
     head = Head()
     with EnabledRobot():
         head.command_nod()
@@ -30,7 +30,7 @@ def wobble():
         head.set_pan(0.0)
 
 
-def main():
+def main() -> int:
     parse(new_parser(__doc__))
     return run("rsdk_head_wobbler", wobble)
 

@@ -16,12 +16,12 @@ POSES = {
 }
 
 
-def print_solution(limb):
+def print_solution(limb: str) -> None:
     for name, angle in sorted(Limb(limb).ik(POSES[limb]).items()):
         print("%s: %.6f" % (name, angle), flush=True)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_limb(parser)
     limb = parse(parser).limb

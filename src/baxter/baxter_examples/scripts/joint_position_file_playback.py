@@ -20,7 +20,7 @@ GRIPPER_STEP_PERCENT = 1.0
 class Player:
     """Sends a recording's values to its arms and grippers."""
 
-    def __init__(self, record):
+    def __init__(self, record: recording.Recording) -> None:
         self._parts = []
         grippers = mounted_grippers([side for side in SIDES if record.side(side)[1]], calibrate=True)
         for side in SIDES:
@@ -28,14 +28,14 @@ class Player:
             self._parts.append((Limb(side) if joints else None, joints, grippers.get(side), side + "_gripper"))
         self._sent = {}
 
-    def go_to(self, row):
+    def go_to(self, row: dict[str, float]) -> None:
         """Move the arms to `row` gently."""
         for limb, joints, _, _ in self._parts:
             if limb:
                 expect(limb.move_to_joint_positions({name: row[name] for name in joints}),
                        "the %s arm did not get to the recording's start" % limb.name)
 
-    def command(self, row):
+    def command(self, row: dict[str, float]) -> None:
         for limb, joints, gripper, column in self._parts:
             if limb:
                 limb.set_joint_positions({name: row[name] for name in joints})
@@ -44,7 +44,7 @@ class Player:
                 self._sent[column] = row[column]
 
 
-def play(path, loops):
+def play(path: str, loops: int) -> None:
     record = recording.read(path)
     with EnabledRobot() as robot:
         player = Player(record)
@@ -66,7 +66,7 @@ def play(path, loops):
                 return
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_file(parser, "the recording")
     parser.add_argument("-l", "--loops", type=int, default=1, help="repetitions, below 1: endless (%(default)d)")

@@ -17,22 +17,22 @@ GRIPPER_BUTTONS = {"left": ("leftTrigger", "dPadLeft", "btnLeft"), "right": ("ri
 class JointPair:
     """The two joints of one arm that its stick moves; switching takes the next two."""
 
-    def __init__(self, side, jogging):
+    def __init__(self, side: str, jogging: Jogging) -> None:
         self._side, self._jogging = side, jogging
         self._first = 0
 
-    def switch(self):
+    def switch(self) -> None:
         self._first = (self._first + 1) % len(JOINTS)
         print("%s stick: %s and %s" % (self._side, self._joint(0), self._joint(1)), flush=True)
 
-    def step(self, which, step_rad):
+    def step(self, which: int, step_rad: float) -> None:
         self._jogging.step(self._side, self._joint(which), step_rad)
 
     def _joint(self, which):
         return JOINTS[(self._first + which) % len(JOINTS)]
 
 
-def steer(kind):
+def steer(kind: str) -> None:
     with EnabledRobot() as robot:
         jogging = Jogging()
         table = JoystickTable("the arms' controls:", JOYSTICKS[kind]())
@@ -48,7 +48,7 @@ def steer(kind):
         joystick_loop(table, robot)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_joystick(parser)
     kind = parse(parser).joystick

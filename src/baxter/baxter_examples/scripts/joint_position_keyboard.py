@@ -19,7 +19,7 @@ GRIPPER_KEYS = {
 }
 
 
-def steer():
+def steer() -> None:
     with EnabledRobot() as robot:
         jogging = Jogging()
         table = KeyTable("the arms' keys:")
@@ -33,7 +33,7 @@ def steer():
         keyboard_loop(table, robot)
 
 
-def main():
+def main() -> int:
     parse(new_parser(__doc__))
     return run("rsdk_joint_position_keyboard", steer)
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Teach an arm waypoints by hand, and have it go through them; buttons of its navigator record and play."""
+import argparse
 import sys
 
 from baxter_examples.arguments import add_limb, new_parser, parse
@@ -15,7 +16,7 @@ PROMPT = "press the wheel to record a waypoint (%d so far), the button below it 
 class Waypoints:
     """Waypoints of one arm, recorded and played by the buttons of its navigator."""
 
-    def __init__(self, side, speed, accuracy_rad):
+    def __init__(self, side: str, speed: float, accuracy_rad: float) -> None:
         self._limb = Limb(side)
         self._speed, self._accuracy_rad = speed, accuracy_rad
         self._waypoints = []
@@ -24,7 +25,7 @@ class Waypoints:
         self._navigator.button0_changed.connect(self._on_record)
         self._navigator.button2_changed.connect(self._on_play)
 
-    def work(self, robot):
+    def work(self, robot: EnabledRobot) -> None:
         """Record until there is something to play, play until `robot` is gone. Raises RobotLost."""
         print(PROMPT % 0, flush=True)
         for _ in robot.beats(RATE_HZ):
@@ -55,12 +56,12 @@ class Waypoints:
                 print("there is no waypoint to play yet", flush=True)
 
 
-def teach(arguments):
+def teach(arguments: argparse.Namespace) -> None:
     with EnabledRobot() as robot:
         Waypoints(arguments.limb, arguments.speed, arguments.accuracy).work(robot)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_limb(parser)
     parser.add_argument("-s", "--speed", type=number(float, 0, 100), default=0.3,

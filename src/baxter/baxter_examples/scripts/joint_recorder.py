@@ -11,7 +11,7 @@ from baxter_model import SIDES
 from command_line.options import number
 
 
-def record(path, rate_hz):
+def record(path: str, rate_hz: float) -> None:
     with EnabledRobot() as robot:
         recorder = JointRecorder(path, rate_hz)
         cuffs = [CuffControl(side, lights=False, gripper=recorder.grippers.get(side)) for side in SIDES]
@@ -26,7 +26,7 @@ def record(path, rate_hz):
         recorder.record(beats())
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_file(parser, "the recording to write")
     parser.add_argument("-r", "--rate", type=number(float, 0, 1000, above=True), default=100.0, metavar="HZ",

@@ -22,14 +22,14 @@ MISSED_COMMANDS = 20
 class Springs:
     """One arm on springs; their stiffness and damping follow this node's dynamic parameters."""
 
-    def __init__(self, side):
+    def __init__(self, side: str) -> None:
         self._limb = Limb(side)
         self._gains = {}
         # While the cuff is squeezed the robot ignores torques; here users must be able to hold the arm.
         self._cuff = rospy.Publisher("robot/limb/%s/suppress_cuff_interaction" % side, Empty, queue_size=1)
         self._server = ParameterServer(JointSpringsExampleConfig, self._on_gains)
 
-    def hold(self, robot):
+    def hold(self, robot: EnabledRobot) -> None:
         """Pull the arm to neutral while `robot` is there. Raises ProgramFailed, RobotLost."""
         limb = self._limb
         expect(limb.move_to_neutral(), "the %s arm did not get to neutral" % limb.name)
@@ -50,12 +50,12 @@ class Springs:
         return config
 
 
-def hold(side):
+def hold(side: str) -> None:
     with EnabledRobot() as robot:
         Springs(side).hold(robot)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_limb(parser)
     side = parse(parser).limb

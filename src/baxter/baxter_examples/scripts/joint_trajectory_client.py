@@ -16,7 +16,7 @@ POINTS = ((7.0, 1.0), (9.0, 0.75), (12.0, 1.25))
 PATIENCE_S = 15.0
 
 
-def move(side):
+def move(side: str) -> None:
     client = TrajectoryClient(side)
     with EnabledRobot():
         limb = Limb(side)
@@ -30,7 +30,7 @@ def move(side):
         print("the %s arm has followed its trajectory" % side, flush=True)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_limb(parser)
     side = parse(parser).limb

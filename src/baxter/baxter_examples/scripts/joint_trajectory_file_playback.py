@@ -24,7 +24,7 @@ SHORTEST_WAY_S = 0.5
 PATIENCE_S = 10.0
 
 
-def lead_in_s(here, row):
+def lead_in_s(here: dict[str, float], row: dict[str, float]) -> float:
     """Return the time for the move from `here` to the recording's first `row` [s], both by joint name."""
     return max(SHORTEST_WAY_S, *(
         abs(row[name] - here[name]) / rospy.get_param(SERVER + name + "_default_velocity", DEFAULT_SPEED_RAD_S)
@@ -34,7 +34,7 @@ def lead_in_s(here, row):
 class Player:
     """One recording, on the arms and grippers that it has."""
 
-    def __init__(self, record):
+    def __init__(self, record: recording.Recording) -> None:
         self._record = record
         self._limbs = {side: Limb(side) for side in SIDES if record.side(side)[0]}
         for side in self._limbs:
@@ -45,7 +45,7 @@ class Player:
         self._clients = {side: TrajectoryClient(side) for side in self._limbs}
         self._grippers = mounted_grippers([side for side in SIDES if record.side(side)[1]], calibrate=True)
 
-    def play(self, robot):
+    def play(self, robot: EnabledRobot) -> None:
         """Play once. Raises ProgramFailed, RobotLost."""
         record = self._record
         here = {name: angle for limb in self._limbs.values() for name, angle in limb.joint_angles().items()}
@@ -77,7 +77,7 @@ class Player:
                 client.cancel()
 
 
-def play(path, loops):
+def play(path: str, loops: int) -> None:
     record = recording.read(path)
     with EnabledRobot() as robot:
         player = Player(record)
@@ -88,7 +88,7 @@ def play(path, loops):
             player.play(robot)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_file(parser, "the recording")
     parser.add_argument("-l", "--loops", type=int, default=1, help="repetitions; 0: endless (default: %(default)s)")

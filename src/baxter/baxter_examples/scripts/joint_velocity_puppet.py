@@ -13,14 +13,14 @@ RATE_HZ = 100.0
 AMPLIFICATION_RANGE = (0.1, 3.0)
 
 
-def amplification(text):
+def amplification(text: str) -> float:
     lowest, highest = AMPLIFICATION_RANGE
     if not lowest <= float(text) <= highest:
         raise argparse.ArgumentTypeError("must be from %g to %g, got %s" % (lowest, highest, text))
     return float(text)
 
 
-def mirror(side, factor):
+def mirror(side: str, factor: float) -> None:
     with EnabledRobot() as robot:
         hand, puppet = Limb(side), Limb(other_side(side))
         for limb in (hand, puppet):
@@ -35,7 +35,7 @@ def mirror(side, factor):
             puppet.exit_control_mode()
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_limb(parser, "the arm that is moved by hand")
     parser.add_argument("-a", "--amplification", type=amplification, default=1.0,

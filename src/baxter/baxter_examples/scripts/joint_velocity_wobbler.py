@@ -21,7 +21,7 @@ FREQUENCY_HZ = (0.3, 0.5)
 SPEED_RAD_S = (0.1, 0.2)
 
 
-def wobble():
+def wobble() -> None:
     state_rate = rospy.Publisher("robot/joint_state_publish_rate", UInt16, queue_size=10, latch=True)
     with EnabledRobot() as robot:
         limbs = [Limb(side) for side in SIDES]
@@ -46,7 +46,7 @@ def wobble():
             state_rate.publish(USUAL_STATE_RATE_HZ)
 
 
-def main():
+def main() -> int:
     parse(new_parser(__doc__))
     return run("rsdk_joint_velocity_wobbler", wobble)
 

@@ -14,7 +14,7 @@ BLINKS, BLINK_RATE_HZ = 100, 10.0
 READINGS, READING_RATE_HZ = 10, 1.0
 
 
-def blink():
+def blink() -> None:
     navigator = Navigator(LOCATION)
     ticker = Ticker(RosClock(), BLINK_RATE_HZ)
     for turn in range(BLINKS):
@@ -24,7 +24,7 @@ def blink():
     navigator.outer_led = False
 
 
-def print_input():
+def print_input() -> None:
     navigator = Navigator(LOCATION)
     ticker = Ticker(RosClock(), READING_RATE_HZ)
     for _ in range(READINGS):
@@ -34,7 +34,7 @@ def print_input():
         ticker.sleep()
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("-b", "--blink", dest="body", action="store_const", const=blink, help="blink the lights")

@@ -18,7 +18,7 @@ RATE_HZ = 5.0
 MAX_BYTES = 4_000_000
 
 
-def send(path, link, joint):
+def send(path: str, link: str, joint: str) -> None:
     try:
         text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
         ElementTree.fromstring(text)
@@ -36,7 +36,7 @@ def send(path, link, joint):
         ticker.sleep()
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_file(parser, "URDF fragment")
     parser.add_argument("-l", "--link", default="left_hand", help="link that it is fixed to (default: %(default)s)")

@@ -23,7 +23,7 @@ HAND_OVER_S = 1.0
 MAX_BYTES, MAX_PIXELS = 100_000_000, 64_000_000
 
 
-def show(path, delay_s):
+def show(path: pathlib.Path, delay_s: float) -> None:
     try:
         content = read_file(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
         check_picture(content, MAX_PIXELS)
@@ -39,7 +39,7 @@ def show(path, delay_s):
     RosClock().sleep(HAND_OVER_S)
 
 
-def main():
+def main() -> int:
     parser = new_parser(__doc__)
     add_file(parser, "the picture's file")
     parser.add_argument("-d", "--delay", type=number(float, 0, MAX_SECONDS), default=0.0, metavar="SECONDS",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rospy
@@ -11,6 +12,9 @@ from actionlib_msgs.msg import GoalStatus
 from baxter_dataflow import wait_for
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed
+
+if TYPE_CHECKING:
+    from genpy import Message
 
 SERVER_TIMEOUT_S = 10.0
 _STATES = {getattr(GoalStatus, name): name.lower() for name in (
@@ -24,7 +28,7 @@ class ActionClient:
     `hint` is the command that starts its server. Raises ProgramFailed if there is none.
     """
 
-    def __init__(self, name: str, kind, hint) -> None:
+    def __init__(self, name: str, kind: type, hint: str) -> None:
         self._name = name
         self._client = actionlib.SimpleActionClient(name, kind)
         startup.wait_for_start([])
@@ -34,7 +38,7 @@ class ActionClient:
             raise ProgramFailed("there is no action server for %s: start it with: %s"
                                 % (rospy.resolve_name(name), hint), errno.ETIMEDOUT)
 
-    def send(self, goal) -> None:
+    def send(self, goal: Message) -> None:
         """Send a goal without waiting."""
         self._client.send_goal(goal)
 
@@ -42,7 +46,7 @@ class ActionClient:
         """Tell whether the last goal has its verdict."""
         return self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE)
 
-    def wait(self, timeout_s: float):
+    def wait(self, timeout_s: float) -> Any:
         """Wait for the last goal's verdict, `timeout_s` [ROS time] at most, and return its result.
 
         A goal without verdict by then is cancelled. Raises ProgramFailed unless it succeeded.

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import queue
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from baxter_interface import DigitalIO, Navigator
 
 from .mounted_grippers import mounted_grippers
+
+if TYPE_CHECKING:
+    from baxter_interface import Gripper
 
 
 class CuffControl:
@@ -18,7 +21,8 @@ class CuffControl:
     by default.
     """
 
-    def __init__(self, side: str, lights: bool = True, say=lambda text: None, gripper=None) -> None:
+    def __init__(self, side: str, lights: bool = True, say: Callable[[str], object] = lambda text: None,
+                 gripper: Gripper | None = None) -> None:
         self._side = side
         self._say = say
         # Callbacks only note: switching a light waits until it follows, which callbacks must not.
@@ -44,7 +48,7 @@ class CuffControl:
         if pressed:
             self._command("close")
 
-    def _command(self, action: Callable[..., Any]) -> None:
+    def _command(self, action: str) -> None:
         self._say("%s gripper: %s" % (self._side, action))
         if self._gripper:
             self._asked.put(getattr(self._gripper, action))

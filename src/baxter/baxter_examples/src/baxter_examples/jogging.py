@@ -17,7 +17,7 @@ class Jogging:
         # lost.
         self._targets = {}
 
-    def step(self, side: str, joint: str, step_rad) -> None:
+    def step(self, side: str, joint: str, step_rad: float) -> None:
         """Move the joint (short name, such as "s0") by `step_rad`."""
         limb, name = self._limbs[side], "%s_%s" % (side, joint)
         here = limb.joint_angle(name)

@@ -2,6 +2,9 @@
 """Write both arms' joint angles and grippers to a file while they move."""
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+
 import rospy
 
 from baxter_dataflow.ros_clock import RosClock
@@ -20,7 +23,7 @@ class JointRecorder:
     Raises as Limb; ValueError for a bad rate.
     """
 
-    def __init__(self, filename, rate) -> None:
+    def __init__(self, filename: str | os.PathLike[str], rate: float) -> None:
         self._rate_hz = require_number(rate, "the rate [Hz]")
         if self._rate_hz <= 0.0:
             raise ValueError("the rate [Hz] must be above 0, got %r" % rate)
@@ -33,13 +36,13 @@ class JointRecorder:
         """End the recording."""
         self._done = True
 
-    def done(self):
+    def done(self) -> bool:
         """Tell whether the recording has ended, or ROS has."""
         if rospy.is_shutdown():
             self.stop()
         return self._done
 
-    def record(self, beats=None) -> None:
+    def record(self, beats: Iterator[object] | None = None) -> None:
         """Record until stop() or ROS's end. `beats`: an iterator to keep time by, ending the recording when it ends.
 
         Raises OSError if the file cannot be written.

@@ -15,7 +15,7 @@ class KeyTable:
         self._show = show
         self._actions = {}
 
-    def add(self, key: str, text: str, action: Callable[..., Any], *arguments: int) -> None:
+    def add(self, key: str, text: str, action: Callable[..., Any], *arguments: object) -> None:
         """Let `key` call `action(*arguments)`; `text` describes it. Raises ValueError for a key in use."""
         if key in self._actions:
             raise ValueError("the key %r is in use for: %s" % (key, self._actions[key][0]))

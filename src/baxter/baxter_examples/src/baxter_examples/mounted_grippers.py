@@ -2,6 +2,8 @@
 """The grippers that this robot carries."""
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import rospy
 
 from baxter_interface import CHECK_VERSION, Gripper
@@ -9,7 +11,7 @@ from baxter_interface.gripper_link import NoGripper
 from baxter_model import CUSTOM, ELECTRIC
 
 
-def mounted_grippers(sides, calibrate: bool = False):
+def mounted_grippers(sides: Iterable[str], calibrate: bool = False) -> dict[str, Gripper]:
     """Return {side: Gripper} of the `sides` whose arm carries one that can be commanded; the log names the others.
 
     With `calibrate`, electric ones that are not calibrated yet are. Raises OSError.

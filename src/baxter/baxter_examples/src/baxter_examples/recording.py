@@ -76,7 +76,7 @@ def read(path: str | Path) -> Recording:
     return parse(io.StringIO(text, newline=""), path)
 
 
-def parse(stream: TextIO, path: str) -> Recording:
+def parse(stream: TextIO, path: str | Path) -> Recording:
     """The recording in a stream of lines; ``path`` names it in errors. Raises BadRecording."""
     try:
         lines = list(csv.reader(stream))

@@ -2,6 +2,8 @@
 """Send trajectories to an arm's action server."""
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -28,11 +30,11 @@ class TrajectoryClient(ActionClient):
         self._goal = FollowJointTrajectoryGoal()
         self._goal.trajectory.joint_names = limb_joint_names(self._side)
 
-    def set_goal_time(self, goal_time_s) -> None:
+    def set_goal_time(self, goal_time_s: float) -> None:
         """Set the time that the arm may take to arrive after the last point [s]."""
         self._goal_time_s = goal_time_s
 
-    def add(self, time_s: float, angles: dict[str, float]) -> None:
+    def add(self, time_s: float, angles: Sequence[float]) -> None:
         """Add a point `time_s` after the start: angles [rad] from shoulder to wrist."""
         self._goal.trajectory.points.append(JointTrajectoryPoint(
             positions=list(angles), time_from_start=rospy.Duration.from_sec(time_s)))

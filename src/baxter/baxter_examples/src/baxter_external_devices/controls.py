@@ -37,7 +37,7 @@ class Stick:
 
     index: int
 
-    def read(self, axes: list[float], buttons: list[int]):
+    def read(self, axes: list[float], buttons: list[int]) -> float:
         return axes[self.index]
 
 
@@ -45,8 +45,8 @@ class Stick:
 class Controller:
     """Controls by their names."""
 
-    buttons: dict
-    sticks: dict
+    buttons: dict[str, Button | AxisButton]
+    sticks: dict[str, Stick]
 
 
 def _buttons(**indices: int) -> dict[str, Button]:

@@ -45,7 +45,7 @@ class Keyboard:
         return key.decode("latin-1")
 
 
-def getch(timeout: float = 0.01):
+def getch(timeout: float = 0.01) -> str | None:
     """Return the next key of the terminal, or None if none was pressed within `timeout` [s]."""
     with Keyboard() as keyboard:
         return keyboard.read(timeout)

@@ -32,17 +32,17 @@ class Joystick:
         self._sticks = {name: StickEvents(scale, offset, deadband) for name in self.CONTROLLER.sticks}
         self._subscriber = rospy.Subscriber("/joy", Joy, self._on_joy, queue_size=10)
 
-    def button_down(self, name: str):
+    def button_down(self, name: str) -> bool:
         """Tell whether the button has gone down since the last call."""
         with self._lock:
             return self._buttons[name].take_down()
 
-    def button_up(self, name: str):
+    def button_up(self, name: str) -> bool:
         """Tell whether the button has gone up since the last call."""
         with self._lock:
             return self._buttons[name].take_up()
 
-    def stick_value(self, name: str):
+    def stick_value(self, name: str) -> float:
         """Return the stick's value."""
         with self._lock:
             return self._sticks[name].value
