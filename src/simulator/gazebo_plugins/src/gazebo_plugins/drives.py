@@ -192,8 +192,8 @@ class _Wheels(Drive):
 class DiffDrive(_Wheels):
     """``libgazebo_ros_diff_drive.so``. Elements besides those of :class:`Drive`: ``leftJoint`` (left_joint),
     ``rightJoint`` (right_joint), ``wheelSeparation`` (0.34 m), ``wheelDiameter`` (0.15 m), ``wheelTorque`` (5 Nm at
-    most), ``wheelAcceleration`` (0: any; of the rim [m/s2]), ``odometrySource`` (world; encoder), ``legacyMode`` (true:
-    left and right are exchanged), ``publishWheelJointState`` (false: the wheels on ``joint_states``),
+    most), ``wheelAcceleration`` (0: any; of the rim [m/s2]), ``odometrySource`` (world; encoder),
+    ``publishWheelJointState`` (false: the wheels on ``joint_states``),
     ``publishWheelTF`` (false: the frames of the wheels on ``/tf``), ``publishTf`` (true; false: neither odometry nor
     its transform, as in Gazebo).
     """
@@ -202,13 +202,7 @@ class DiffDrive(_Wheels):
     named_after_model = True
 
     def sides(self):
-        names = [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]
-        if self.flag("legacyMode", True):
-            if self.text("legacyMode") is None:
-                self.context.log.warn("%s says no <legacyMode>, so left and right are exchanged, as in Gazebo; give "
-                                      "false where that is wrong" % self.what)
-            return names[::-1]
-        return names
+        return [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]
 
     def configure(self):
         super().configure()

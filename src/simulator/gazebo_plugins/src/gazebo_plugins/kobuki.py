@@ -12,7 +12,7 @@ from sim_time.stamps import stamp
 
 _NAMES = {"leftJoint": "left_wheel_joint_name", "rightJoint": "right_wheel_joint_name",
           "wheelSeparation": "wheel_separation", "wheelDiameter": "wheel_diameter", "publishOdomTF": "publish_tf"}
-_FIXED = {"odometrySource": "encoder", "legacyMode": "false", "publishWheelJointState": "true"}
+_FIXED = {"odometrySource": "encoder", "publishWheelJointState": "true"}
 
 
 class Kobuki(DiffDrive):

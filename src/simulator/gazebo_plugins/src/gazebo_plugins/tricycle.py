@@ -9,7 +9,7 @@ from gazebo_plugins.drives import DiffDrive
 _NAMES = {"leftJoint": "encoderWheelLeftJoint", "rightJoint": "encoderWheelRightJoint",
           "wheelSeparation": "encoderWheelSeparation", "wheelDiameter": "encoderWheelDiameter"}
 _DEFAULTS = {"leftJoint": "left_wheel_joint", "rightJoint": "right_wheel_joint", "wheelSeparation": "0.5",
-             "robotBaseFrame": "base_link", "legacyMode": "false"}
+             "robotBaseFrame": "base_link"}
 
 
 class Tricycle(DiffDrive):

@@ -52,7 +52,8 @@ PLUGINS = {
     "libgazebo_ros_vacuum_gripper.so": ("topicName bodyName updateRate",),
     "libgazebo_ros_diff_drive.so": (
         _DRIVE + "updateRate leftJoint rightJoint wheelSeparation wheelDiameter wheelTorque wheelAcceleration "
-        "legacyMode odometrySource publishWheelJointState publishWheelTF publishOdomTF publishTf",),
+        "odometrySource publishWheelJointState publishWheelTF publishOdomTF publishTf",
+        ({"legacyMode": "false"}, "left and right are not exchanged, as in melodic and noetic")),
     "libgazebo_ros_skid_steer_drive.so": (
         _DRIVE + "updateRate leftFrontJoint rightFrontJoint leftRearJoint rightRearJoint wheelSeparation wheelDiameter "
         "torque broadcastTF covariance_x covariance_y covariance_yaw",),
