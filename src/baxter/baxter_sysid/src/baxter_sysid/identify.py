@@ -30,8 +30,6 @@ COMMON = {MASS: (0.0, 4.0, 0.2, 0.15), DELAY: (0.0, 0.06, 0.2, 0.003), EXCESS: (
 #: The load's place on the hand's axis [m from the frame `<side>_hand`]: that of a gripper.
 LOAD_M = 0.08
 MAX_REFUSALS = 4
-#: The inertia about w2 is so small that only the ratios of its gain, damping and friction show in a motion.
-NEVER = ("proportional_gain", "w2")
 
 Name = tuple[str, str]
 
@@ -97,7 +95,7 @@ class Model:
         settings = self.settings
         common = [name for name, is_free in ((EXCESS, settings.excess), (MASS, settings.load), (DELAY, settings.delay))
                   if is_free]
-        return [(number, joint) for number in FREE for joint in JOINTS if (number, joint) != NEVER] + common
+        return [(number, joint) for number in FREE for joint in JOINTS] + common
 
     def start(self, names: list[Name]) -> Array:
         """(p,) the numbers as they are."""
@@ -132,7 +130,7 @@ class Model:
 
 def identify(model: Model) -> Found:
     """Fit a model's numbers."""
-    names, refused = model.names(), {NEVER: float("inf")}
+    names, refused = model.names(), {}
     before = model.errors([], np.zeros(0))
     for _ in range(MAX_REFUSALS):
         start = model.start(names)

@@ -10,6 +10,7 @@ import numpy as np
 
 from baxter_sim_hardware.arms import actuators
 from baxter_sim_hardware.arms.actuators import Wanted, turn
+from baxter_sim_hardware.robot import INERTIA_TICKS
 from disk_cache.compiled import compiler
 
 from . import arm_body
@@ -17,7 +18,7 @@ from .arm_body import GRAVITY, TICK_S, ArmBody, Array, fill_inertia, solve, torq
 
 _compiled = compiler("baxter_sysid", [__file__, arm_body.__file__, actuators.__file__], error_model="numpy")
 
-INERTIA_TICKS = 5  # the inertia of an arm changes that slowly
+ARM_TICKS = 5  # the inertia of an arm changes that slowly
 
 
 class Motion(NamedTuple):
@@ -69,14 +70,24 @@ def _replay(body, known, numbers, start, velocity, points, every):
     gravity, own = np.empty(count), np.empty(count)
     links[0], links[1] = start, velocity
     positions[0] = start
+    # It rested, or moved for long: the integral has what the controller does not know of the load.
+    turn_joints(body, start, turned)
+    torques(body, turned, still, still, GRAVITY, work, own)
+    torques(known, turned, still, still, GRAVITY, work, gravity)
+    for i in range(count):
+        balance = numbers[11, i] + numbers[12, i] * start[i]
+        begun[i] = True
+        state[0, i] = start[i] + (own[i] + balance * (1.0 + numbers[16, i])) / numbers[0, i]
+        state[1, i], state[2, i], state[4, i] = velocity[i], points[0, i], points[0, i]
+        state[3, i] = balance * numbers[16, i] + own[i] - gravity[i]
     for tick in range(ticks):
         turn_joints(body, links[0], turned)
         torques(known, turned, still, still, GRAVITY, work, gravity)
-        if tick % INERTIA_TICKS == 0:
+        if tick % ARM_TICKS == 0:
             fill_inertia(body, turned, still, unit, work, matrix)
-            for i in range(count):
-                links[2, i] = matrix[i, i]
-                matrix[i, i] += dt * body.damping[i]
+            if tick % INERTIA_TICKS == 0:
+                for i in range(count):
+                    links[2, i] = matrix[i, i]
         torque = turn(state, begun, numbers, Wanted(driven, points[tick], still, raw, gravity, limit), links, dt)
         torques(body, turned, links[1], still, GRAVITY, work, own)
         row = tick // every + 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from baxter_model import JOINTS
+from baxter_sim_hardware.arms.actuators import NUMBERS
 
 from .arm_body import Array
 from .fit import rms
@@ -31,6 +32,12 @@ def numbers(found: Found) -> list[str]:
     """Lines: the fitted numbers with their standard deviations, and what the recording does not determine."""
     lines = ["%s of %s: %.4g, +- %.2g" % (number, joint, value, deviation)
              for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True)]
+    for number, joint in found.refused:
+        damping = ("motor_damping", joint)
+        if number == "proportional_gain" and damping in found.names:
+            gain = found.numbers[found.sides[0]][NUMBERS.index(number), JOINTS.index(joint)]
+            lines.append("lag of %s, motor_damping by proportional_gain: %.4g s, +- %.2g; the two are not known" % (
+                joint, found.value(damping) / gain, found.deviations[found.names.index(damping)] / gain))
     return lines + ["%s of %s: not determined (+- %.2g), kept" % (number, joint, deviation)
                     for (number, joint), deviation in found.refused.items()]
 

@@ -127,21 +127,12 @@ def found(robot, rows):
                                             Settings(load=True, delay=True, excess=False)))
 
 
-def rows_of_w2(result):
-    """The gain of w2 that was kept."""
-    return result.numbers["left"][NUMBERS.index("proportional_gain"), JOINTS.index("w2")]
-
-
 def test_a_hidden_robot_with_a_weight_and_late_messages_is_found_again(found):
     truth, _, result = found
     for (number, joint), value in zip(result.names, result.values, strict=True):
-        if number in truth and truth[number][joint] > 0.1 and joint != "w2":
+        if number in truth and truth[number][joint] > 0.1:
             assert value == pytest.approx(truth[number][joint], rel=0.05), (number, joint)
     assert result.value(MASS) == pytest.approx(0.8, rel=0.05) and result.value(DELAY) == pytest.approx(0.012, rel=0.05)
-    # A wrist's inertia is so small that only the ratio of its gain and damping shows.
-    assert ("proportional_gain", "w2") in result.refused
-    ratio = result.value(("motor_damping", "w2")) / rows_of_w2(result)
-    assert ratio == pytest.approx(truth["motor_damping"]["w2"] / truth["proportional_gain"]["w2"], rel=0.05)
     assert np.sqrt(np.mean(result.after ** 2, axis=0)).max() < 8e-4
     assert np.sqrt(np.mean(result.without ** 2, axis=0)).max() < 8e-4
 
