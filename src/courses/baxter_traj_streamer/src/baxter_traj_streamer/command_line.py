@@ -2,7 +2,10 @@
 """Shared by the commands that move arms."""
 from __future__ import annotations
 
+import argparse
 import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import rospy
 
@@ -12,8 +15,11 @@ from command_line.options import MAX_SECONDS, number
 from .move_service import REFUSALS
 from .traj_client import MoveFailed, TrajClient
 
+if TYPE_CHECKING:
+    from trajectory_msgs.msg import JointTrajectory
 
-def add_wait_option(parser, default_s: float) -> None:
+
+def add_wait_option(parser: argparse.ArgumentParser, default_s: float | None) -> None:
     """``--wait SECONDS``; ``default_s`` None: until the move is over."""
     parser.add_argument("--wait", type=number(float, 0, MAX_SECONDS), default=default_s, metavar="SECONDS",
                         help="how long to wait for the result, in the robot's time; the arm moves on in any case "
@@ -21,7 +27,7 @@ def add_wait_option(parser, default_s: float) -> None:
                         % ("until it is there" if default_s is None else "%g" % default_s))
 
 
-def run(name: str, plan, wait_s: float | None) -> None:
+def run(name: str, plan: Callable[[TrajClient], JointTrajectory | None], wait_s: float | None) -> None:
     """Send the trajectory ``plan(client)`` and wait for it; exits with a line on stderr after a failure.
 
     ``plan`` returns None if there is nothing to send.

@@ -2,7 +2,7 @@
 """The action server ``trajActionServer``: connects goals, their checks and the robot's joint commands."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from baxter_traj_streamer.settings import StreamerSettings
     from baxter_traj_streamer.versions import Version
 
+    from .judging import JointLimit
+    from .robot_link import RobotLink
+
 ACTION_NAME = "trajActionServer"
 _FEEDBACK_PERIOD_S = 0.1
 STOPPED_MEANWHILE = "the robot was disabled or stopped on the way; its arms have stopped where they were"
@@ -38,7 +41,8 @@ class Interpolator:
     version: the clients' `versions.Version`.
     """
 
-    def __init__(self, robot: Any, limits, settings: StreamerSettings, version: Version) -> None:
+    def __init__(self, robot: RobotLink, limits: Mapping[str, JointLimit], settings: StreamerSettings,
+                 version: Version) -> None:
         self._robot = robot
         self._limits = limits
         self._settings = settings

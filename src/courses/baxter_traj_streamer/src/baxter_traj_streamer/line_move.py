@@ -2,7 +2,7 @@
 """Moves along a straight line from the arms' present position. A separate module, because its imports take a second."""
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -16,6 +16,13 @@ from .settings import SIDES, SettingsError, arm_joint_names
 from .straight_line import straight_line
 from .traj_client import joint_trajectory
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from trajectory_msgs.msg import JointTrajectory
+
+    from .traj_client import TrajClient
+
 
 class LineMove:
     """The tip along a straight line, its orientation kept: ``trajectory(side, displacement, speed)``.
@@ -23,7 +30,7 @@ class LineMove:
     Raises SettingsError without robot_description, ChainError or UrdfError if it has no gripper.
     """
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: TrajClient) -> None:
         self._client = client
         if not rospy.has_param("robot_description"):
             raise SettingsError("the parameter robot_description is not set; the arms' kinematics are read from it")
@@ -31,7 +38,7 @@ class LineMove:
         self._chains = {side: Chain.from_robot(robot, BASE_FRAME, tip_of(side)) for side in SIDES}
         self._limits = read_limits()
 
-    def trajectory(self, side: str, displacement: np.ndarray, speed: float = 0.0):
+    def trajectory(self, side: str, displacement: Sequence[float] | np.ndarray, speed: float = 0.0) -> JointTrajectory:
         """``displacement`` (3,) [m] in base; ``speed`` [m/s], 0: the settings'. Raises LeavesReach, ValueError."""
         settings = self._client.streamer.settings
         if not 0.0 <= speed < np.inf:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import rospy
 
@@ -11,11 +12,15 @@ import baxter_interface.startup
 
 from .traj_client import MoveFailed, TrajClient
 
+if TYPE_CHECKING:
+    from trajectory_msgs.msg import JointTrajectory
+
 # Errors of invalid requests (PlayfileError, SettingsError, LeavesReach are ValueErrors).
 REFUSALS = (MoveFailed, ValueError, OSError)
 
 
-def run(name: str, service: str, service_type, move_type, plan) -> None:
+def run(name: str, service: str, service_type: type, move_type: Callable[[TrajClient], Any],
+        plan: Callable[[Any, Any], JointTrajectory]) -> None:
     """Run as the node ``name`` until it is shut down. ``plan(move, request)`` returns the trajectory for a request.
 
     A request during another one is refused; trajActionServer/cancel stops the active one.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from baxter_traj_streamer.settings import StreamerSettings
+
+    from .judging import JointLimit
 
 #: Of a playfile; the notes' have some kilobytes.
 MAX_BYTES = 100_000_000
@@ -37,10 +39,10 @@ class Playfile(NamedTuple):
     positions: np.ndarray
     times: np.ndarray
     source: str
-    lines: tuple
+    lines: tuple[int, ...]
 
     @classmethod
-    def read(cls, path: Path):
+    def read(cls, path: Path) -> Playfile:
         """Read a file. Raises PlayfileError, OSError."""
         try:
             text = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S)
@@ -49,7 +51,7 @@ class Playfile(NamedTuple):
         return cls.parse(text, str(path))
 
     @classmethod
-    def parse(cls, text: str, source: str = "playfile"):
+    def parse(cls, text: str, source: str = "playfile") -> Playfile:
         """Take the content of a file; empty lines and text after a # are ignored. Raises PlayfileError."""
         rows, lines = [], []
         for number, line in enumerate(text.splitlines(), start=1):
@@ -71,12 +73,12 @@ class Playfile(NamedTuple):
         return "".join("%s, %.3f\n" % (", ".join("%.6f" % angle for angle in row), time)
                        for row, time in zip(self.positions, self.times, strict=True))
 
-    def retimed(self, velocity: Any, min_segment_s: float):
+    def retimed(self, velocity: np.ndarray, min_segment_s: float) -> Playfile:
         """The same poses with the notes' arrival times for ``velocity`` (7,) [rad/s]."""
         return self._replace(times=np.array(arrival_times(self.positions, velocity, min_segment_s)))
 
 
-def merged(playfiles: Any) -> tuple[list[Any], np.ndarray, np.ndarray]:
+def merged(playfiles: Mapping[str, Playfile]) -> tuple[list[str], np.ndarray, np.ndarray]:
     """(joint names, times (m,), positions (m, k)) of {side: Playfile}, each starting at its first row at time 0.
 
     It has a row for each time of any file; between its own rows an arm moves linearly, after them it rests.
@@ -89,7 +91,7 @@ def merged(playfiles: Any) -> tuple[list[Any], np.ndarray, np.ndarray]:
     return names, times, np.array(columns).T
 
 
-def check(playfiles: Any, limits, settings: StreamerSettings) -> None:
+def check(playfiles: Mapping[str, Playfile], limits: Mapping[str, JointLimit], settings: StreamerSettings) -> None:
     """Check {side: Playfile} as the server would, but without the start; arguments as for judging.judge.
 
     Raises PlayfileError, which names the file and, if known, the line.

@@ -62,7 +62,7 @@ class RobotLink:
         """Whether no node publishes joint angles any more. A paused simulation is not gone."""
         return self._presence.is_gone()
 
-    def why_not_ready(self):
+    def why_not_ready(self) -> str:
         """Why the arms will not move, as text; "" if they will."""
         state = self._state
         if state is None:

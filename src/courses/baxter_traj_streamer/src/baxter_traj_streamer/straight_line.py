@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from arm_kinematics import Budget, NoSolution, Reason, solve
+from arm_kinematics import Budget, Chain, NoSolution, Reason, solve
 
 from .optimal import time_optimal
 
@@ -37,7 +38,8 @@ class StraightLine(NamedTuple):
     distances: np.ndarray
     positions: np.ndarray
 
-    def timed(self, velocity: Any, acceleration: np.ndarray, speed: float):
+    def timed(self, velocity: np.ndarray, acceleration: np.ndarray,
+              speed: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(times (m,) [s], positions (m, n), velocities (m, n)): points that give a smooth move when joined by cubics.
 
         The tip speeds up, continues at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
@@ -58,7 +60,8 @@ class StraightLine(NamedTuple):
         return times, self.positions, slope * np.array([[way.sample(t)[1, 0]] for t in times])
 
 
-def straight_line(chain: Any, start: np.ndarray, displacement: np.ndarray) -> StraightLine:
+def straight_line(chain: Chain, start: Sequence[float] | np.ndarray,
+                  displacement: Sequence[float] | np.ndarray) -> StraightLine:
     """The :class:`StraightLine` of the tip of ``chain`` from the posture ``start`` (n,) [rad].
 
     ``displacement`` (3,) [m] is in the base frame of the chain. Each solution is searched from the previous one, and

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -18,10 +18,15 @@ from .ros_settings import read_settings
 from .settings import JOINTS, SIDES, arm_joint_names
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
     from baxter_traj_streamer.settings import StreamerSettings
 
 
-def stuff_trajectory(qvecs: Any, side: str, settings: StreamerSettings) -> JointTrajectory:
+def stuff_trajectory(qvecs: Sequence[Sequence[float]] | np.ndarray, side: str,
+                     settings: StreamerSettings) -> JointTrajectory:
     """The JointTrajectory of one arm along the 7-vectors ``qvecs``; the first point is due at 0 s.
 
     Raises ValueError for an empty path or vectors that are not seven finite numbers.
@@ -60,25 +65,25 @@ class BaxterTrajStreamer:
         for publisher in self._command_publishers.values():
             startup.wait_for_subscribers(publisher)
 
-    def get_qvec(self, side: str) -> list[Any]:
+    def get_qvec(self, side: str) -> list[float]:
         """The seven measured angles of one arm."""
         angles = self.robot.angles()
         return [angles[name] for name in arm_joint_names(side)]
 
-    def transition_time(self, dqvec: Any) -> float:
+    def transition_time(self, dqvec: Sequence[float] | np.ndarray) -> float:
         """Shortest time [s] for a move of the seven joints by `dqvec`; see timing.transition_time."""
         return timing.transition_time(dqvec, self.settings.planning_velocity())
 
-    def stuff_trajectory(self, qvecs: Any, side: str = "right") -> JointTrajectory:
+    def stuff_trajectory(self, qvecs: Sequence[Sequence[float]] | np.ndarray, side: str = "right") -> JointTrajectory:
         """Turn a path, a list of 7-vectors, into a JointTrajectory of one arm; see :func:`stuff_trajectory`."""
         return stuff_trajectory(qvecs, side, self.settings)
 
-    def cmd_pose(self, qvec: Any, side: str) -> None:
+    def cmd_pose(self, qvec: Sequence[float] | np.ndarray, side: str) -> None:
         """Command one arm's joints once, in position mode, and return at once."""
         self._command_publishers[side].publish(JointCommand(
             mode=JointCommand.POSITION_MODE, names=arm_joint_names(side), command=list(qvec)))
 
-    def pub_arm_trajectory(self, trajectory: Any, side: str) -> None:
+    def pub_arm_trajectory(self, trajectory: JointTrajectory, side: str) -> None:
         """Publish a trajectory on <side>_arm_joint_path_command; goals of trajActionServer are the better way."""
         self._path_publishers[side].publish(trajectory)
 

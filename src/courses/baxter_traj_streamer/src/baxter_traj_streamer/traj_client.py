@@ -38,7 +38,7 @@ class SentGoal:
     """An active goal. It is polled instead of waiting for events, because a response may arrive before send()
     returns."""
 
-    def __init__(self, client: Any, goal: Any, feedback: Any) -> None:
+    def __init__(self, client: actionlib.ActionClient, goal: Any, feedback: Callable[[float], object]) -> None:
         self._client = client
         self._handle = client.send_goal(goal, feedback_cb=lambda _, message: feedback(message.fdbk))
 
@@ -119,14 +119,15 @@ class TrajClient:
         finally:
             startup.LINE.end()
 
-    def send(self, trajectory: Any, traj_id: int = 1, feedback: Any = lambda percent: None) -> SentGoal:
+    def send(self, trajectory: JointTrajectory, traj_id: int = 1,
+             feedback: Callable[[float], object] = lambda percent: None) -> SentGoal:
         """Send a JointTrajectory: a :class:`SentGoal`; ``feedback`` is called with the percent done.
 
         The arms continue when this program ends; see the setting stop_when_client_leaves.
         """
         return SentGoal(self._action, self._version.make_goal(trajectory, traj_id), feedback)
 
-    def move(self, trajectory: Any, timeout_s: float | None = None) -> None:
+    def move(self, trajectory: JointTrajectory, timeout_s: float | None = None) -> Any:
         """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.
 
         Raises MoveFailed, ROSInterruptException when ROS shuts down; the arms then continue.
@@ -139,7 +140,7 @@ class TrajClient:
             raise MoveFailed(status, text)
         return result
 
-    def here(self, joint_names: Sequence[str]) -> list[Any]:
+    def here(self, joint_names: Sequence[str]) -> list[float]:
         """The measured angles [rad] of these joints. Raises KeyError for one that the robot does not report."""
         angles = self.streamer.robot.angles()
         return [angles[name] for name in joint_names]

@@ -32,7 +32,7 @@ class Version(NamedTuple):
     has_id: bool
 
     @property
-    def md5sum(self):
+    def md5sum(self) -> str:
         """MD5 sum of the goal, by which server and clients check that they use the same version."""
         return self.action_goal._md5sum
 
