@@ -51,7 +51,7 @@ SUITES = {
     "tracking": ("tracking_bench", "trajActionServer: the jitter of its commands, the arm's tracking error"),
     "fidelity": ("fidelity_bench", "a recording of a physical robot's arms, replayed: --recording FILE for another"),
     "placing": ("placing_bench", "pick and place by friction, twenty seeds a round: 100 in five"),
-    "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
+    "start": ("start_bench", "launch to /robot/sim/started; memory of each process, CPU of a resting lab"),
     "cameras": ("camera_bench", "pictures beside PyBullet's own; pictures per second, and their cost to physics"),
     "web": ("web_bench", "the page: first sight, cost of viewers, delays of cameras, hands, stop and echoes"),
     "web_soak": ("web_soak_bench", "growth of the page's server under 50 clients that come and go, some misbehaving"),

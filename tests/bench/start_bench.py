@@ -1,12 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The time from roslaunch to a robot that is ready, and the memory of every process of the lab."""
+"""The time from roslaunch to a robot that is ready, the memory of every process of the lab, its cost at rest."""
+import contextlib
+import os
 import tempfile
+import time
 from pathlib import Path
 
-from labs import HERE, Lab, memory_mb
+from labs import HERE, Lab, Process, memory_mb
 
+from processes.family import children_of
+
+# What has only started still loads and connects [s]; how long a lab is watched at rest [s].
+SETTLE_S, RESTING_S = 3.0, 10.0
 # A launch file with one empty node measures the time of roslaunch and rospy alone.
 EMPTY = '<launch><node name="bench_empty" pkg="workspace_tests" type="lab_part.py" args="empty"/></launch>'
+
+
+def _cpu_s(processes):
+    """CPU time of processes that may have ended [s]."""
+    total = 0.0
+    for process in processes:
+        with contextlib.suppress(OSError):
+            total += process.cpu_s()
+    return total
 
 
 def measure(report, quick, number):
@@ -20,12 +36,19 @@ def measure(report, quick, number):
             bare_mb = memory_mb(lab.process(node).pid)
     with Lab(gui="false") as lab:
         report.add("launch to /robot/sim/started", lab.started_s, "s", ("one empty node", bare_s), most=5.0)
-        total = 0.0
+        used = {}
         for node in lab.nodes():
             try:
-                used = memory_mb(lab.process(node).pid)
+                pid = lab.process(node).pid
+                if pid not in used:  # one process may have several names
+                    used[pid] = memory_mb(pid)
+                    report.add("memory of %s" % node, used[pid], "MB", ("empty rospy node", bare_mb))
             except (OSError, TypeError):
                 continue  # a node that has ended, such as spawn_model
-            total += used
-            report.add("memory of %s" % node, used, "MB", ("empty rospy node", bare_mb))
-        report.add("memory of all nodes", total, "MB")
+        report.add("memory of all nodes", sum(used.values()), "MB", most=290.0)
+        time.sleep(SETTLE_S)
+        processes, begin = [Process(pid) for pid in children_of([os.getpid()]) - {os.getpid()}], time.monotonic()
+        before = _cpu_s(processes)
+        time.sleep(1.0 if quick else RESTING_S)
+        share = 100.0 * (_cpu_s(processes) - before) / (time.monotonic() - begin)
+        report.add("a resting lab in real time, all processes", share, "% of a core", most=18.0)
