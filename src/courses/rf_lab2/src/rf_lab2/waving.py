@@ -12,12 +12,12 @@ HANDS_UP = {"s0": -0.3, "s1": -1.2, "e0": 0.0, "e1": 1.2, "w0": 0.0, "w1": -1.4,
 RAMP_S = 1.0
 
 
-def hands_up(side: str):
+def hands_up(side: str) -> dict[str, float]:
     """Joint angles {name: rad} of the arm `side`, "left" or "right", with its hand up."""
     return arm_angles(side, HANDS_UP)
 
 
-def shifts(side: str, amplitude_m: float, count: int):
+def shifts(side: str, amplitude_m: float, count: int) -> np.ndarray:
     """Shifts (count, 3) [m, in base] of the gripper along one period: a sine along y, mirrored for the other arm."""
     phases = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     out = np.zeros((count, 3))
@@ -41,7 +41,7 @@ class Swing:
         self._places = np.arange(len(rows) + 1)
         self._columns = np.vstack([rows, rows[:1]]).T
 
-    def angles(self, elapsed_s: float, total_s: float):
+    def angles(self, elapsed_s: float, total_s: float) -> np.ndarray:
         """Angles (joints,) [rad] after `elapsed_s` of `total_s`: at rest in the first row at both ends."""
         place = (elapsed_s / self._period_s * len(self._rows)) % len(self._rows)
         there = np.array([np.interp(place, self._places, column) for column in self._columns])
