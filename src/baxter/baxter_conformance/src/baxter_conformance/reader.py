@@ -25,7 +25,7 @@ POLL_S = 0.02
 NO_ANSWER = (rosgraph.MasterException, rospy.ROSException, OSError, xmlrpc.client.Error, http.client.HTTPException)
 
 
-def read(robot: Interface, timeout_s: float):
+def read(robot: Interface, timeout_s: float) -> Seen:
     """Return a Seen. robot: the Interface of which the topics are listened to. timeout_s: how long to wait for them.
 
     Call after rospy.init_node(). Raises one of NO_ANSWER where the master does not answer.
