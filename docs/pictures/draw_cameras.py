@@ -11,6 +11,7 @@ the Kinect's depth with its noise.
 """
 import contextlib
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import cv2
@@ -37,7 +38,7 @@ MOVING = 2.0
 
 
 @contextlib.contextmanager
-def moving(velocities):
+def moving(velocities: dict[str, float]) -> Iterator[None]:
     """The left arm moves so, to and fro, and goes back where it was at the end."""
     limb = Limb("left")
     start = limb.joint_angles()
@@ -57,7 +58,7 @@ def moving(velocities):
 
 
 @contextlib.contextmanager
-def settings(camera, **values):
+def settings(camera: str, **values: float) -> Iterator[None]:
     """The camera has these settings meanwhile."""
     client = Client(camera, timeout=TIMEOUT_S)
     before = {name: client.get_configuration(TIMEOUT_S)[name] for name in values}
@@ -69,7 +70,8 @@ def settings(camera, **values):
         client.close()
 
 
-def together(topics, fits=lambda pictures: True):
+def together(topics: Sequence[str],
+             fits: Callable[[list[np.ndarray]], bool] = lambda pictures: True) -> list[np.ndarray]:
     """Pictures of the same moment of all topics, the next ones that fit."""
     came, found = {}, []
 
@@ -89,20 +91,20 @@ def together(topics, fits=lambda pictures: True):
     return found[0]
 
 
-def later(topic, number):
+def later(topic: str, number: int) -> np.ndarray:
     """The picture that comes as the `number`-th."""
     pictures = []
     return together([topic], lambda one: pictures.append(one) or len(pictures) >= number)[0]
 
 
-def by_number(numbers):
+def by_number(numbers: np.ndarray) -> np.ndarray:
     """A colour for each number of a mask; black for 0."""
     hue = (numbers.astype(np.uint32) * 67 % 180).astype(np.uint8)
     bright = np.where(numbers > 0, 230, 0).astype(np.uint8)
     return cv2.cvtColor(np.dstack([hue, np.full_like(hue, 190), bright]), cv2.COLOR_HSV2RGB)
 
 
-def by_direction(flow):
+def by_direction(flow: np.ndarray) -> np.ndarray:
     """Hue by the flow's direction, saturation by its length; grey for nothing."""
     length = np.linalg.norm(flow, axis=2)
     hue = np.nan_to_num(np.degrees(np.arctan2(flow[..., 1], flow[..., 0])) % 360.0 / 2.0)
@@ -111,14 +113,14 @@ def by_direction(flow):
     return cv2.cvtColor(np.dstack([hue, full, bright]).astype(np.uint8), cv2.COLOR_HSV2RGB)
 
 
-def by_depth(depth):
+def by_depth(depth: np.ndarray) -> np.ndarray:
     """Near is light, nothing is dark blue."""
     share = np.clip((depth - DEPTH_M[0]) / (DEPTH_M[1] - DEPTH_M[0]), 0.0, 1.0)
     grey = np.nan_to_num(240.0 - 200.0 * share).astype(np.uint8)
     return np.where(np.isfinite(depth)[..., None], np.dstack([grey] * 3), np.uint8([0, 0, 60])).astype(np.uint8)
 
 
-def save(name, tiles):
+def save(name: str, tiles: Sequence[tuple[str, np.ndarray]]) -> None:
     """Four pictures as two rows with their titles."""
     drawn = []
     for title, picture in tiles:
@@ -135,7 +137,7 @@ def save(name, tiles):
     print(path)
 
 
-def draw_learning():
+def draw_learning() -> None:
     topics = [KINECT + name for name in (
         "/rgb/image_raw", "/instance/image_raw", "/ideal_depth/image_raw", "/flow/image_raw")]
     with settings(KINECT, learning_topics=True), moving(SWING):
@@ -146,7 +148,7 @@ def draw_learning():
         ("ideal_depth/image_raw", by_depth(depth)), ("flow/image_raw", by_direction(flow))])
 
 
-def draw_sensor():
+def draw_sensor() -> None:
     topic = HAND + "/image"
     ideal = later(topic, 1)
     with settings(HAND, exposure_time=0.02):
@@ -161,7 +163,7 @@ def draw_sensor():
         ("depth_noise", by_depth(depth))])
 
 
-def draw():
+def draw() -> None:
     with EnabledRobot():
         draw_learning()
         draw_sensor()

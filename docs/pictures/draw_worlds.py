@@ -9,7 +9,7 @@ The worlds' bodies have settled for a second of simulated time; the conveyor has
 """
 import sys
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rospkg
@@ -21,12 +21,12 @@ from bullet_sim import Pose, World
 from gazebo_ros.world_file import read_world
 from gazebo_ros.world_lights import WorldLights, lights_of_links
 from model_files.resources import ResourceFinder, model_folders, model_sizes
-from sdf_model import ModelFolders
+from sdf_model import ModelFolders, SdfWorld
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import looking_at
-from urdf_model import drawing_urdf, merge_fixed, parse_urdf
+from urdf_model import MergedFrame, drawing_urdf, merge_fixed, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix
 from world_picture.drawing import DrawingCache
 
@@ -73,7 +73,7 @@ VIEWS = {
 }
 
 
-def robot_entry(view):
+def robot_entry(view: View) -> tuple[dict[str, Any], list[float], dict[str, MergedFrame]]:
     """(entry of the scene, state, frames) of the robot."""
     package, file = view.robot
     path = "%s/%s" % (rospkg.RosPack().get_path(package), file)
@@ -87,7 +87,7 @@ def robot_entry(view):
     return {"name": "robot", "urdf": xml, "joints": [joint.name for joint in joints]}, state, merged.frames
 
 
-def settled(description, seconds):
+def settled(description: SdfWorld, seconds: float) -> tuple[list[dict[str, Any]], list[list[float]], dict[str, Any]]:
     """(entries, states) of a world's models after ``seconds``, and its light."""
     world = World(time_step_s=description.time_step_s, gravity=description.gravity, find_mesh=ResourceFinder())
     entries, states = [], []
@@ -111,7 +111,7 @@ def settled(description, seconds):
     return entries, states, WorldLights(description.lights, description.scene).listed()
 
 
-def draw(name, view):
+def draw(name: str, view: View) -> Path:
     """Draw one picture; return its path."""
     packages = rospkg.RosPack()
     folders = ModelFolders(model_folders(packages), model_sizes(packages))
@@ -131,7 +131,7 @@ def draw(name, view):
     return path
 
 
-def main():
+def main() -> None:
     """Draw the pictures that the command line names, or all."""
     unknown = [name for name in sys.argv[1:] if name not in VIEWS]
     if unknown:

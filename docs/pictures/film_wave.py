@@ -4,7 +4,6 @@
 
 ./baxter.sh sim docs/pictures/film_wave.py docs/pictures/wave.webp
 """
-
 import subprocess
 import sys
 
@@ -23,11 +22,11 @@ EYE, TARGET = (2.9, 1.35, 1.75), (0.2, -0.03, 1.0)  # [m, in the world]
 QUALITY = 35
 
 
-def moves():
+def moves() -> bool:
     return max(map(abs, rospy.wait_for_message("/robot/joint_states", JointState).velocity)) > MOVES_RAD_S
 
 
-def main(path):
+def main(path: str) -> None:
     rospy.init_node("film_wave")
     program = subprocess.Popen(["rosrun", "rf_lab2", "wave.py"])
     while program.poll() is None and not moves():
