@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Many poses in one call, on every core."""
+from __future__ import annotations
+
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +13,12 @@ from arm_kinematics import kernels
 from arm_kinematics.budget import USUAL
 from arm_kinematics.errors import InvalidPosture
 from arm_kinematics.target import Targets
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from arm_kinematics.budget import Budget
+    from arm_kinematics.chain import Chain
 
 # Poses that a thread takes at a time: large enough to hide the overhead, small enough to distribute hard poses.
 _CHUNK = 64
@@ -29,21 +38,22 @@ class BatchResult:
     restarts: np.ndarray
 
 
-def solve_batch(chain, targets, seeds, *, postures=None, budget=USUAL, threads=None):
+def solve_batch(chain: Chain, targets: Targets | ArrayLike, seeds: ArrayLike, *, postures: ArrayLike | None = None,
+                budget: Budget = USUAL, threads: int | None = None) -> BatchResult:
     """Solve for every one of ``targets`` as :func:`arm_kinematics.solve` does; return a BatchResult.
 
     ``targets``: :class:`Targets`, or poses (m, 4, 4). ``seeds``, ``postures``: (m, n), or (n,) for the same everywhere.
     ``threads``: as many as there are cores by default; the answers do not depend on it. Raises InvalidTarget, with the
     number of the target, InvalidPosture.
     """
-    targets = Targets.of(targets)
-    count = len(targets)
+    checked = Targets.of(targets)
+    count = len(checked)
     seeds = _postures(chain, seeds, count)
     chosen = (seeds, seeds if postures is None else _postures(chain, postures, count))
     solutions, outcomes = np.empty((count, len(chain))), np.empty((count, 5))
 
-    def work(first):
-        kernels.search_many(chain.arrays, chain.limit_arrays, targets.arrays, budget.effort, chosen,
+    def work(first: int) -> None:
+        kernels.search_many(chain.arrays, chain.limit_arrays, checked.arrays, budget.effort, chosen,
                             (first, min(first + _CHUNK, count)), (solutions, outcomes))
 
     with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
@@ -54,7 +64,7 @@ def solve_batch(chain, targets, seeds, *, postures=None, budget=USUAL, threads=N
                        starts.astype(int) - 1)
 
 
-def _postures(chain, values, count):
+def _postures(chain: Chain, values: ArrayLike, count: int) -> np.ndarray:
     postures = np.array(values, dtype=np.float64)
     if postures.shape == (len(chain),):
         postures = np.tile(chain.posture(postures), (count, 1))

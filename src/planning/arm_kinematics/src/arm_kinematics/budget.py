@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How exact a solution must be, and the effort before a pose counts as unsolvable."""
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Effort
 
 # Random starts before a pose counts as unreachable. Of 100,000 random reachable Baxter poses none needed more than 100.
 MAX_STARTS = 200
@@ -26,9 +32,9 @@ class Budget:
     max_iterations: int = MAX_ITERATIONS
     tolerance_m: float = 1e-6
     tolerance_rad: float = 1e-6
-    effort: tuple = field(init=False, repr=False, compare=False)  # the same numbers for the kernels
+    effort: Effort = field(init=False, repr=False, compare=False)  # the same numbers for the kernels
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("tolerance_m", "tolerance_rad"):
             if not getattr(self, name) > 0.0:
                 raise ValueError("%s must be positive, got %r" % (name, getattr(self, name)))

@@ -2,14 +2,25 @@
 """A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported only where it is used: importing PyBullet
 is slow.
 """
+from __future__ import annotations
+
 import itertools
 from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from arm_kinematics.collision import Touch
 from bullet_sim import LOG, World
 from urdf_model import Mesh
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from bullet_sim import Contact, Model
+    from urdf_model import Robot
+    from urdf_model.merge import MergedLink
 
 # Random postures in which the hull of a fixed link's mesh must touch what the mesh touches, to replace it.
 _COMPARED = 300
@@ -22,7 +33,8 @@ class BulletChecker:
     does not.
     """
 
-    def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0, rough=None):
+    def __init__(self, world: World, model: Model, self_collision_pairs: Iterable[tuple[str, str]] | None = None,
+                 margin_m: float = 0.0, rough: tuple[World, Model] | None = None) -> None:
         """``model``: the robot in ``world`` (bullet_sim); ``self_collision_pairs``: [(link, link)] that must not
         touch, all plausible ones if None. ``margin_m``: allowed depth of a contact; shapes are often a little
         too large. ``rough``: (World, Model) of the same robot, in which the meshes of its fixed link are convex.
@@ -33,47 +45,50 @@ class BulletChecker:
         self._rough, self._is_convex = rough, False
         if rough is not None:
             rough[1].set_self_collision_pairs(pairs)
-            self._is_convex = self._agree()
-        self._plans = {}
+            self._is_convex = self._agree(rough)
+        self._plans: dict[tuple[str, ...], tuple[np.ndarray, set[str], set[str]]] = {}
 
     @classmethod
-    def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None,
-                 warn=LOG.warning):
+    def of_robot(cls, robot: Robot, self_collision_pairs: Iterable[tuple[str, str]] | None = None,
+                 margin_m: float = 0.0, find_mesh: Callable[[str], str | None] | None = None,
+                 mesh_cuts: Mapping[str, ArrayLike] | None = None,
+                 warn: Callable[[str], object] = LOG.warning) -> BulletChecker:
         """Return a checker with a separate world, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
 
         ``find_mesh``, ``warn``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
         """
-        world = World(warn=warn, **({} if find_mesh is None else {"find_mesh": find_mesh}))
-        options = {} if mesh_cuts is None else {"mesh_cuts": mesh_cuts}
-        model = world.spawn(robot, robot.name or "robot", static=True, **options)
+        options: dict[str, Any] = {} if find_mesh is None else {"find_mesh": find_mesh}
+        cuts: dict[str, Any] = {} if mesh_cuts is None else {"mesh_cuts": mesh_cuts}
+        world = World(warn=warn, **options)
+        model = world.spawn(robot, robot.name or "robot", static=True, **cuts)
         rough = None
         if mesh_cuts is None and _has_meshes(model.merged.links[model.merged.root]):
             # The first world has said what it lacks.
-            rough_world = World(warn=lambda text: None, **({} if find_mesh is None else {"find_mesh": find_mesh}))
+            rough_world = World(warn=lambda text: None, **options)
             # Meshes of a body that moves are convex; without a step it stays.
             rough = rough_world, rough_world.spawn(robot, robot.name or "robot", static=False)
         return cls(world, model, self_collision_pairs, margin_m, rough)
 
     @property
-    def world(self):
+    def world(self) -> World:
         """The bullet_sim.World; spawn obstacles into it."""
         return self._world
 
-    def known(self, joint_names, q):
+    def known(self, joint_names: Sequence[str], q: Iterable[float]) -> tuple[list[str], list[float]]:
         """Return (names, values) of the joints that the robot has and whose value is finite."""
         has = set(self._model.joint_names)
         pairs = [pair for pair in zip(joint_names, q, strict=False) if pair[0] in has and np.isfinite(pair[1])]
         return [name for name, _ in pairs], [value for _, value in pairs]
 
-    def set_posture(self, joint_names, q):
+    def set_posture(self, joint_names: Sequence[str], q: ArrayLike) -> None:
         """Set the other joints of the robot, such as the other arm's."""
         self._put(self._model.index(joint_names), np.asarray(q, dtype=float))
 
-    def contact(self, joint_names, q):
+    def contact(self, joint_names: Sequence[str], q: np.ndarray) -> Touch | None:
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None if there is none."""
         return self.contact_and_cause(joint_names, q)[0]
 
-    def contact_and_cause(self, joint_names, q):
+    def contact_and_cause(self, joint_names: Sequence[str], q: np.ndarray) -> tuple[Touch | None, bool]:
         """Return (:meth:`contact`, whether the pose of the last joint's link alone is the cause).
 
         It is where that link, or one beyond it, touches a body that none of ``joint_names`` (base to tip) moves: then
@@ -94,12 +109,12 @@ class BulletChecker:
                 worst = Touch(ours[0], others, len(ours) == 1, -found.distance)
         return worst, is_fixed
 
-    def _put(self, index, q):
+    def _put(self, index: np.ndarray, q: np.ndarray) -> None:
         self._model.set_joint_positions(index, q)
         if self._rough is not None:
             self._rough[1].set_joint_positions(index, q)
 
-    def _touching(self):
+    def _touching(self) -> list[Contact]:
         """The contacts of the robot. Those with a fixed link of triangles take twenty times as long as all others, and
         are looked at where something touches its convex hull, unless that is as good."""
         if self._rough is not None and len(self._world.models) == 1:
@@ -109,22 +124,22 @@ class BulletChecker:
                 return found
         return self._world.touching(self._model)
 
-    def _agree(self):
+    def _agree(self, rough: tuple[World, Model]) -> bool:
         """Whether the same pairs touch with the fixed link as its hull, in all of some random postures."""
-        (world, model), index = self._rough, np.arange(len(self._model.joint_names))
+        (world, model), index = rough, np.arange(len(self._model.joint_names))
         for q in random_postures(model, _COMPARED):
             self._put(index, q)
             if _touching_pairs(world, model) != _touching_pairs(self._world, self._model):
                 return False
         return True
 
-    def close(self):
+    def close(self) -> None:
         """Close the world."""
         self._world.close()
         if self._rough is not None:
             self._rough[0].close()
 
-    def _plan(self, joint_names):
+    def _plan(self, joint_names: tuple[str, ...]) -> tuple[np.ndarray, set[str], set[str]]:
         """Return (index of the joints, names of the links that they move, of those that the last one moves); computed
         once."""
         if joint_names not in self._plans:
@@ -137,7 +152,7 @@ class BulletChecker:
             self._plans[joint_names] = (self._model.index(joint_names), moved, last)
         return self._plans[joint_names]
 
-    def _named(self, found):
+    def _named(self, found: Contact) -> tuple[tuple[str, ...], str]:
         """Return (our links that take part, the other one's name)."""
         if found.model_a == found.model_b:
             return (found.link_a, found.link_b), found.link_b
@@ -146,22 +161,22 @@ class BulletChecker:
         return (found.link_b,), "%s/%s" % (found.model_a, found.link_a)
 
 
-def random_postures(model, count):
+def random_postures(model: Model, count: int) -> np.ndarray:
     """Postures (count, n) within the joints' limits, of joints that turn on and on within a turn; always the same."""
     low, high = np.clip(model.lower, -np.pi, np.pi), np.clip(model.upper, -np.pi, np.pi)
     return np.random.default_rng(0).uniform(low, high, (count, len(low)))
 
 
-def _touching_pairs(world, model):
+def _touching_pairs(world: World, model: Model) -> set[frozenset[str]]:
     return {frozenset((found.link_a, found.link_b)) for found in world.touching(model)
             if found.model_a == found.model_b and found.distance < 0.0}
 
 
-def _has_meshes(link):
+def _has_meshes(link: MergedLink) -> bool:
     return any(isinstance(one.geometry, Mesh) for one in link.collisions)
 
 
-def plausible_pairs(world, model, samples=50):
+def plausible_pairs(world: World, model: Model, samples: int = 50) -> list[tuple[str, str]]:
     """Return [(link, link)] of ``model`` that have no joint between them and do not always overlap.
 
     A pair counts as always overlapping if it touches in more than half of ``samples`` random postures.

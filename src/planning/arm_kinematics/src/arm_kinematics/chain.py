@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A serial chain of joints from a base link to a tip link: poses of its links, and their motion with the joints."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics import kernels
 from arm_kinematics.errors import ChainError, InvalidPosture
 from command_line.options import counted
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from urdf_model import Robot
+
+    #: Of a URDF joint: name, type, child link, origin (4, 4), axis (3,), lower and upper limit [rad or m].
+    Step = tuple[str, str, str, ArrayLike, ArrayLike, float | None, float | None]
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 
@@ -21,7 +33,7 @@ class Chain:
     link_names: every link of the chain, base first, including fixed ones.
     """
 
-    def __init__(self, base, tip, steps):
+    def __init__(self, base: str, tip: str, steps: Iterable[Step]) -> None:
         """``steps``: (name, type, child link, origin (4, 4), axis (3,), lower, upper) per URDF joint, base to tip.
 
         Raises ChainError for an unsupported joint type, a zero axis, or limits in the wrong order.
@@ -68,7 +80,7 @@ class Chain:
         self.lower, self.upper = (_read_only(limit) for limit in self.limit_arrays)
 
     @classmethod
-    def from_robot(cls, robot, base="base", tip="left_gripper"):
+    def from_robot(cls, robot: Robot, base: str = "base", tip: str = "left_gripper") -> Chain:
         """Return the chain between two links of an ``urdf_model.Robot``.
 
         Raises ChainError, or ``urdf_model.UrdfError`` where a link is unknown or ``tip`` does not hang below ``base``.
@@ -82,7 +94,7 @@ class Chain:
                           joint.limit.upper))
         return cls(base, tip, steps)
 
-    def _set_reach(self):
+    def _set_reach(self) -> None:
         """Compute two balls around the first joint, by the sum of the links' lengths: the tip and the origin of the
         last joint never leave them.
 
@@ -98,21 +110,21 @@ class Chain:
         self.wrist_is_fixed = not prismatic[-1]
         self.wrist_in_tip = rotations[-1].T @ offsets[-1]
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.joint_names)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return "Chain('%s' to '%s': %s)" % (self.base, self.tip, ", ".join(self.joint_names))
 
     @property
-    def mid_range(self):
+    def mid_range(self) -> np.ndarray:
         """The posture (n,) in the middle of the limits; 0 where a joint has none."""
         finite = np.isfinite(self.lower) & np.isfinite(self.upper)
         middle = np.zeros(len(self))
         middle[finite] = 0.5 * (self.lower[finite] + self.upper[finite])
         return np.clip(middle, self.lower, self.upper)
 
-    def posture(self, values):
+    def posture(self, values: ArrayLike) -> np.ndarray:
         """Return ``values`` as a new array (n,). Raises InvalidPosture for a wrong count, or a value that is not
         finite."""
         try:
@@ -129,7 +141,7 @@ class Chain:
             raise InvalidPosture("joint values must be finite, got %s" % ", ".join(bad), values)
         return q
 
-    def posture_by_name(self, names, positions):
+    def posture_by_name(self, names: Sequence[str], positions: Sequence[float]) -> np.ndarray:
         """Return the posture (n,) picked out of parallel lists of joint names and positions; other joints may be in the
         lists.
 
@@ -147,27 +159,27 @@ class Chain:
             raise InvalidPosture("more than one value for %s" % ", ".join(repeated), names)
         return self.posture([positions[names.index(name)] for name in self.joint_names])
 
-    def fk(self, q):
+    def fk(self, q: ArrayLike) -> np.ndarray:
         """Return the tip's pose (4, 4) in the base frame. Raises InvalidPosture."""
         return self.fk_and_jacobian(q)[0]
 
-    def jacobian(self, q):
+    def jacobian(self, q: ArrayLike) -> np.ndarray:
         """Return the tip's geometric Jacobian (6, n): J @ q_dot is its velocity [m/s], then angular velocity [rad/s].
 
         Both in the base frame, the velocity that of the tip's origin. Raises InvalidPosture.
         """
         return self.fk_and_jacobian(q)[1]
 
-    def fk_and_jacobian(self, q):
+    def fk_and_jacobian(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return (:meth:`fk`, :meth:`jacobian`) for little more than the cost of one. Raises InvalidPosture."""
         return kernels.tip_and_jacobian(*self.arrays, self.posture(q))
 
-    def joint_frames(self, q):
+    def joint_frames(self, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Return the rotations (n + 1, 3, 3) and origins (n + 1, 3) of every joint's moved frame, whose z is its axis,
         and of the tip, in the base frame. Raises InvalidPosture."""
         return kernels.joint_frames(*self.arrays, self.posture(q))
 
-    def link_frames(self, q):
+    def link_frames(self, q: ArrayLike) -> dict[str, np.ndarray]:
         """Return {link name: pose (4, 4) in the base frame} for every link of the chain. Raises InvalidPosture."""
         rotations, origins = self.joint_frames(q)
         frames = {}
@@ -179,7 +191,7 @@ class Chain:
         return frames
 
 
-def wrench_from_torques(jacobian, torques, damping=0.01):
+def wrench_from_torques(jacobian: ArrayLike, torques: ArrayLike, damping: float = 0.01) -> np.ndarray:
     """Return the wrench (6,), force [N] then torque [Nm], that the joint torques (n,) [Nm or N] exert through the tip.
 
     Base frame, about the tip's origin. The least-squares solution of ``J^T w = torques``, damped (``damping`` in the
@@ -194,7 +206,7 @@ def wrench_from_torques(jacobian, torques, damping=0.01):
     return kernels.wrench(jacobian, torques, float(damping))
 
 
-def _rotation_taking_z_to(axis, joint_name):
+def _rotation_taking_z_to(axis: ArrayLike, joint_name: str) -> np.ndarray:
     """The shortest rotation (3, 3) that turns the z axis into ``axis``."""
     axis = np.asarray(axis, dtype=float)
     length = float(np.linalg.norm(axis))
@@ -207,7 +219,7 @@ def _rotation_taking_z_to(axis, joint_name):
     return np.array([[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]])
 
 
-def _read_only(array):
+def _read_only(array: np.ndarray) -> np.ndarray:
     view = array.view()
     view.flags.writeable = False
     return view

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inverse kinematics that avoids collisions with the robot's own body and the world."""
+from __future__ import annotations
+
 from collections import Counter
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -9,6 +12,9 @@ from arm_kinematics.chain import Chain
 from arm_kinematics.errors import Attempt, NoSolution, Reason
 from arm_kinematics.search import Collection, IkResult
 from command_line.options import counted
+
+if TYPE_CHECKING:
+    from arm_kinematics.search import Found, Search
 
 # Number of solutions checked between two searches; the first ones are mostly free.
 _CHUNK = 6
@@ -26,8 +32,9 @@ class Touch(NamedTuple):
 class CollisionChecker(Protocol):
     """Checks whether a posture touches anything. Not thread-safe unless its class says so."""
 
-    def contact(self, joint_names, q):
+    def contact(self, joint_names: Sequence[str], q: np.ndarray) -> Touch | None:
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+        ...
 
 
 class OwnBody:
@@ -56,7 +63,7 @@ class OwnBody:
         return bool((gaps < self._distances).any())
 
 
-def first_free(search, found, checker):
+def first_free(search: Search, found: Found, checker: CollisionChecker) -> IkResult:
     """Return the IkResult of ``found`` if it has no contact, else of the solution without contact that is nearest to
     the preferred posture, among the first ones found.
 

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnose why a pose has no solution: after a failed search, search again with one constraint removed."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +15,12 @@ from arm_kinematics.errors import Attempt, NoSolution, Reason
 from arm_kinematics.kernels import Rows
 from arm_kinematics.search import Collection
 from command_line.options import counted
+
+if TYPE_CHECKING:
+    from arm_kinematics.budget import Budget
+    from arm_kinematics.chain import Chain
+    from arm_kinematics.search import Found, Search
+    from arm_kinematics.target import Target
 
 # If the pose error stays above this without limits, more iterations will not help [m or rad].
 _CLEARLY_OFF = 1e-4
@@ -26,7 +36,7 @@ _UNLIMITED = 48
 _OTHER_UNITS = 10.0
 
 
-def beyond_reach(chain, target):
+def beyond_reach(chain: Chain, target: Target) -> str:
     """Return a sentence if the target lies outside a ball that the arm cannot leave, or "" if it lies inside.
 
     With the orientation given, the origin of a last revolute joint is known, so there is a ball for that as well.
@@ -45,7 +55,7 @@ def beyond_reach(chain, target):
     return (text + " towards the shoulder at (%.3f %.3f %.3f) in %s") % (over, *chain.shoulder, chain.base)
 
 
-def explain(search, found):
+def explain(search: Search, found: Found) -> Found:
     """Raise the NoSolution that explains why ``search`` failed with ``found``.
 
     Returns a solution if the diagnosis happens to find one.
@@ -84,22 +94,23 @@ def explain(search, found):
                    % counted(found.starts, "start"), (found.q, found.residual_m, found.residual_rad))
 
 
-def _budget(search, starts):
+def _budget(search: Search, starts: int) -> Budget:
     """The search's tolerances, one solution, and the default number of iterations."""
     return replace(search.budget, candidates=1, max_starts=starts, max_iterations=MAX_ITERATIONS)
 
 
-def _out_of_reach(search, detail):
+def _out_of_reach(search: Search, detail: str) -> NoSolution:
     return _failure(search, Reason.OUT_OF_REACH, detail, search.nearest())
 
 
-def _failure(search, reason, detail, nearest, joints=(), excess=()):
+def _failure(search: Search, reason: Reason, detail: str, nearest: tuple[np.ndarray, float, float],
+             joints: Iterable[str] = (), excess: Iterable[float] = ()) -> NoSolution:
     q, residual_m, residual_rad = nearest
     attempt = Attempt(q, search.chain.fk(q), residual_m, residual_rad)
     return NoSolution(search.target.pose, reason, detail, attempt, joints=joints, excess=excess)
 
 
-def _least_excess(search, start, lifted):
+def _least_excess(search: Search, start: np.ndarray, lifted: np.ndarray) -> tuple[Found | None, dict[str, float]]:
     """Return (a solution inside the limits or None, {joint name: signed excess} of the joints that must exceed their
     limits).
 
@@ -126,7 +137,7 @@ def _least_excess(search, start, lifted):
     return None, least
 
 
-def _alone(search, joint, bound, start):
+def _alone(search: Search, joint: int, bound: float, start: np.ndarray) -> tuple[Found | None, dict[str, float]]:
     """Return (a solution inside the limits or None, {name of joint number ``joint``: signed excess}, empty if it fails
     within ``bound`` [rad or m] beyond its limits).
     """
@@ -143,25 +154,25 @@ def _alone(search, joint, bound, start):
     return (None if over else _settled(search, found.q)), over
 
 
-def _sum(over):
+def _sum(over: dict[str, float]) -> float:
     return sum(map(abs, over.values()))
 
 
-def _settled(search, q):
+def _settled(search: Search, q: np.ndarray) -> Found | None:
     """Return the Found of a search from ``q``, wrapped into the limits, if it arrives; else None."""
     start = np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays)
     inside = search.run(budget=_budget(search, 1), postures=(start, search.preferred))
     return inside if inside.arrived else None
 
 
-def _wrapped(chain, q):
+def _wrapped(chain: Chain, q: np.ndarray) -> np.ndarray:
     """Turn revolute joints by whole turns into their limits, or to the least excess."""
     lower, upper = chain.limit_arrays
     turns = np.round((q - chain.mid_range) / (2.0 * math.pi))
     return np.where(chain.arrays[2] | ~np.isfinite(lower) | ~np.isfinite(upper), q, q - 2.0 * math.pi * turns)
 
 
-def _excess(chain, q):
+def _excess(chain: Chain, q: np.ndarray) -> dict[str, float]:
     """Return {joint name: excess beyond its limit [rad or m], negative below the lower one} of ``q`` modulo whole
     turns.
     """
@@ -172,7 +183,7 @@ def _excess(chain, q):
     return over
 
 
-def _excess_sentence(chain, name, excess):
+def _excess_sentence(chain: Chain, name: str, excess: float) -> str:
     joint = chain.joint_names.index(name)
     side, limit = ("lower", chain.lower[joint]) if excess < 0.0 else ("upper", chain.upper[joint])
     return "%s would have to go to %.3f %s, its %s limit is %.3f" % (

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The errors of this package, each with the values that it concerns."""
+from __future__ import annotations
+
 import enum
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +12,7 @@ import numpy as np
 class KinematicsError(Exception):
     """Base class of this package's errors. All of them can be pickled."""
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Callable[..., KinematicsError], tuple[object, ...]]:
         # By default, unpickling calls the class with the message alone, which fails, and a process pool then waits for
         # ever.
         return _restored, (type(self), self.args, self.__dict__)
@@ -22,7 +25,7 @@ class ChainError(KinematicsError):
 class InvalidTarget(KinematicsError):
     """The target is not a pose. ``value`` is the given one."""
 
-    def __init__(self, message, value):
+    def __init__(self, message: str, value: object) -> None:
         super().__init__(message)
         self.value = value
 
@@ -30,7 +33,7 @@ class InvalidTarget(KinematicsError):
 class InvalidPosture(KinematicsError):
     """Joint values that do not fit the chain: wrong number, wrong names, or not finite. ``value`` is the given one."""
 
-    def __init__(self, message, value):
+    def __init__(self, message: str, value: object) -> None:
         super().__init__(message)
         self.value = value
 
@@ -70,7 +73,8 @@ class NoSolution(KinematicsError):
     for collisions; a link of the world as "model/link").
     """
 
-    def __init__(self, target, reason, detail, attempt, *, joints=(), excess=(), pair=()):
+    def __init__(self, target: np.ndarray, reason: Reason, detail: str, attempt: Attempt, *, joints: Iterable[str] = (),
+                 excess: Iterable[float] = (), pair: Iterable[str] = ()) -> None:
         """``attempt``: the best :class:`Attempt`."""
         super().__init__("%s: %s%s" % (reason.value, detail, _nearest_sentence(attempt)))
         self.target = target
@@ -82,13 +86,13 @@ class NoSolution(KinematicsError):
         self.pair = tuple(pair)
 
 
-def _restored(kind, args, values):
+def _restored(kind: type[KinematicsError], args: tuple[Any, ...], values: dict[str, Any]) -> KinematicsError:
     error = kind.__new__(kind, *args)
     error.__dict__.update(values)
     return error
 
 
-def _nearest_sentence(attempt):
+def _nearest_sentence(attempt: Attempt) -> str:
     if attempt.residual_m < 1e-5 and attempt.residual_rad < 1e-5:
         return ""
     return " (the nearest pose in reach is at %.3f %.3f %.3f, %.4f m and %.4f rad away)" % (

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inverse kinematics: from a pose of the tip to joint values inside the limits, or to the reason why none exist."""
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +17,20 @@ from arm_kinematics.errors import NoSolution
 from arm_kinematics.search import APART, Collection, IkResult, Search
 from arm_kinematics.target import Target
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from arm_kinematics.budget import Budget
+    from arm_kinematics.chain import Chain
+    from arm_kinematics.collision import CollisionChecker
+
 # A quarter turn more than needed [rad] is another arm configuration: of such answers (from neutral, 829 poses) nine in
 # ten are on another curve of self-motion than the nearest solution. Near neutral, one answer in twenty is of that kind.
 MAX_DETOUR_RAD = math.pi / 2
 
 
-def solve(chain, target, seed, *, posture=None, budget=USUAL, checker=None):
+def solve(chain: Chain, target: Target | ArrayLike, seed: ArrayLike, *, posture: ArrayLike | None = None,
+          budget: Budget = USUAL, checker: CollisionChecker | None = None) -> IkResult:
     """Return an :class:`IkResult` whose q puts the tip of ``chain`` on ``target``.
 
     ``target``: a :class:`Target`, or the pose (4, 4), tip in base [m], all six components. ``seed`` (n,): where
@@ -43,7 +55,9 @@ def solve(chain, target, seed, *, posture=None, budget=USUAL, checker=None):
     return IkResult(found.q, found.residual_m, found.residual_rad, found.iterations, found.starts - 1)
 
 
-def solve_as_vendor(chain, target, seed, *, budget=USUAL, checker=None, is_possible=lambda q: True):
+def solve_as_vendor(chain: Chain, target: Target | ArrayLike, seed: ArrayLike, *, budget: Budget = USUAL,
+                    checker: CollisionChecker | None = None,
+                    is_possible: Callable[[np.ndarray], bool] = lambda q: True) -> IkResult:
     """Return the IkResult that the vendor's simulator answers with, made exact: where plain Newton steps from ``seed``
     lead. Where they lead nowhere, into contact, to a posture that is not possible, or far round, the one of
     :func:`solve`.
@@ -84,14 +98,16 @@ class Several:
     settle: bool = True
     apart: float = APART
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not 1 <= self.number < math.inf:
             raise ValueError("the number of solutions must be finite and at least 1, got %r" % (self.number,))
         if not self.apart >= 0.0:
             raise ValueError("apart must be 0 or more, got %r" % (self.apart,))
 
 
-def solve_all(chain, target, seed, wanted, *, posture=None, budget=USUAL, checker=None):
+def solve_all(chain: Chain, target: Target | ArrayLike, seed: ArrayLike, wanted: Several | int, *,
+              posture: ArrayLike | None = None, budget: Budget = USUAL,
+              checker: CollisionChecker | None = None) -> list[IkResult]:
     """Return distinct solutions of :func:`solve`'s problem, as a list of IkResult, nearest to ``posture`` first.
 
     ``wanted``: :class:`Several`, or the most solutions to return. Returns fewer if the budget's starts find no more;
@@ -120,7 +136,7 @@ def solve_all(chain, target, seed, wanted, *, posture=None, budget=USUAL, checke
     return results
 
 
-def warm_up(chain):
+def warm_up(chain: Chain) -> None:
     """Compile, or load from the cache, everything that ``chain`` and :func:`solve` need, by using it once."""
     pose, jacobian = chain.fk_and_jacobian(chain.mid_range)
     chain.link_frames(chain.mid_range)

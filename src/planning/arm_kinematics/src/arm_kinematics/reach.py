@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Workspace of an arm: a volume in cells, and for each cell the share of orientations that the tip can reach."""
+from __future__ import annotations
+
 import json
 import math
 import multiprocessing
 import signal
 import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,6 +18,10 @@ from arm_kinematics.errors import KinematicsError
 from arm_kinematics.reach_search import search_cells
 from disk_cache.files import draft_of
 from urdf_model.transforms import matrix_from_quaternion
+
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
+    from arm_kinematics.collision import Touch
 
 # Cells that are computed, saved and counted together: about a second of work. Postures of neighbouring cells help each
 # other within a part alone, so that a map does not depend on the order of its parts.
@@ -36,16 +43,16 @@ class MapSettings:
     turns about that count, else None; starts: of each search; chain: data that identifies the arm; self_collision: a
     pose counts only if a posture reaches it in which the robot does not touch itself."""
 
-    lower: tuple
-    upper: tuple
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
     cell_m: float
     orientations: int
-    tool: tuple | None
+    tool: tuple[float, ...] | None
     starts: int
     chain: str
     self_collision: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not all(math.isfinite(v) for v in (*self.lower, *self.upper)) or not np.less(self.lower, self.upper).all():
             raise ReachError("the volume must have each lower bound below its upper one, got %s to %s"
                              % (self.lower, self.upper))
@@ -60,28 +67,28 @@ class MapSettings:
             raise ReachError("the tool must point somewhere, e.g. 0 0 -1 for down, got %s" % (self.tool,))
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, ...]:
         """Number of cells along x, y, z."""
         return tuple(max(1, int(round((high - low) / self.cell_m)))
                      for low, high in zip(self.lower, self.upper, strict=True))
 
-    def centres(self, first=0, count=None):
+    def centres(self, first: int = 0, count: int | None = None) -> np.ndarray:
         """Return the centres (cells, 3) [m] of ``count`` cells from number ``first`` on, by default of all; x slowest.
         """
         cells = math.prod(self.shape)
         return np.array(self.lower) + self.cell_m * (0.5 + self.cells(first, cells if count is None else count))
 
-    def cells(self, first, count):
+    def cells(self, first: int, count: int) -> np.ndarray:
         """Return the indices (count, 3) of cells from number ``first`` on, as far as there are any; x slowest."""
         numbers = np.arange(first, min(first + count, math.prod(self.shape)))
         return np.column_stack(np.unravel_index(numbers, self.shape))
 
-    def parts(self):
+    def parts(self) -> dict[int, int]:
         """Return {number of the first cell: number of cells} of the parts of the map."""
         cells = math.prod(self.shape)
         return {first: min(PART, cells - first) for first in range(0, cells, PART)}
 
-    def rotations(self):
+    def rotations(self) -> np.ndarray:
         """Return the orientations (orientations, 3, 3) tried in every cell: the same for the same settings."""
         if self.tool is None:
             # Normalised normal deviates are spread evenly over the rotations.
@@ -98,11 +105,13 @@ class MapSettings:
 class PoseChecker(Protocol):
     """Checks postures for contact, as bullet_checker.BulletChecker does. Not thread-safe."""
 
-    def contact(self, joint_names, q):
+    def contact(self, joint_names: Sequence[str], q: np.ndarray) -> Touch | None:
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+        ...
 
-    def contact_and_cause(self, joint_names, q):
+    def contact_and_cause(self, joint_names: Sequence[str], q: np.ndarray) -> tuple[Touch | None, bool]:
         """Return (:meth:`contact`, whether all postures touch that have the last joint's link in the same pose)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,9 @@ class PartValues:
     manipulability: np.ndarray
 
 
-def compute(chain, settings, folder, processes, progress=lambda done, total: None, new_checker=None):
+def compute(chain: Chain, settings: MapSettings, folder: str | Path, processes: int,
+            progress: Callable[[int, int], object] = lambda done, total: None,
+            new_checker: Callable[[], PoseChecker] | None = None) -> PartValues:
     """Compute a map and return its PartValues, of all cells, x slowest.
 
     Each finished part is kept in ``folder``; existing parts are not computed again. ``progress`` is
@@ -144,12 +155,13 @@ def compute(chain, settings, folder, processes, progress=lambda done, total: Non
 class MapParts:
     """The parts of a map that several programs compute, each some of them, into one folder."""
 
-    def __init__(self, chain, settings, folder, checker=None):
+    def __init__(self, chain: Chain, settings: MapSettings, folder: str | Path,
+                 checker: PoseChecker | None = None) -> None:
         """Arguments as of :func:`compute`. Raises ReachError."""
         self.settings = settings
         self._chain, self._checker, self._parts = chain, checker, _Parts(Path(folder), settings)
 
-    def compute(self, first):
+    def compute(self, first: int) -> PartValues:
         """Compute and keep the part that begins with cell number ``first``, and return its PartValues. A part that is
         there already is not computed again."""
         found = self._parts.load({first: self.settings.parts()[first]})
@@ -159,7 +171,7 @@ class MapParts:
         return found[first]
 
 
-def part_values(chain, settings, first, checker=None):
+def part_values(chain: Chain, settings: MapSettings, first: int, checker: PoseChecker | None = None) -> PartValues:
     """Return the PartValues of the part that begins with cell number ``first``.
 
     Manipulability is Yoshikawa's sqrt(det(J J^T)). ``checker``: a PoseChecker; postures with contacts do not count.
@@ -174,7 +186,7 @@ def part_values(chain, settings, first, checker=None):
     return PartValues(found.reached, manipulability)
 
 
-def yoshikawa(jacobians):
+def yoshikawa(jacobians: np.ndarray) -> np.ndarray:
     """Return the manipulability of a Jacobian (6, n), or of many (m, 6, n)."""
     return np.sqrt(np.maximum(np.linalg.det(jacobians @ np.swapaxes(jacobians, -1, -2)), 0.0))
 
@@ -182,7 +194,7 @@ def yoshikawa(jacobians):
 class _Parts:
     """The files of a map that is being computed."""
 
-    def __init__(self, folder, settings):
+    def __init__(self, folder: Path, settings: MapSettings) -> None:
         self._folder, self._orientations = folder / "parts", settings.orientations
         self._folder.mkdir(parents=True, exist_ok=True)
         wanted = json.loads(json.dumps({**asdict(settings), "method": _METHOD}))
@@ -203,7 +215,7 @@ class _Parts:
             with draft_of(note) as unfinished:
                 unfinished.write_text(json.dumps(wanted, indent=1) + "\n")
 
-    def load(self, sizes):
+    def load(self, sizes: Mapping[int, int]) -> dict[int, PartValues]:
         """Return {first cell: PartValues} of the complete parts of ``sizes`` {first cell: cells}."""
         values = {}
         for first, size in sizes.items():
@@ -217,24 +229,24 @@ class _Parts:
                 values[first] = PartValues(reached, manipulability)
         return values
 
-    def save(self, first, values):
+    def save(self, first: int, values: PartValues) -> None:
         with draft_of(self._path(first)) as unfinished:
             np.savez(unfinished, reached=np.packbits(values.reached, axis=1), manipulability=values.manipulability)
 
-    def _path(self, first):
+    def _path(self, first: int) -> Path:
         return self._folder / ("%07d.npz" % first)
 
 
-_task = None  # of a worker process: (chain, settings, parts, checker)
+_task: tuple[Chain, MapSettings, _Parts, PoseChecker | None]  # of a worker process
 
 
-def _begin(chain, settings, parts, new_checker):
+def _begin(chain: Chain, settings: MapSettings, parts: _Parts, new_checker: Callable[[], PoseChecker] | None) -> None:
     global _task
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends the workers
-    _task = (chain, settings, parts, new_checker() if settings.self_collision else None)
+    _task = (chain, settings, parts, None if new_checker is None or not settings.self_collision else new_checker())
 
 
-def _work(first):
+def _work(first: int) -> int:
     chain, settings, parts, checker = _task
     parts.save(first, part_values(chain, settings, first, checker))
     return first

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Balls that points of an arm's tip never leave: a pose outside one of them needs no search."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
 
 # Axes nearer to each other than this [m] meet.
 _MEETING_M = 1e-9
@@ -17,13 +23,13 @@ class Ball(NamedTuple):
     centre: np.ndarray
     radius: float
 
-    def beyond(self, poses):
+    def beyond(self, poses: np.ndarray) -> np.ndarray:
         """Which of the tip's ``poses`` (m, 4, 4) would have the point outside (m,), with 1e-6 m for rounding."""
         points = poses[:, :3, 3] + poses[:, :3, :3] @ self.in_tip
         return np.linalg.norm(points - self.centre, axis=1) > self.radius + 1e-6
 
 
-def balls(chain):
+def balls(chain: Chain) -> list[Ball]:
     """Return the Balls of a Chain: of the tip; and of a point on the last joint's axis, if it is revolute.
 
     The second point is the one nearest to the axis before. Where both axes meet, neither of the two joints moves it,
@@ -51,7 +57,7 @@ def balls(chain):
     return found
 
 
-def beyond(bounds, poses):
+def beyond(bounds: Iterable[Ball], poses: np.ndarray) -> np.ndarray:
     """Which of ``poses`` (m, 4, 4) are outside one of the Balls."""
     outside = np.zeros(len(poses), dtype=bool)
     for ball in bounds:
@@ -59,7 +65,7 @@ def beyond(bounds, poses):
     return outside
 
 
-def _bound(chain, count, end):
+def _bound(chain: Chain, count: int, end: np.ndarray) -> tuple[np.ndarray, float]:
     """Return (centre (3,), radius) for the point ``end`` (3,), given in the frame that ``count`` joints move."""
     rotations, offsets, prismatic = chain.arrays
     if count == 0:
@@ -90,7 +96,7 @@ def _bound(chain, count, end):
     return offsets[0] + rotations[0] @ path[0], float(radius)
 
 
-def _height_nearest_to_z(rotation, offset):
+def _height_nearest_to_z(rotation: np.ndarray, offset: np.ndarray) -> float:
     """Return where on its own z axis a frame (``rotation``, ``offset``) is nearest to the outer frame's z axis [m]."""
     direction = rotation[:2, 2]
     square = direction @ direction

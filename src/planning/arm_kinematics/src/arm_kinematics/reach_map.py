@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A reachability map as data, and its files."""
+from __future__ import annotations
+
 import csv
 import math
 import zipfile
@@ -40,26 +42,26 @@ class ReachMap:
     self_collision: bool
 
     @property
-    def share(self):
+    def share(self) -> np.ndarray:
         """Share (x, y, z) of the orientations that are reached, 0 to 1."""
         return self.reached.mean(axis=3)
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, ...]:
         return self.reached.shape[:3]
 
     @property
-    def centres(self):
+    def centres(self) -> np.ndarray:
         """Centres (x, y, z, 3) of the cells [m]."""
         return self.lower + self.cell_m * (0.5 + np.moveaxis(np.indices(self.shape), 0, -1))
 
-    def cells_of(self, points):
+    def cells_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (cells (..., 3) int that hold ``points`` (..., 3) [m], whether they are inside the volume (...))."""
         cells = np.floor((points - self.lower) / self.cell_m).astype(int)
         inside = ((cells >= 0) & (cells < self.shape)).all(axis=-1)
         return np.where(inside[..., None], cells, 0), inside
 
-    def write(self, path):
+    def write(self, path: str | Path) -> None:
         """Write ``path`` (.npz), complete or not at all. Raises OSError."""
         count = len(self.rotations)
         with draft_of(path) as unfinished:
@@ -69,7 +71,7 @@ class ReachMap:
                                 reached=np.packbits(self.reached, axis=3), self_collision=self.self_collision)
 
     @classmethod
-    def read(cls, path):
+    def read(cls, path: str | Path) -> ReachMap:
         """Return the map in ``path``: reach.npz, or the folder that holds it. Raises ReachError, OSError."""
         path = Path(path)
         path = path / "reach.npz" if path.is_dir() else path
@@ -87,7 +89,7 @@ class ReachMap:
         return cls(kept["lower"], float(kept["cell_m"]), rotations, reached, kept["manipulability"],
                    str(kept["base"]), str(kept["tip"]), bool(kept["self_collision"]))
 
-    def points(self):
+    def points(self) -> np.ndarray:
         """Return a structured array of the reached cells: x, y, z [m], share, manipulability (float32), rgb (uint32:
         red for few orientations, by hue to blue for all)."""
         import cv2
@@ -104,7 +106,7 @@ class ReachMap:
         table["rgb"] = (colours[:, 0] << 16) | (colours[:, 1] << 8) | colours[:, 2]
         return table
 
-    def write_csv(self, path):
+    def write_csv(self, path: str | Path) -> None:
         """Write a row for each cell. Raises OSError."""
         with open(path, "w", newline="") as file:
             writer = csv.writer(file)
@@ -114,7 +116,7 @@ class ReachMap:
                 writer.writerow((*("%.4f" % c for c in centre), "%.2f" % (100.0 * part),
                                  "" if math.isnan(value) else "%.5f" % value))
 
-    def write_hdf5(self, path):
+    def write_hdf5(self, path: str | Path) -> None:
         """Write the reached poses and cells in the layout of Reuleaux's reachability maps. Raises OSError.
 
         /Poses/poses_dataset: float32 rows, centre of a cell (x y z), then a pose (x y z, qx qy qz qw).
@@ -142,7 +144,7 @@ class ReachMap:
                 "Spheres/sphere_dataset", data=np.column_stack((centres[some], 100.0 * flat[some].mean(axis=1))))
             spheres.attrs["Resolution"] = np.array([self.cell_m], dtype="float32")
 
-    def write_capabilities(self, path):
+    def write_capabilities(self, path: str | Path) -> None:
         """Write from where each cell is reached, in the layout of Reuleaux's capability maps. Raises OSError.
 
         /Capability/capability_dataset: rows as of :meth:`capabilities`; its attribute Resolution [m].
@@ -153,7 +155,7 @@ class ReachMap:
             data = file.create_dataset("Capability/capability_dataset", data=self.capabilities())
             data.attrs["Resolution"] = np.array([self.cell_m], dtype="float32")
 
-    def capabilities(self):
+    def capabilities(self) -> np.ndarray:
         """Return a row (10,) for each reached cell: kind, reached percentage, cone, centre (x y z), quaternion.
 
         Kind 1, where at most a fifth of the orientations are reached: a cone whose tip is at the centre and out of
@@ -168,7 +170,7 @@ class ReachMap:
                 for first in range(0, len(flat), step)]
         return np.concatenate([np.empty((0, 10)), *rows])
 
-    def _capabilities(self, reached, centres):
+    def _capabilities(self, reached: np.ndarray, centres: np.ndarray) -> np.ndarray:
         some = reached.any(axis=1)
         reached, centres = reached[some], centres[some]
         rows = np.zeros((len(reached), 10))
@@ -187,7 +189,7 @@ class ReachMap:
         return rows
 
 
-def _quaternions_to(axes):
+def _quaternions_to(axes: np.ndarray) -> np.ndarray:
     """The shortest turns (n, 4), x y z w, of the x axis to unit vectors ``axes`` (n, 3)."""
     turns = np.column_stack((np.zeros(len(axes)), -axes[:, 2], axes[:, 1], 1.0 + axes[:, 0]))
     turns[axes[:, 0] < -1.0 + 1e-9] = 0.0, 0.0, 1.0, 0.0
@@ -204,7 +206,7 @@ class Overlap:
     cell_m: float
 
 
-def overlap(first, second):
+def overlap(first: ReachMap, second: ReachMap) -> Overlap:
     """Return the Overlap of two maps. Raises ReachError where they have no cells in common."""
     if first.base != second.base:
         raise ReachError("the maps are in the frames of %s and %s; give the same --base" % (first.base, second.base))

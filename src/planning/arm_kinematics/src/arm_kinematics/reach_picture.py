@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Draw a reachability map: one panel a level of z, x to the right and y up, the share of orientations as a colour."""
+from __future__ import annotations
+
 import math
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+
+if TYPE_CHECKING:
+    from arm_kinematics.reach import MapSettings
+    from arm_kinematics.reach_map import Overlap
 
 _MARGIN, _TITLE, _BAR = 12, 22, 46  # [pixels]
 _INK, _PAPER = (60, 60, 60), (255, 255, 255)
 
 
-def draw(share, settings, path, max_panels=12):
+def draw(share: np.ndarray, settings: MapSettings | Overlap, path: str | Path, max_panels: int = 12) -> None:
     """Write the PNG ``path`` of ``share`` (x, y, z). At most ``max_panels`` levels are drawn, evenly chosen.
 
     Raises OSError when it cannot be written.
@@ -35,14 +43,14 @@ def draw(share, settings, path, max_panels=12):
         raise OSError("the picture '%s' cannot be written" % path)
 
 
-def _coloured(share):
+def _coloured(share: np.ndarray) -> np.ndarray:
     """Colours (h, w, 3) of shares 0 to 1; unreachable cells are light grey."""
     colours = cv2.applyColorMap(np.clip(255.0 * share, 0, 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     colours[share <= 0.0] = (225, 225, 225)
     return colours
 
 
-def _legend(canvas, text):
+def _legend(canvas: np.ndarray, text: str) -> None:
     bottom = canvas.shape[0] - _MARGIN
     bar = _coloured(np.linspace(0.004, 1.0, 100)[None])
     canvas[bottom - 12:bottom, _MARGIN:_MARGIN + 100] = np.repeat(bar, 12, axis=0)
@@ -50,5 +58,5 @@ def _legend(canvas, text):
     _write(canvas, text, _MARGIN, bottom - 20)
 
 
-def _write(canvas, text, x, y):
+def _write(canvas: np.ndarray, text: str, x: int, y: int) -> None:
     cv2.putText(canvas, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, _INK, 1, cv2.LINE_AA)

@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where to place a task before an arm, by its map: the poses of the task are looked up, not searched for."""
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics.reach import ReachError
 from command_line.options import counted
 from urdf_model.transforms import rigid, rpy_matrix
+
+if TYPE_CHECKING:
+    from arm_kinematics.reach_map import ReachMap
 
 # Places times poses, and poses of a task: more take minutes and gigabytes.
 _MAX_LOOKUPS, _MAX_POSES = 200_000_000, 100_000
@@ -24,7 +30,7 @@ class Place:
     spare: float
 
     @property
-    def pose(self):
+    def pose(self) -> np.ndarray:
         """The task's frame (4, 4) in the map's frame."""
         return rigid(rpy_matrix(0.0, 0.0, self.yaw), self.position)
 
@@ -33,12 +39,12 @@ class Place:
 class Region:
     """Places that are tried: lower, upper: (3,) [m] corners; step_m: between places; yaws: [rad]."""
 
-    lower: tuple
-    upper: tuple
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
     step_m: float
-    yaws: tuple = (0.0,)
+    yaws: tuple[float, ...] = (0.0,)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (np.isfinite([*self.lower, *self.upper]).all() and np.less_equal(self.lower, self.upper).all()):
             raise ReachError("the region must have each lower bound at or below its upper one, got %s to %s"
                              % (self.lower, self.upper))
@@ -46,18 +52,18 @@ class Region:
             raise ReachError("the step must be positive and finite, got %g m" % self.step_m)
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, ...]:
         """Number of positions along x, y, z."""
         return tuple(int((high - low) / self.step_m + 1e-9) + 1
                      for low, high in zip(self.lower, self.upper, strict=True))
 
-    def positions(self):
+    def positions(self) -> np.ndarray:
         """All positions (m, 3), x slowest."""
         axes = [low + self.step_m * np.arange(count) for low, count in zip(self.lower, self.shape, strict=True)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def table_poses(width_m, depth_m, step_m, rotations):
+def table_poses(width_m: float, depth_m: float, step_m: float, rotations: np.ndarray) -> np.ndarray:
     """Return the poses (m, 4, 4) of a tool on a table top: every ``step_m``, with each of ``rotations`` (k, 3, 3).
 
     width_m along y, depth_m along x; the origin is the middle of the top. Raises ReachError.
@@ -73,7 +79,7 @@ def table_poses(width_m, depth_m, step_m, rotations):
     return np.array([rigid(rotation, (x, y, 0.0)) for x in xs for y in ys for rotation in rotations])
 
 
-def best_places(reach_map, poses, region, most=10):
+def best_places(reach_map: ReachMap, poses: np.ndarray, region: Region, most: int = 10) -> list[Place]:
     """Return the best Places of a task with ``poses`` (m, 4, 4) in its own frame, best first.
 
     A pose counts as reached where the map reaches its cell with the nearest of its orientations. Equal shares are
@@ -100,7 +106,7 @@ def best_places(reach_map, poses, region, most=10):
     return found[:most]
 
 
-def nearest_rotations(reach_map, rotations):
+def nearest_rotations(reach_map: ReachMap, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (number (m,) of the map's nearest orientation for each of ``rotations`` (m, 3, 3), its distance [rad])."""
     traces = np.einsum("mab,kab->mk", rotations, reach_map.rotations)
     nearest = traces.argmax(axis=1)

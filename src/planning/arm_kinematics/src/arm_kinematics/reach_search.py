@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which orientations an arm's tip reaches in the cells of a grid, each by a posture."""
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +13,10 @@ from arm_kinematics.budget import Budget
 from arm_kinematics.reach_bounds import balls, beyond
 from arm_kinematics.search import Collection, Search
 from arm_kinematics.target import Target
+
+if TYPE_CHECKING:
+    from arm_kinematics.chain import Chain
+    from arm_kinematics.reach import PoseChecker
 
 TOLERANCE = 1e-5  # [m] and [rad]
 # Starts for another posture of a pose whose first one touches, as a multiple of those of a pose: at 40 of these, 1 in
@@ -26,7 +34,8 @@ class Reached:
     postures: np.ndarray
 
 
-def search_cells(chain, cells, centres, rotations, starts, checker=None):
+def search_cells(chain: Chain, cells: np.ndarray, centres: np.ndarray, rotations: np.ndarray, starts: int,
+                 checker: PoseChecker | None = None) -> Reached:
     """Return the Reached of cells at ``centres`` (m, 3) [m] for ``rotations`` (k, 3, 3) of the tip, base frame.
 
     ``cells``: (m, 3) int, the indices of the cells in their grid: a pose that is not reached by ``starts`` starts is
@@ -40,7 +49,7 @@ def search_cells(chain, cells, centres, rotations, starts, checker=None):
     return Reached(search.reached, search.postures)
 
 
-def _neighbours(cells):
+def _neighbours(cells: np.ndarray) -> list[list[int]]:
     """Return, for each of ``cells`` (m, 3), the numbers of those that share a face with it."""
     number = {tuple(cell): k for k, cell in enumerate(cells.tolist())}
     steps = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
@@ -50,7 +59,8 @@ def _neighbours(cells):
 
 
 class _CellSearch:
-    def __init__(self, chain, neighbours, centres, rotations, starts):
+    def __init__(self, chain: Chain, neighbours: list[list[int]], centres: np.ndarray, rotations: np.ndarray,
+                 starts: int) -> None:
         self._chain, self._neighbours, self._centres, self._rotations = chain, neighbours, centres, rotations
         self._budget = Budget(candidates=1, max_starts=starts, tolerance_m=TOLERANCE, tolerance_rad=TOLERANCE)
         self._once = replace(self._budget, max_starts=1)
@@ -59,13 +69,13 @@ class _CellSearch:
         self.postures = np.zeros((*shape, len(chain)))
         self._open = np.zeros(shape, dtype=bool)  # poses that may be reached and are not yet
 
-    def _poses(self, where):
+    def _poses(self, where: tuple[np.ndarray, ...]) -> np.ndarray:
         """Return the poses (m, 4, 4) of ``where``, two arrays (m,) of cells and orientations."""
         poses = np.tile(np.eye(4), (len(where[0]), 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = self._rotations[where[1]], self._centres[where[0]]
         return poses
 
-    def find_postures(self):
+    def find_postures(self) -> None:
         everything = tuple(part.ravel() for part in np.indices(self.reached.shape))
         outside = beyond(balls(self._chain), self._poses(everything))
         where = tuple(part[~outside] for part in everything)
@@ -73,7 +83,7 @@ class _CellSearch:
         self._solve(where, self._chain.mid_range, self._budget)
         self._spread(self._solve_from)
 
-    def _solve(self, where, seeds, budget):
+    def _solve(self, where: tuple[np.ndarray, ...], seeds: np.ndarray, budget: Budget) -> None:
         """Search for postures, as near the middle of the joints' ranges as the search finds them."""
         if not len(where[0]):
             return
@@ -82,11 +92,11 @@ class _CellSearch:
         solved = tuple(part[found.solved] for part in where)
         self._take(solved, found.q[found.solved])
 
-    def _take(self, where, postures):
+    def _take(self, where: tuple[np.ndarray, ...] | tuple[int, int], postures: np.ndarray) -> None:
         self.reached[where], self._open[where] = True, False
         self.postures[where] = postures
 
-    def _spread(self, search):
+    def _spread(self, search: Callable[[int, int, np.ndarray], None]) -> None:
         """Try open poses from reached ones of the same orientation in neighbouring cells, until no more are reached."""
         new = self.reached.copy()
         while new.any():
@@ -97,10 +107,10 @@ class _CellSearch:
                         search(cell, orientation, self.postures[here, orientation])
             new = self.reached & ~before
 
-    def _solve_from(self, cell, orientation, seed):
+    def _solve_from(self, cell: int, orientation: int, seed: np.ndarray) -> None:
         self._solve((np.array([cell]), np.array([orientation])), seed, self._once)
 
-    def keep_free(self, checker):
+    def keep_free(self, checker: PoseChecker) -> None:
         """Of the reached poses, keep those with a posture without contact, and look for other postures of the rest."""
         self._checker = checker
         where = np.argwhere(self.reached)
@@ -118,11 +128,11 @@ class _CellSearch:
             self._other_posture(cell, orientation)
         self._spread(self._free_from)
 
-    def _search_of(self, cell, orientation, seed, budget):
+    def _search_of(self, cell: int, orientation: int, seed: np.ndarray, budget: Budget) -> Search:
         pose = self._poses((np.array([cell]), np.array([orientation])))[0]
         return Search(self._chain, Target(pose), seed, None, budget)
 
-    def _other_posture(self, cell, orientation):
+    def _other_posture(self, cell: int, orientation: int) -> None:
         starts = _MORE_STARTS * self._budget.max_starts
         search = self._search_of(cell, orientation, self._chain.mid_range, replace(self._budget, max_starts=starts))
         solutions = np.empty((starts, len(self._chain)))
@@ -137,7 +147,7 @@ class _CellSearch:
                     return
             held, start = count, start + used
 
-    def _free_from(self, cell, orientation, seed):
+    def _free_from(self, cell: int, orientation: int, seed: np.ndarray) -> None:
         solution = np.empty((1, len(self._chain)))
         count, _, _ = self._search_of(cell, orientation, seed, self._once).gather(solution, Collection(settle=False))
         if count and self._checker.contact(self._chain.joint_names, solution[0]) is None:

@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Searches for one target of one chain, under varying limits and budgets."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from arm_kinematics import kernels
 from arm_kinematics.budget import Budget
 from arm_kinematics.target import METRES_PER_RADIAN
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from arm_kinematics.chain import Chain
+    from arm_kinematics.kernels import Limits, Postures, Rows
+    from arm_kinematics.target import Target
 
 # Solutions that differ by less than this in every joint [rad or m] are the same one.
 APART = 0.05
@@ -59,12 +68,14 @@ class Search:
     Raises InvalidPosture for values that do not fit the chain.
     """
 
-    def __init__(self, chain, target, seed, posture, budget):
+    def __init__(self, chain: Chain, target: Target, seed: ArrayLike, posture: ArrayLike | None,
+                 budget: Budget) -> None:
         self.chain, self.target, self.budget = chain, target, budget
         self.seed = chain.posture(seed)
         self.preferred = self.seed if posture is None else chain.posture(posture)
 
-    def run(self, *, budget=None, limits=None, postures=None, rows=None):
+    def run(self, *, budget: Budget | None = None, limits: Limits | None = None, postures: Postures | None = None,
+            rows: Rows | None = None) -> Found:
         """Return the Found; arguments replace the search's own groups.
 
         ``limits``: (lower, upper) in place of the chain's; ``postures``: (seed, preferred); ``rows``: the Rows of the
@@ -74,11 +85,12 @@ class Search:
         target = self.target.arrays
         if rows is not None:
             target = (*target[:2], rows.value, target[3])
-        outcome = kernels.search(self.chain.arrays, limits or self.chain.limit_arrays, target,
-                                 (budget or self.budget).effort, postures or (self.seed, self.preferred), q)
-        return Found(*outcome, q)
+        arrived, starts, iterations, error_m, error_rad = kernels.search(
+            self.chain.arrays, limits or self.chain.limit_arrays, target, (budget or self.budget).effort,
+            postures or (self.seed, self.preferred), q)
+        return Found(arrived, starts, iterations, error_m, error_rad, q)
 
-    def newton(self):
+    def newton(self) -> Found:
         """Return the Found of plain Newton steps from the seed, as the vendor's simulator makes them; ``arrived`` is 1
         or 0."""
         q = np.empty(len(self.chain))
@@ -86,7 +98,8 @@ class Search:
                                         self.budget.effort, self.seed, q)
         return Found(int(arrived), 1, steps, *self.residual(q), q)
 
-    def gather(self, solutions, collection, *, budget=None, limits=None):
+    def gather(self, solutions: np.ndarray, collection: Collection, *, budget: Budget | None = None,
+               limits: Limits | None = None) -> tuple[int, int, int]:
         """Fill rows of ``solutions`` (m, n) with different solutions, as a :class:`Collection` describes.
 
         Returns (rows filled, starts used, iterations).
@@ -94,18 +107,18 @@ class Search:
         return kernels.gather(self.chain.arrays, limits or self.chain.limit_arrays, self.target.arrays,
                               (budget or self.budget).effort, (self.seed, self.preferred), tuple(collection), solutions)
 
-    def residual(self, q):
+    def residual(self, q: np.ndarray) -> tuple[float, float]:
         """Return the pose error of ``q`` (n,): [m], [rad]."""
         return kernels.pose_error(self.chain.arrays, self.target.arrays, q)
 
-    def nearest(self):
+    def nearest(self) -> tuple[np.ndarray, float, float]:
         """Return (q, error [m], error [rad]): inside the limits, with the tip as near to the target as possible."""
         q = np.empty(len(self.chain))
         errors = kernels.nearest(self.chain.arrays, self.chain.limit_arrays, self.target.arrays, _NEAREST.effort,
                                  METRES_PER_RADIAN, self.seed, q)
         return (q, *errors)
 
-    def free_limits(self, joint=None, by=math.inf):
+    def free_limits(self, joint: int | None = None, by: float = math.inf) -> Limits:
         """Return (lower, upper) with the limits of ``joint`` (index), or of all, moved outwards by ``by`` [rad or
         m]."""
         lower, upper = (limit.copy() for limit in self.chain.limit_arrays)

@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The target of the tip: a pose, or the part of one that counts."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics import kernels
 from arm_kinematics.errors import InvalidTarget
 from urdf_model.transforms import matrix_from_quaternion, rigid
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from arm_kinematics.kernels import Rows
 
 # A rotation with a smaller error counts as rounded and is normalised (the labs' quaternion has an error of 9e-4).
 ROUNDED = 1e-2
@@ -16,7 +25,7 @@ METRES_PER_RADIAN = 0.3
 _NO_AXIS = np.eye(3)
 
 
-def pose_from_quaternion(position, quaternion_xyzw):
+def pose_from_quaternion(position: Iterable[float], quaternion_xyzw: Iterable[float]) -> np.ndarray:
     """Return the pose (4, 4) at ``position`` (x, y, z) [m] with orientation (x, y, z, w).
 
     A quaternion whose length differs from 1 by less than 0.01 is normalised. Raises InvalidTarget for any other length
@@ -45,7 +54,7 @@ class Target:
     pose error count; arrays: rotation, position, rows, basis, as the kernels take them.
     """
 
-    def __init__(self, pose, position_only=False, free_axis=None):
+    def __init__(self, pose: ArrayLike, position_only: bool = False, free_axis: ArrayLike | None = None) -> None:
         """``position_only``: the orientation is free. ``free_axis`` (3,): the rotation about this axis of the tip, in
         the tip's frame, is free, e.g. (0, 0, 1) for a gripper that may come from any side.
 
@@ -68,12 +77,12 @@ class Target:
         self.arrays = self.rotation, self.position, self.rows.value, basis
 
     @classmethod
-    def of(cls, target):
+    def of(cls, target: Target | ArrayLike) -> Target:
         """Return ``target``, a Target or a full pose (4, 4), as a Target."""
-        return target if isinstance(target, cls) else cls(target)
+        return target if isinstance(target, Target) else cls(target)
 
     @property
-    def pose(self):
+    def pose(self) -> np.ndarray:
         """The requested pose as a new (4, 4), made orthonormal."""
         return rigid(self.rotation, self.position)
 
@@ -84,7 +93,7 @@ class Targets:
     arrays: rotations (m, 3, 3), positions (m, 3) [m], rows, bases (m, 3, 3), as the kernels take them.
     """
 
-    def __init__(self, poses, position_only=False, free_axis=None):
+    def __init__(self, poses: ArrayLike, position_only: bool = False, free_axis: ArrayLike | None = None) -> None:
         """Raises InvalidTarget with the number of an invalid pose, and ValueError as Target does."""
         try:
             matrices = np.array(poses, dtype=np.float64)
@@ -107,22 +116,22 @@ class Targets:
         self.arrays = rotations, positions, rows_of(position_only, free_axis).value, bases
 
     @classmethod
-    def of(cls, targets):
+    def of(cls, targets: Targets | ArrayLike) -> Targets:
         """Return ``targets``, Targets or full poses (m, 4, 4), as Targets."""
-        return targets if isinstance(targets, cls) else cls(targets)
+        return targets if isinstance(targets, Targets) else cls(targets)
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.arrays[1])
 
 
-def rows_of(position_only, free_axis):
+def rows_of(position_only: bool, free_axis: ArrayLike | None) -> Rows:
     """Return the Rows of the pose error that count; position_only overrides free_axis."""
     if position_only:
         return kernels.Rows.POSITION
     return kernels.Rows.POSE if free_axis is None else kernels.Rows.FREE_TURN
 
 
-def _direction(axis):
+def _direction(axis: ArrayLike) -> np.ndarray:
     try:
         vector = np.array(axis, dtype=np.float64)
     except (TypeError, ValueError):

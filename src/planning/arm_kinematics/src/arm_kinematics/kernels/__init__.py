@@ -20,9 +20,22 @@ a named one. Their parts, in order:
 Positions are in metres and angles in radians, everything in the base frame. The functions keep no state and release the
 GIL, so any number of threads may call them.
 """
+from __future__ import annotations
+
 import importlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 
 from arm_kinematics.kernels.rows import Rows
+
+Arm = tuple[np.ndarray, np.ndarray, np.ndarray]
+Limits = tuple[np.ndarray, np.ndarray]
+TargetArrays = tuple[np.ndarray, np.ndarray, int, np.ndarray]
+Effort = tuple[float, float, int, int, int]
+Postures = tuple[np.ndarray, np.ndarray]
+Gathering = tuple[int, int, bool, float]
 
 _HOMES = {"descent": ("nearest", "newton"), "linear": ("wrench",), "motion": ("joint_frames", "tip_and_jacobian"),
           "searching": ("gather", "search", "search_many"),
@@ -39,7 +52,7 @@ def load() -> None:
         globals().update((name, getattr(home, name)) for name in names)
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> Callable[..., Any]:
     """The functions are imported at the first use of one of them."""
     if name not in __all__:
         raise AttributeError("module '%s' has no attribute '%s'" % (__name__, name))

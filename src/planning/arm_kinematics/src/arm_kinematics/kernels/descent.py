@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Descent from one start: to the target, damped or by Newton's steps, along the self-motion towards a posture, or as
 near to the target as possible."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +13,9 @@ from arm_kinematics.kernels.linear import back_substitute, damp, distance, facto
 from arm_kinematics.kernels.motion import place_joints
 from arm_kinematics.kernels.starts import clamped, fill_start, state_of, turn_towards
 from arm_kinematics.kernels.task import fill_error, fill_task_jacobian, on_target, pose_error, within, workspace
+
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Arm, Effort, Limits, TargetArrays
 
 # Tried on 4,000 random poses of each of two arms. With less damping, starts arrive even sooner, but more often at a
 # distant solution: at a quarter of this value, 3 in 1,000 starts that began 0.05 rad away; at this value none of 1,500.
@@ -28,7 +34,8 @@ _TOUCHING = 1e-12
 
 
 @compiled
-def _fill_slope(jacobian, error, rows, limits, q, slope):
+def _fill_slope(jacobian: np.ndarray, error: np.ndarray, rows: int, limits: Limits, q: np.ndarray,
+                slope: np.ndarray) -> None:
     """Fill ``slope`` (n,) with J^T e. A joint at its limit that is pushed outwards is excluded: its column becomes
     0."""
     lower, upper = limits
@@ -44,7 +51,8 @@ def _fill_slope(jacobian, error, rows, limits, q, slope):
 
 
 @compiled
-def reach(arm, limits, target, effort, q, best):
+def reach(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, q: np.ndarray,
+          best: np.ndarray) -> tuple[bool, int, float]:
     """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
 
     ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is in
@@ -82,7 +90,8 @@ def reach(arm, limits, target, effort, q, best):
 
 
 @compiled
-def newton(arm, limits, target, effort, seed, q):
+def newton(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, seed: np.ndarray,
+           q: np.ndarray) -> tuple[int, bool]:
     """Newton's steps with the pseudo-inverse from ``seed`` (n,), each cut off at the limits, as KDL's
     ChainIkSolverPos_NR_JL makes them; then, from where they arrive, to the tolerances of ``effort``.
 
@@ -127,7 +136,8 @@ def newton(arm, limits, target, effort, seed, q):
 
 
 @compiled
-def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
+def _fill_drift(jacobian: np.ndarray, error: np.ndarray, rows: int, limits: Limits, preferred: np.ndarray,
+                q: np.ndarray, room: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> None:
     """Of ``room``, (gram (6, 6), pull (6,), correction (6,), drift (n,), fix (n,)), fill fix, the minimum-norm
     correction of the pose error, and drift, the part of (preferred - q) that does not move the tip.
 
@@ -165,7 +175,8 @@ def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
 
 
 @compiled
-def walk(arm, limits, target, effort, preferred, q, best):
+def walk(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, preferred: np.ndarray, q: np.ndarray,
+         best: np.ndarray) -> int:
     """Walk from the solution ``q`` towards ``preferred`` in the null space, so that the tip stays on the target.
 
     ``best`` (a solution on entry) gets the nearest solution found. Returns the iterations used. Each step is the drift
@@ -230,7 +241,8 @@ def walk(arm, limits, target, effort, preferred, q, best):
 
 
 @compiled
-def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
+def _approach(arm: Arm, limits: Limits, target: TargetArrays, metres_per_radian: float, max_iterations: int,
+              q: np.ndarray) -> float:
     """Take ``q`` (changed in place) to a local minimum of the tip's distance to the target; returns the squared error
     [m^2].
 
@@ -272,7 +284,8 @@ def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
 
 
 @compiled
-def nearest(arm, limits, target, effort, metres_per_radian, seed, solution):
+def nearest(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, metres_per_radian: float, seed: np.ndarray,
+            solution: np.ndarray) -> tuple[float, float]:
     """The posture inside the limits whose tip comes nearest to a target that cannot be reached.
 
     Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Searched from the seed and from random postures.

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Vectors and small symmetric matrices: at most seven by seven. Own code, because numba's ``numpy.linalg`` needs
 scipy."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -12,7 +14,7 @@ _SINGULAR = 1e-14
 
 
 @compiled
-def length(vector, start, stop):
+def length(vector: np.ndarray, start: int, stop: int) -> float:
     """Return the length of the part ``start`` to ``stop`` - 1 of a vector."""
     total = 0.0
     for i in range(start, stop):
@@ -21,7 +23,7 @@ def length(vector, start, stop):
 
 
 @compiled
-def distance(a, b):
+def distance(a: np.ndarray, b: np.ndarray) -> float:
     """Return the distance of two postures (n,)."""
     total = 0.0
     for i in range(a.shape[0]):
@@ -30,7 +32,7 @@ def distance(a, b):
 
 
 @compiled
-def factorise(matrix, size):
+def factorise(matrix: np.ndarray, size: int) -> None:
     """Cholesky factor in place (lower triangle), the inverse of each pivot on the diagonal.
 
     A singular direction gets 0 there, so it does not move.
@@ -49,7 +51,7 @@ def factorise(matrix, size):
 
 
 @compiled
-def back_substitute(factor, size, vector):
+def back_substitute(factor: np.ndarray, size: int, vector: np.ndarray) -> None:
     """Solve in place with the factor of :func:`factorise`."""
     for i in range(size):
         value = vector[i]
@@ -64,7 +66,7 @@ def back_substitute(factor, size, vector):
 
 
 @compiled
-def damp(jacobian, rows, damping, normal, step):
+def damp(jacobian: np.ndarray, rows: int, damping: float, normal: np.ndarray, step: np.ndarray) -> None:
     """Turn ``step`` (n,), the slope J^T e on entry, into (J^T J + damping I)^-1 J^T e; ``normal`` (n, n) is work
     space."""
     n = step.shape[0]
@@ -80,7 +82,7 @@ def damp(jacobian, rows, damping, normal, step):
 
 
 @compiled
-def fill_gram(jacobian, rows, damping, gram):
+def fill_gram(jacobian: np.ndarray, rows: int, damping: float, gram: np.ndarray) -> None:
     """Fill the lower triangle of ``gram`` with J J^T + damping I, of the first ``rows`` of J."""
     for row in range(rows):
         for column in range(row + 1):
@@ -92,7 +94,7 @@ def fill_gram(jacobian, rows, damping, gram):
 
 
 @compiled
-def wrench(jacobian, torques, damping):
+def wrench(jacobian: np.ndarray, torques: np.ndarray, damping: float) -> np.ndarray:
     """Damped least-squares wrench (6,) whose joint torques are ``torques``: (J J^T + damping^2) w = J torques."""
     n = torques.shape[0]
     gram, result = np.empty((6, 6)), np.empty(6)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Forward kinematics of joints and tip, and Jacobians."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -8,7 +10,8 @@ from arm_kinematics.kernels.compiled import compiled
 
 
 @compiled
-def place_joints(rotations, offsets, prismatic, q, lines, rotation, position):
+def place_joints(rotations: np.ndarray, offsets: np.ndarray, prismatic: np.ndarray, q: np.ndarray, lines: np.ndarray,
+                 rotation: np.ndarray, position: np.ndarray) -> None:
     """Forward kinematics; fills the tip's ``rotation`` and ``position`` and the joints' ``lines`` (n, 6): the direction
     of each joint's axis, then a point on it, the joint's origin.
     """
@@ -54,7 +57,7 @@ def place_joints(rotations, offsets, prismatic, q, lines, rotation, position):
 
 
 @compiled
-def fill_jacobian(prismatic, lines, position, jacobian):
+def fill_jacobian(prismatic: np.ndarray, lines: np.ndarray, position: np.ndarray, jacobian: np.ndarray) -> None:
     """Geometric Jacobian (6, n) of the point ``position``: linear rows first, base frame."""
     for i in range(lines.shape[0]):
         ax, ay, az = lines[i, 0], lines[i, 1], lines[i, 2]
@@ -70,7 +73,8 @@ def fill_jacobian(prismatic, lines, position, jacobian):
 
 
 @compiled
-def joint_frames(rotations, offsets, prismatic, q):
+def joint_frames(rotations: np.ndarray, offsets: np.ndarray, prismatic: np.ndarray,
+                 q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the rotations (n + 1, 3, 3) and origins (n + 1, 3) of every joint's moved frame, and of the tip (last)."""
     n = q.shape[0]
     all_rotations, all_origins = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -97,7 +101,8 @@ def joint_frames(rotations, offsets, prismatic, q):
 
 
 @compiled
-def tip_and_jacobian(rotations, offsets, prismatic, q):
+def tip_and_jacobian(rotations: np.ndarray, offsets: np.ndarray, prismatic: np.ndarray,
+                     q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the tip's pose (4, 4) in the base frame and its Jacobian (6, n)."""
     n = q.shape[0]
     lines, rotation, position = np.empty((n, 6)), np.empty((3, 3)), np.empty(3)

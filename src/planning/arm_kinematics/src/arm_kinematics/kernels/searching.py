@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Search from many starts until there are enough solutions."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +13,13 @@ from arm_kinematics.kernels.linear import distance
 from arm_kinematics.kernels.starts import clamped, fill_start, state_of, turn_towards
 from arm_kinematics.kernels.task import pose_error
 
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Arm, Effort, Gathering, Limits, Postures, TargetArrays
+
 
 @compiled
-def search(arm, limits, target, effort, postures, solution):
+def search(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, postures: Postures,
+           solution: np.ndarray) -> tuple[int, int, int, float, float]:
     """Look for postures that put the tip on the target, and keep the one nearest the preferred posture.
 
     The first start is the seed, the others are random postures inside the limits. Their generator is seeded by the
@@ -50,7 +57,8 @@ def search(arm, limits, target, effort, postures, solution):
 
 
 @compiled
-def search_many(arm, limits, targets, effort, postures, part, answers):
+def search_many(arm: Arm, limits: Limits, targets: TargetArrays, effort: Effort, postures: Postures,
+                part: tuple[int, int], answers: tuple[np.ndarray, np.ndarray]) -> None:
     """:func:`search` for a ``part`` (first, last + 1) of the targets.
 
     ``targets`` and ``postures`` have arrays with one entry per target. ``answers``: (solutions (m, n), outcomes (m, 5):
@@ -65,7 +73,8 @@ def search_many(arm, limits, targets, effort, postures, part, answers):
 
 
 @compiled
-def gather(arm, limits, target, effort, postures, collection, solutions):
+def gather(arm: Arm, limits: Limits, target: TargetArrays, effort: Effort, postures: Postures, collection: Gathering,
+           solutions: np.ndarray) -> tuple[int, int, int]:
     """Collect different solutions of one target, as ``collection`` describes, in the rows of ``solutions`` (m, n).
 
     Makes the starts that :func:`search` would make, from the collection's first to the effort's last, until the rows

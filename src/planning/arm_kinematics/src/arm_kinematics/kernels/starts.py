@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Starts of a search: the seed, then random postures that depend only on the request."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics.kernels.compiled import compiled
 
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Arm, Limits, TargetArrays
+
 
 @compiled
-def _mix(state):
+def _mix(state: np.uint64) -> tuple[np.uint64, np.uint64]:
     """One step of splitmix64 (Steele, Lea, Flood, OOPSLA 2014): returns (new state, 64 mixed bits)."""
     state += np.uint64(0x9E3779B97F4A7C15)
     z = state
@@ -18,7 +24,7 @@ def _mix(state):
 
 
 @compiled
-def _stir(state, values):
+def _stir(state: np.uint64, values: np.ndarray) -> np.uint64:
     for bits in values.view(np.uint64):
         state, mixed = _mix(state ^ bits)
         state ^= mixed
@@ -26,14 +32,14 @@ def _stir(state, values):
 
 
 @compiled
-def state_of(target, seed):
+def state_of(target: TargetArrays, seed: np.ndarray) -> np.uint64:
     """Return the generator's first state: it depends only on the request."""
     rotation, position, _, _ = target
     return _stir(_stir(_stir(np.uint64(seed.shape[0]), position), rotation.ravel()), seed)
 
 
 @compiled
-def clamped(seed, limits):
+def clamped(seed: np.ndarray, limits: Limits) -> np.ndarray:
     """Return the posture ``seed`` (n,) moved inside the limits."""
     lower, upper = limits
     inside = np.empty(seed.shape[0])
@@ -43,7 +49,7 @@ def clamped(seed, limits):
 
 
 @compiled
-def fill_start(attempt, state, limits, seed, start):
+def fill_start(attempt: int, state: np.uint64, limits: Limits, seed: np.ndarray, start: np.ndarray) -> None:
     """Fill ``start`` (n,) with the posture that attempt number ``attempt`` begins at: the seed first, then random ones.
 
     Depends on nothing but the arguments: ``state`` is that of :func:`state_of`, so the same request gives the same
@@ -64,7 +70,7 @@ def fill_start(attempt, state, limits, seed, start):
 
 
 @compiled
-def turn_towards(arm, limits, preferred, q):
+def turn_towards(arm: Arm, limits: Limits, preferred: np.ndarray, q: np.ndarray) -> None:
     """For a joint without limits, choose the equivalent angle nearest the posture ``preferred``."""
     _, _, prismatic = arm
     lower, upper = limits

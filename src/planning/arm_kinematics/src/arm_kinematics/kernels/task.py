@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The target of the tip, and the pose error."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,9 +12,12 @@ from arm_kinematics.kernels.linear import length
 from arm_kinematics.kernels.motion import fill_jacobian, place_joints
 from arm_kinematics.kernels.rows import Rows
 
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Arm, TargetArrays
+
 
 @compiled
-def split_pose(pose, allowed, rotation, position):
+def split_pose(pose: np.ndarray, allowed: float, rotation: np.ndarray, position: np.ndarray) -> bool:
     """Copy a pose (4, 4) into ``rotation`` (3, 3), made exactly orthonormal, and ``position`` (3,).
 
     Returns False when a number is not finite, the rotation is off by more than ``allowed`` in any product of columns,
@@ -52,7 +58,7 @@ def split_pose(pose, allowed, rotation, position):
 
 
 @compiled
-def fill_basis(target_rotation, axis, basis):
+def fill_basis(target_rotation: np.ndarray, axis: np.ndarray, basis: np.ndarray) -> None:
     """Fill ``basis`` (3, 3): its last row is the target's ``axis`` (3,), given in the tip's frame, the others complete
     the basis.
 
@@ -75,7 +81,8 @@ def fill_basis(target_rotation, axis, basis):
 
 
 @compiled
-def fill_error(rotation, position, target_rotation, target_position, rows, basis, error):
+def fill_error(rotation: np.ndarray, position: np.ndarray, target_rotation: np.ndarray, target_position: np.ndarray,
+               rows: int, basis: np.ndarray, error: np.ndarray) -> None:
     """Pose error: translation [m], then the rotation vector [rad] that turns the tip into the target; base frame.
 
     With a free turn the rotation is the smallest that turns the tip's free axis into the target's; it has no part along
@@ -128,13 +135,13 @@ def fill_error(rotation, position, target_rotation, target_position, rows, basis
 
 
 @compiled
-def on_target(error, rows, tolerance_m, tolerance_rad):
+def on_target(error: np.ndarray, rows: int, tolerance_m: float, tolerance_rad: float) -> bool:
     """Return whether a pose error is within the tolerances."""
     return length(error, 0, 3) <= tolerance_m and (rows == Rows.POSITION or length(error, 3, rows) <= tolerance_rad)
 
 
 @compiled
-def within(error, rows, bound):
+def within(error: np.ndarray, rows: int, bound: float) -> bool:
     """Return whether every component of a pose error is less than ``bound`` [m] and [rad]."""
     for row in range(rows):
         if not abs(error[row]) < bound:
@@ -143,7 +150,7 @@ def within(error, rows, bound):
 
 
 @compiled
-def workspace(n):
+def workspace(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return arrays for a posture's joint lines (n, 6), tip rotation (3, 3), position (3,), jacobian (6, n) and error
     (6,).
     """
@@ -151,7 +158,8 @@ def workspace(n):
 
 
 @compiled
-def fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian):
+def fill_task_jacobian(prismatic: np.ndarray, lines: np.ndarray, position: np.ndarray, rows: int, basis: np.ndarray,
+                       jacobian: np.ndarray) -> None:
     """:func:`fill_jacobian`, its angular rows along ``basis`` where a turn is free."""
     fill_jacobian(prismatic, lines, position, jacobian)
     if rows == Rows.FREE_TURN:
@@ -162,7 +170,7 @@ def fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian):
 
 
 @compiled
-def pose_error(arm, target, q):
+def pose_error(arm: Arm, target: TargetArrays, q: np.ndarray) -> tuple[float, float]:
     """Return the pose error of the posture ``q``: [m], [rad]."""
     rotations, offsets, prismatic = arm
     target_rotation, target_position, rows, basis = target
@@ -173,7 +181,8 @@ def pose_error(arm, target, q):
 
 
 @compiled
-def beyond_reach(target_rotation, target_position, shoulder, tip_reach_m, wrist_in_tip, wrist_reach_m):
+def beyond_reach(target_rotation: np.ndarray, target_position: np.ndarray, shoulder: np.ndarray, tip_reach_m: float,
+                 wrist_in_tip: np.ndarray, wrist_reach_m: float) -> tuple[float, float]:
     """Return how far the tip, and the wrist in this orientation, would be outside the balls around the shoulder [m]."""
     tip, wrist = 0.0, 0.0
     for a in range(3):
