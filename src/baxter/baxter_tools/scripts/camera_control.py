@@ -3,6 +3,7 @@
 """Open, close and list the robot's cameras, or search for them again."""
 import argparse
 import sys
+from collections.abc import Sequence
 
 import rospy
 from std_srvs.srv import Empty
@@ -16,7 +17,7 @@ from baxter_interface.services import call_service
 RESET_TIMEOUT_S = 10.0
 
 
-def resolution(text):
+def resolution(text: str) -> tuple[int, int]:
     try:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:
@@ -30,7 +31,7 @@ def _modes():
     return ", ".join("%dx%d" % mode for mode in MODES)
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="camera_control.py", description=__doc__,
         epilog="Exit status: 0 done, 1 failed, 2 wrong options.")
@@ -44,13 +45,13 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
-def print_cameras():
+def print_cameras() -> None:
     published = {name for name, _type in rospy.get_published_topics()}
     for camera in list_cameras():
         print(camera + (" - (open)" if "/cameras/%s/image" % camera in published else ""))
 
 
-def do(arguments):
+def do(arguments: argparse.Namespace) -> None:
     if arguments.list:
         print_cameras()
     elif arguments.enumerate:
@@ -62,7 +63,7 @@ def do(arguments):
         CameraController(arguments.open).resolution = arguments.resolution
 
 
-def main():
+def main() -> int:
     arguments = parse_arguments(rospy.myargv()[1:])
     return run("rsdk_camera_control", lambda: do(arguments), anonymous=True)
 

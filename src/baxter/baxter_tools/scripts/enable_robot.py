@@ -3,6 +3,7 @@
 """Print the robot's state; enable, disable, reset or stop it."""
 import argparse
 import sys
+from collections.abc import Sequence
 
 import rospy
 
@@ -18,7 +19,7 @@ ACTIONS = {
 }
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: Sequence[str]) -> list[str]:
     parser = argparse.ArgumentParser(
         prog="enable_robot.py", description=__doc__,
         epilog="Options are carried out in the order given. A robot is waited for, 30 s or "
@@ -38,13 +39,13 @@ def parse_arguments(argv):
     return actions
 
 
-def carry_out(actions):
+def carry_out(actions: Sequence[str]) -> None:
     robot = RobotEnable(CHECK_VERSION)
     for action in actions:
         ACTIONS[action](robot)
 
 
-def main():
+def main() -> int:
     actions = parse_arguments(rospy.myargv()[1:])
     return run("rsdk_robot_enable", lambda: carry_out(actions)) if actions else 0
 

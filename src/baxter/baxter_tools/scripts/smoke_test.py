@@ -4,6 +4,8 @@
 import argparse
 import datetime
 import sys
+from collections.abc import Sequence
+from typing import TextIO
 
 import rospy
 
@@ -15,7 +17,7 @@ from baxter_tools.smoke_tests import TESTS, log_file_name
 SERIAL_PARAMETER = "manifest/robot_serial"
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="smoke_test.py", description=__doc__,
         epilog="The arms need room. Exit status: 0 all passed, 1 something failed, 2 wrong options.")
@@ -27,15 +29,15 @@ def parse_arguments(argv):
 class Report:
     """Lines to the terminal and to the log file."""
 
-    def __init__(self, stream):
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
-    def say(self, text):
+    def say(self, text: str) -> None:
         print(text, flush=True)
         print(text, file=self._stream, flush=True)
 
 
-def run_test(name, report):
+def run_test(name: str, report: Report) -> bool:
     """Return whether the test passed; an exception means failure."""
     report.say("=== %s: %s" % (name, TESTS[name].__doc__))
     try:
@@ -49,7 +51,7 @@ def run_test(name, report):
     return True
 
 
-def run_tests(arguments):
+def run_tests(arguments: argparse.Namespace) -> None:
     robot = RobotEnable(CHECK_VERSION)
     was_enabled = robot.state().enabled
     serial = rospy.get_param(SERIAL_PARAMETER, None)
@@ -78,7 +80,7 @@ def run_tests(arguments):
         report.say("all passed: %s" % ", ".join(names))
 
 
-def main():
+def main() -> int:
     arguments = parse_arguments(rospy.myargv()[1:])
     return run("rsdk_smoke_test", lambda: run_tests(arguments))
 

@@ -3,6 +3,7 @@
 """Fold the arms up for transport, or unfold them, from any posture and around each other."""
 import argparse
 import sys
+from collections.abc import Sequence
 
 import rospy
 
@@ -13,7 +14,7 @@ from baxter_tools.folding import Arms, Folding, own_collision_avoidance
 HEAD_SPEED = 0.5
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: Sequence[str]) -> str:
     parser = argparse.ArgumentParser(prog="tuck_arms.py", description=__doc__,
                                      epilog="Exit status: 0 done, 1 failed, 2 wrong options.")
     choice = parser.add_mutually_exclusive_group(required=True)
@@ -22,7 +23,7 @@ def parse_arguments(argv):
     return parser.parse_args(argv).pose
 
 
-def look_ahead():
+def look_ahead() -> None:
     """Turn the head forward: the arms fold around it. If the head does not turn, folding still goes on."""
     try:
         Head().set_pan(0.0, speed=HEAD_SPEED)
@@ -30,7 +31,7 @@ def look_ahead():
         rospy.logwarn("%s", failure.strerror)
 
 
-def fold(pose):
+def fold(pose: str) -> None:
     arms = Arms()
     folding = Folding(arms.names)
     with own_collision_avoidance() as too_near, EnabledRobot() as robot:
@@ -44,7 +45,7 @@ def fold(pose):
             raise ProgramFailed("the robot holds its arms for too near and is disabled: %s" % "; ".join(too_near()))
 
 
-def main():
+def main() -> int:
     pose = parse_arguments(rospy.myargv()[1:])
     return run("rsdk_tuck_arms", lambda: fold(pose))
 

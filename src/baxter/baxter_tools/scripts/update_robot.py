@@ -4,6 +4,7 @@
 import argparse
 import re
 import sys
+from collections.abc import Sequence
 
 import rospy
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
@@ -27,7 +28,7 @@ SILENCE_TIMEOUT_S = 60.0
 POLL_S = 0.1
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="update_robot.py", description=__doc__,
                                      epilog="Exit status: 0 done, 1 failed, 2 wrong options.")
     action = parser.add_mutually_exclusive_group(required=True)
@@ -36,7 +37,7 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
-def require_old_robot():
+def require_old_robot() -> None:
     version = str(rospy.get_param(VERSION_PARAMETER, "unknown"))
     numbers = re.match(r"(\d+)\.(\d+)", version)
     if numbers is None or tuple(map(int, numbers.groups())) > LAST_VERSION:
@@ -47,7 +48,7 @@ def require_old_robot():
 class Updater:
     """The robot's updater: the updates on the stick, and the progress of an update."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.sources = self._status = None
         self._heard = False
         self._last_line = ""
@@ -60,7 +61,7 @@ class Updater:
         startup.wait_for_start([startup.message_arrives("/usb/update_sources", lambda: self.sources is not None)],
                                SILENCE_TIMEOUT_S)
 
-    def run(self, uuid):
+    def run(self, uuid: str) -> None:
         """Start the update and follow it to its end. Raises ProgramFailed; Ctrl-C stops the update."""
         if uuid not in [source.uuid for source in self.sources]:
             raise ProgramFailed("there is no update %r on the stick: those are %s" % (
@@ -106,7 +107,7 @@ class Updater:
         self._status, self._heard = message, True
 
 
-def do(arguments):
+def do(arguments: argparse.Namespace) -> None:
     require_old_robot()
     updater = Updater()
     if arguments.list:
@@ -116,7 +117,7 @@ def do(arguments):
         updater.run(arguments.update)
 
 
-def main():
+def main() -> int:
     arguments = parse_arguments(rospy.myargv()[1:])
     return run("rsdk_update_robot", lambda: do(arguments))
 

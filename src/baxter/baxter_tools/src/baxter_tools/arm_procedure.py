@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 import rospy
 
@@ -11,8 +12,14 @@ from baxter_interface.gripper_link import NoGripper
 from baxter_interface.programs import ProgramFailed, run
 from baxter_model import SIDES
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
-def run_arm_procedure(node_name, procedure, kind, data, timeout_s: float, description):
+    from genpy import Message
+
+
+def run_arm_procedure(node_name: str, procedure: str, kind: Callable[[bool, str, Message], Message], data: Message,
+                      timeout_s: float, description: str | None) -> int:
     """Parse the options, run `procedure` on the arm, and return the exit status.
 
     Parameters: `procedure` as the robot calls it; `kind` of its enable message and its `data`; `timeout_s`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,16 +44,16 @@ class Arms:
         self.names = [name for limb in self._limbs for name in limb.joint_names()]
         self._switch = None
 
-    def angles(self):
+    def angles(self) -> dict[str, float]:
         """Return the joint angles as a dict of name to rad."""
         return {name: angle for limb in self._limbs for name, angle in limb.joint_angles().items()}
 
-    def command(self, angles, raw) -> None:
+    def command(self, angles: Mapping[str, float], raw: bool) -> None:
         """Command joint angles, a dict of name to rad; as Limb.set_joint_positions."""
         for limb in self._limbs:
             limb.set_joint_positions({name: angles[name] for name in limb.joint_names()}, raw)
 
-    def follow(self, way, is_enabled) -> None:
+    def follow(self, way: Sequence[dict[str, float]], is_enabled: Callable[[], bool]) -> None:
         """Move both arms through the postures of `way` (dicts of name to rad), all joints in step; stop at each.
 
         `is_enabled` returns whether the robot is enabled. Raises ProgramFailed; the arms then stay where they are.
@@ -100,7 +101,7 @@ class Folding:
                                 % rospy.resolve_name("robot_description"))
         self._clearance = SelfClearance(text, names, rospy.logwarn)
 
-    def way(self, angles, pose: Any):
+    def way(self, angles: Mapping[str, float], pose: str) -> list[dict[str, float]]:
         """Return the path from `angles` (dict of name to rad) to the named pose as a list of such dicts.
 
         Raises ProgramFailed if there is none.
@@ -121,7 +122,7 @@ class Folding:
 
 
 @contextlib.contextmanager
-def own_collision_avoidance():
+def own_collision_avoidance() -> Iterator[Callable[[], list[str]]]:
     """Suppress the robot's collision avoidance inside a `with` block: folded arms are too close for it.
 
     Yields a function that lists the parts that the robot now counts as too close.

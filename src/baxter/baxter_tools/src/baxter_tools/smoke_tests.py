@@ -22,6 +22,7 @@ from baxter_interface.programs import ProgramFailed, expect
 from baxter_model import ELECTRIC, SIDES, poses
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from datetime import datetime
 
 ZERO_G_S = 10.0
@@ -44,7 +45,7 @@ CAMERA_RESOLUTION = (960, 600)
 USUAL_RESOLUTION, USUAL_FPS = (640, 400), 25.0
 
 
-def test_enable(say) -> None:
+def test_enable(say: Callable[[str], object]) -> None:
     """The robot can be enabled and disabled."""
     robot = RobotEnable()
     robot.enable()
@@ -53,7 +54,7 @@ def test_enable(say) -> None:
     robot.disable()
 
 
-def test_messages(say) -> None:
+def test_messages(say: Callable[[str], object]) -> None:
     """Joint states and analog states arrive."""
     for topic, kind in (("robot/joint_states", JointState), ("robot/analog_io_states", AnalogIOStates)):
         say("waiting for %s" % topic)
@@ -66,13 +67,13 @@ def test_messages(say) -> None:
             subscriber.unregister()
 
 
-def test_services(say) -> None:
+def test_services(say: Callable[[str], object]) -> None:
     """The left arm's inverse kinematics finds a posture."""
     angles = Limb("left").ik(REACHABLE)
     say("a posture for the pose: %s" % ", ".join("%s %.3f" % item for item in angles.items()))
 
 
-def test_head(say) -> None:
+def test_head(say: Callable[[str], object]) -> None:
     """The head turns and nods, and the screen shows pictures."""
     RobotEnable().enable()
     head = Head()
@@ -90,7 +91,7 @@ def test_head(say) -> None:
         RosClock().sleep(PICTURE_S)
 
 
-def test_move_arms(say) -> None:
+def test_move_arms(say: Callable[[str], object]) -> None:
     """Both arms move through four postures."""
     RobotEnable().enable()
     limbs = [Limb(side) for side in SIDES]
@@ -105,7 +106,7 @@ def test_move_arms(say) -> None:
                 expect(move.result(), "the %s arm did not get to posture %d" % (limb.name, number))
 
 
-def test_grippers(say) -> None:
+def test_grippers(say: Callable[[str], object]) -> None:
     """Both electric grippers calibrate, open, close and take positions and speeds."""
     RobotEnable().enable()
     for gripper in [Gripper(side) for side in SIDES]:
@@ -129,7 +130,7 @@ def test_grippers(say) -> None:
         gripper.set_parameters(defaults=True)
 
 
-def test_blink_leds(say) -> None:
+def test_blink_leds(say: Callable[[str], object]) -> None:
     """Every light of the navigators follows."""
     for name in LIGHTS:
         say("blinking %s" % name)
@@ -141,7 +142,7 @@ def test_blink_leds(say) -> None:
         light.set_output(before)
 
 
-def test_cameras(say) -> None:
+def test_cameras(say: Callable[[str], object]) -> None:
     """Every camera that has power opens, and its pictures arrive; they are shown on the screen."""
     names = list_cameras(MESSAGE_TIMEOUT_S)
     expect(names, "no camera has power")
