@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from baxter_model import BASE_HEIGHT_M, SIDES, poses
 from baxter_model.self_collision import spawn_options
@@ -43,6 +44,10 @@ from .robot import MOVE_S, Baxter
 from .saving import SavedState
 from .tools import with_tools
 
+if TYPE_CHECKING:
+    from bullet_sim import Model
+    from motion_planning.timing import Timed
+
 LOG = logging.getLogger("baxter_lab")
 STEP_S = 0.002
 ROBOT = "baxter"
@@ -52,7 +57,7 @@ class _Log:
     """Where repeated warnings of the robot's logic go."""
 
     @staticmethod
-    def warn(text):
+    def warn(text: str) -> None:
         LOG.warning(text)
 
 
@@ -80,7 +85,7 @@ class Options(NamedTuple):
 class Thing:
     """An object in the world. Attributes: `model`, of bullet_sim; `name`; `shape`, of urdf_model, or None."""
 
-    def __init__(self, model, shape=None):
+    def __init__(self, model: Model, shape: Box | Cylinder | Sphere | None = None) -> None:
         self.model, self.name, self.shape = model, model.name, shape
 
     @property
@@ -93,7 +98,7 @@ class Thing:
         """(3,) [m]."""
         return np.array(self.model.base_pose().position)
 
-    def put(self, place, yaw: float = 0.0) -> None:
+    def put(self, place: npt.ArrayLike, yaw: float = 0.0) -> None:
         """Put it at a pose (4, 4), or at (x, y, z), turned about the vertical, at rest."""
         self.model.set_base_pose(_pose(place, yaw))
         if not self.model.static:
@@ -112,7 +117,7 @@ def _pose(place, yaw=0.0):
     return Pose(tuple(place.tolist()), (0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))
 
 
-def pose(place, rpy=(math.pi, 0.0, 0.0)) -> np.ndarray:
+def pose(place: Sequence[float], rpy: Sequence[float] = (math.pi, 0.0, 0.0)) -> np.ndarray:
     """(4, 4) the pose at (x, y, z) with roll, pitch and yaw [rad]; by default of a hand that points straight down."""
     from urdf_model.transforms import pose_matrix
 
@@ -226,7 +231,7 @@ class Lab:
         self.things[name] = Thing(model, geometry)
         return self.things[name]
 
-    def add_box(self, name: str, size, place, yaw: float = 0.0, **body) -> Thing:
+    def add_box(self, name: str, size: Sequence[float], place: npt.ArrayLike, yaw: float = 0.0, **body: Any) -> Thing:
         """Add a box of `size` (3,) [m] with its centre at `place`: a pose (4, 4), or (x, y, z) and `yaw` [rad].
 
         It is fixed unless it has a `mass_kg`; `friction`, `colour`: as in `Body`. Raises BulletSimError for a name
@@ -234,15 +239,16 @@ class Lab:
         """
         return self._spawn(name, Box(tuple(map(float, size))), place, yaw, Body(**body))
 
-    def add_cylinder(self, name: str, radius: float, length: float, place, yaw: float = 0.0, **body) -> Thing:
+    def add_cylinder(self, name: str, radius: float, length: float, place: npt.ArrayLike, yaw: float = 0.0,
+                     **body: Any) -> Thing:
         """Add a cylinder along z; otherwise as `add_box`."""
         return self._spawn(name, Cylinder(radius, length), place, yaw, Body(**body))
 
-    def add_sphere(self, name: str, radius: float, place, **body) -> Thing:
+    def add_sphere(self, name: str, radius: float, place: npt.ArrayLike, **body: Any) -> Thing:
         """Add a ball; otherwise as `add_box`."""
         return self._spawn(name, Sphere(radius), place, 0.0, Body(**body))
 
-    def add_urdf(self, name: str, description: str | Path, place, yaw: float = 0.0,
+    def add_urdf(self, name: str, description: str | Path, place: npt.ArrayLike, yaw: float = 0.0,
                  static: bool | None = None) -> Thing:
         """Add what a URDF text, or a file with one, describes, its root's frame at `place`. `static`: whether it is
         fixed; by default only a root called "world" is. A mesh that is not found is replaced with a warning."""
@@ -260,7 +266,8 @@ class Lab:
 
     # -- motions that avoid the things
 
-    def plan(self, side: str, goal: np.ndarray, held: str | None = None, time_limit_s: float = 5.0, seed: int = 0):
+    def plan(self, side: str, goal: np.ndarray, held: str | None = None, time_limit_s: float = 5.0,
+             seed: int = 0) -> Timed:
         """A timed path of one arm to a pose (4, 4) or angles (7,) around all things of simple shapes.
 
         `held`: name of the thing in its hand. Returns a `motion_planning.timing.Timed` for `follow`. Raises
@@ -268,7 +275,7 @@ class Lab:
         """
         return self._planning.plan(side, goal, held, time_limit_s, seed)
 
-    def follow(self, side: str, timed) -> None:
+    def follow(self, side: str, timed: Timed) -> None:
         """Move one arm along a timed path, and wait for its end. Raises CommandRefused, NotReached."""
         self._planning.follow(side, timed)
 

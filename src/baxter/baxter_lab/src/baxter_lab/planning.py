@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from baxter_model import JOINTS, finger_prefix, tip_of
 from baxter_sim_hardware.arms.joint_command import Mode
 
 from .descriptions import baxter_srdf, joint_limits
+
+if TYPE_CHECKING:
+    from motion_planning.timing import Timed
+
+    from .lab import Lab
 
 FLOOR, _UNDER_FLOOR_M = "floor", 0.01  # the pedestal stands on it, which is no collision
 _SETTLE_S = 5.0  # [simulated s] for the last millimetres behind a path
@@ -24,7 +31,7 @@ def _lowered(pose):
 class Planning:
     """The planner of a Lab; made at the first plan, which takes seconds. lab: `lab.Lab`."""
 
-    def __init__(self, lab):
+    def __init__(self, lab: Lab) -> None:
         self._lab, self._exact, self._limits = lab, None, None
 
     def _checker(self):
@@ -55,7 +62,7 @@ class Planning:
             scene = scene.attach(held, tip_of(side), touch_links=["%s_hand" % side, *hand])
         return scene
 
-    def plan(self, side, goal, held, time_limit_s, seed):
+    def plan(self, side: str, goal: npt.ArrayLike, held: str | None, time_limit_s: float, seed: int) -> Timed:
         """As `Lab.plan`."""
         from motion_planning.planners.planning import Search, plan_path
         from motion_planning.timing import time_path
@@ -70,7 +77,7 @@ class Planning:
         return time_path(path.points, np.array([row["max_velocity"] for row in limits]),
                          np.array([row["max_acceleration"] for row in limits]))
 
-    def follow(self, side, timed):
+    def follow(self, side: str, timed: Timed) -> None:
         """As `Lab.follow`."""
         lab, arm = self._lab, self._lab.robot.arms[side]
         begin, end = lab.time_s, timed.positions[-1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from arm_kinematics import NoSolution, solve, solve_as_vendor
 from baxter_model import HEAD_JOINT, JOINTS, SIDES
-from baxter_sim_hardware.arms.joint_command import Mode
+from baxter_sim_hardware.arms.joint_command import JointCommand, Mode
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.robot_state import Event, State
 from baxter_sim_hardware.simulated import SimulatedBaxter
@@ -128,7 +128,7 @@ class Arm:
         """The command mode of each joint."""
         return [Mode(mode) for mode in self._simulated.baxter.arms.modes(self.side)]
 
-    def command(self, mode: Mode, values: Sequence[float], names: Sequence[str] | None = None):
+    def command(self, mode: Mode, values: Sequence[float], names: Sequence[str] | None = None) -> JointCommand:
         """One joint command, as on ``joint_command``: `values` [rad, rad/s or Nm] for `names`, by default all joints.
 
         Streamed modes expire after 0.2 s. Returns the command as the robot took it, whose ``clamped`` names the joints

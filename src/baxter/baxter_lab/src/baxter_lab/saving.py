@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bullet_sim.quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from .lab import Lab
 
 _LOGIC = ("baxter_sim_hardware", "sim_time")
 _OF_MODEL = ("_good", "still_for", "_any_effort_driven")
 _OF_WORLD = ("tick", "steps", "_step_since")
 
 
-def restorer(found, seen: dict | None = None) -> Callable[[], object]:
+def restorer(found: object, seen: dict | None = None) -> Callable[[], object]:
     """A function that gives an object, and all that it holds of the control logic, its present state again, in place,
     and returns it. Other things, such as the physics and names, are left alone."""
     seen = {} if seen is None else seen
@@ -80,7 +84,7 @@ def _refilled(found, items):
 class SavedState:
     """The state of a Lab at one moment; made by ``Lab.save``. It holds as long as no object is added or removed."""
 
-    def __init__(self, lab):
+    def __init__(self, lab: Lab) -> None:
         world = lab.world
         self._lab, self._client = lab, world._client
         self._models = {name: (model, {key: getattr(model, key) for key in _OF_MODEL}, model._effort_driven.copy(),
