@@ -32,7 +32,7 @@ class _Timespec(ctypes.Structure):
 class _RunClock:
     """The page that the judge writes, read."""
 
-    def __init__(self, descriptor):
+    def __init__(self, descriptor: int) -> None:
         self._libc = ctypes.CDLL(None, use_errno=True)
         self._libc.mmap.restype = ctypes.c_void_p
         self._libc.mmap.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int, ctypes.c_int,
@@ -55,19 +55,19 @@ class _RunClock:
                 return words
             _real_sleep(0)
 
-    def elapsed_ns(self):
+    def elapsed_ns(self) -> int:
         """Simulated time since the run's start; between two steps it grows more and more slowly, but never stops."""
         _, _, simulated_ns, moved_at_ns, _, _ = self._read()
         since, step = max(0, _real_monotonic_ns() - moved_at_ns), _STEP_S * 1e9
         return simulated_ns + int(step * since / (since + step))
 
-    def time_ns(self):
+    def time_ns(self) -> int:
         return self.elapsed_ns() + self._wall_ns
 
-    def monotonic_ns(self):
+    def monotonic_ns(self) -> int:
         return self.elapsed_ns() + self._monotonic_ns
 
-    def sleep(self, seconds):
+    def sleep(self, seconds: float) -> None:
         """`time.sleep`, in simulated time."""
         if not seconds > 0.0:
             _real_sleep(seconds)  # yields, or raises for a wrong argument

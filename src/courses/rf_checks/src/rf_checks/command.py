@@ -9,7 +9,7 @@ import shutil
 import signal
 import sys
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
 
 import rospkg
 
@@ -50,7 +50,7 @@ def _command_for(word: str) -> str:
 class _Parser(Parser):
     """A parser whose errors have no usage text in front."""
 
-    def error(self, message: Any) -> None:
+    def error(self, message: str) -> NoReturn:
         self.exit(WRONG_WORDS, "check: %s%s\n" % (message, self.meant(message)))
 
 
@@ -122,7 +122,7 @@ def _link_in(path: Path):
     return next((part for part in [*reversed(path.parents), path] if part.is_symlink()), None)
 
 
-def start(name: str):
+def start(name: str) -> int:
     """Copy a skeleton into the current folder; returns the exit status."""
     folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
     source, target = folder / (name + ".py"), Path(name + ".py")

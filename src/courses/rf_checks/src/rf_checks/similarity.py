@@ -93,11 +93,11 @@ class _Level(ast.NodeTransformer):
         node.name = "v" if node.name else None
         return node
 
-    def visit_AnnAssign(self, node: str):
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.Assign | None:
         self.generic_visit(node)
         return None if node.value is None else ast.Assign([node.target], node.value, lineno=node.lineno)
 
-    def visit_JoinedStr(self, node: str):
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> ast.Constant:
         return ast.Constant("s")
 
     def visit_Constant(self, node: ast.Constant) -> ast.Constant:
