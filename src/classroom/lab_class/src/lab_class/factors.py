@@ -27,7 +27,7 @@ class _ToSocket(netutil.Resolver):
     def initialize(self, path: Path) -> None:
         self._path = path
 
-    async def resolve(self, host: str, port: int, family: Any = socket.AF_UNSPEC):
+    async def resolve(self, host: str, port: int, family: Any = socket.AF_UNSPEC) -> list[tuple[int, str]]:
         return [(socket.AF_UNIX, self._path)]
 
 

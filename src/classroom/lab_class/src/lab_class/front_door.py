@@ -282,7 +282,7 @@ def application(door: Door, page: Path) -> web.Application:
         (prefix + r"/([a-z0-9-]+)(?:/.*)?", Passed, {"door": door})], log_function=lambda handler: None)
 
 
-def control(door: Door):
+def control(door: Door) -> web.Application:
     """The same for the commands of the class's owner, at the control socket."""
     owner = {"door": door, "trusted": True}
     return web.Application([(r"/labs", Overview, owner), (r"/labs/([a-z0-9-]+)/([a-z]+)", Change, owner),

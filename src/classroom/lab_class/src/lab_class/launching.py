@@ -113,6 +113,6 @@ def limited(file_bytes: int, tasks: int | None) -> list[str]:
     return ["prlimit", "--core=0", "--fsize=%d" % file_bytes, *number, "--"]
 
 
-def refused(walls: Any):
+def refused(walls: Any) -> contextlib.AbstractContextManager[tuple[list[str], tuple[int, ...]]]:
     """The filter of system calls for one start; a context manager for `prepared`."""
     return system_calls.refused() if walls else contextlib.nullcontext(([], ()))
