@@ -19,10 +19,11 @@ END = "\033[0m"
 class Completer:
     """Completes words by what the interpreter knows at that place."""
 
-    def __init__(self, interpreter):
-        self._interpreter, self._found = interpreter, []
+    def __init__(self, interpreter: MoveGroupCommandInterpreter) -> None:
+        self._interpreter = interpreter
+        self._found: list[str] = []
 
-    def __call__(self, text, state):
+    def __call__(self, text: str, state: int) -> str | None:
         if state == 0:
             keywords = self._interpreter.get_keywords()
             before = readline.get_line_buffer()[:readline.get_begidx()].split()
@@ -31,7 +32,7 @@ class Completer:
         return self._found[state] if state < len(self._found) else None
 
 
-def parse_arguments(argv):
+def parse_arguments(argv: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="moveit_commander_cmdline.py", description=__doc__,
                                      epilog="Exit status: 0, or 1 when a command that was read from a file failed.")
     parser.add_argument("-i", "--interactive", action="store_true", help="go on with the keyboard after -f")
@@ -40,12 +41,12 @@ def parse_arguments(argv):
     return parser.parse_args(argv)
 
 
-def show(level, answer, coloured):
+def show(level: int, answer: str, coloured: bool) -> None:
     if answer:
         print(COLOURS[level] + answer + END if coloured else answer)
 
 
-def read_commands(interpreter, prompts):
+def read_commands(interpreter: MoveGroupCommandInterpreter, prompts: bool) -> bool:
     """Carry out commands until there are no more; return whether all succeeded. prompts: from a keyboard?"""
     fine = True
     while not rospy.is_shutdown():
@@ -62,7 +63,7 @@ def read_commands(interpreter, prompts):
     return fine or prompts
 
 
-def main(argv):
+def main(argv: list[str]) -> int:
     arguments = parse_arguments(argv)
     rospy.init_node("move_group_interface_cmdline", anonymous=True, disable_signals=True)
     interpreter = MoveGroupCommandInterpreter()

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The connection to a running move_group: its actions, services and topics."""
+from __future__ import annotations
+
 import socket
 import threading
 import time
 import urllib.parse
+from collections.abc import Iterable
 from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rosgraph
@@ -18,6 +22,10 @@ import master_calls
 
 from .exception import MoveItCommanderException
 from .node import ensure_node
+
+if TYPE_CHECKING:
+    import genpy
+    from actionlib import ClientGoalHandle
 
 ACTIONS = {"move_group": msg.MoveGroupAction, "execute_trajectory": msg.ExecuteTrajectoryAction,
            "pickup": msg.PickupAction, "place": msg.PlaceAction}
@@ -49,17 +57,17 @@ def how_to_start() -> str:
 class Connection:
     """To the move_group in one namespace. All methods can be called from several threads."""
 
-    def __init__(self, namespace):
+    def __init__(self, namespace: str) -> None:
         self._namespace = namespace
         self._clients, self._publishers = {}, {}
         self._lock = threading.RLock()
         self._running = set()
 
-    def name(self, name):
+    def name(self, name: str) -> str:
         """The resolved name of one of move_group's actions, services or topics."""
         return rospy.resolve_name("/".join(filter(None, [self._namespace, name])))
 
-    def wait_for_actions(self, names, seconds):
+    def wait_for_actions(self, names: Iterable[str], seconds: float) -> None:
         """Wait until the action servers answer, in seconds of real time; longer, up to START_WAIT_S, while move_group
         is starting. Raises RuntimeError after the time limit."""
         begin = time.monotonic()
@@ -90,7 +98,7 @@ class Connection:
             return False
         return True
 
-    def start(self, name, goal):
+    def start(self, name: str, goal: genpy.Message) -> tuple[ClientGoalHandle, threading.Event]:
         """Send a goal and return at once; :meth:`cancel` ends it."""
         done = threading.Event()
         # Sent without our lock: actionlib holds its own lock while it calls _transition, which needs ours.
@@ -101,13 +109,13 @@ class Connection:
                 self._running.add(handle)
         return handle, done
 
-    def _transition(self, handle, done):
+    def _transition(self, handle: ClientGoalHandle, done: threading.Event) -> None:
         if handle.get_comm_state() == actionlib.CommState.DONE:
             done.set()
             with self._lock:
                 self._running.discard(handle)
 
-    def run(self, name, goal):
+    def run(self, name: str, goal: genpy.Message) -> tuple[Any, str]:
         """Send a goal, wait until it has ended, without a time limit, and return (result, text of its server).
 
         The result is FAILURE if the server refused the goal or has ended.
@@ -123,14 +131,14 @@ class Connection:
         refused = handle.get_goal_status() in (GoalStatus.REJECTED, GoalStatus.RECALLED, GoalStatus.LOST)
         return _failure(name) if refused else handle.get_result(), text
 
-    def cancel(self):
+    def cancel(self) -> None:
         """Cancel what this program has sent and what has not ended yet."""
         with self._lock:
             running = tuple(self._running)
         for handle in running:
             handle.cancel()
 
-    def call(self, name, **fields):
+    def call(self, name: str, **fields: object) -> Any:
         """Call a service and return its answer. Raises MoveItCommanderException when there is none."""
         full_name = self.name(name)
         try:
@@ -139,34 +147,34 @@ class Connection:
         except (rospy.ROSException, rospy.ServiceException) as error:
             raise MoveItCommanderException("the service '%s' did not answer: %s" % (full_name, error)) from error
 
-    def service(self, name):
+    def service(self, name: str) -> rospy.ServiceProxy:
         """Return a rospy.ServiceProxy of one of move_group's services, which need not be there yet."""
         return rospy.ServiceProxy(self.name(name), SERVICES[name])
 
-    def publish(self, name, message):
+    def publish(self, name: str, message: genpy.Message) -> None:
         """Publish on one of the topics that move_group listens to."""
         self.advertise(name).publish(message)
 
-    def advertise(self, name):
+    def advertise(self, name: str) -> rospy.Publisher:
         """Return the publisher of a topic; one that exists beforehand loses no message to a late connection."""
         with self._lock:
             if name not in self._publishers:
                 self._publishers[name] = rospy.Publisher(self.name(name), TOPICS[name], queue_size=100)
             return self._publishers[name]
 
-    def _client(self, name):
+    def _client(self, name: str) -> actionlib.ActionClient:
         with self._lock:
             if name not in self._clients:
                 self._clients[name] = actionlib.ActionClient(self.name(name), ACTIONS[name])
             return self._clients[name]
 
 
-def _failure(name):
+def _failure(name: str) -> Any:
     return _RESULTS[name](error_code=msg.MoveItErrorCodes(msg.MoveItErrorCodes.FAILURE))
 
 
 @cache
-def connect(namespace):
+def connect(namespace: str) -> Connection:
     """Return the program's connection to the move_group in a namespace, the same one for every commander."""
     ensure_node()
     return Connection(namespace)

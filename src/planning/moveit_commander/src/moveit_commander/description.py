@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A robot's data from the parameter server: its planning model, and the settings of its groups."""
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import rospy
 import yaml
@@ -17,19 +20,19 @@ class Description:
     """model: a :class:`motion_planning.model.PlanningModel`; kinematics: group to its mapping of settings;
     velocity_scaling, acceleration_scaling: defaults."""
 
-    model: object
-    kinematics: dict = field(default_factory=dict)
+    model: PlanningModel
+    kinematics: dict[str, Any] = field(default_factory=dict)
     velocity_scaling: float = 0.1
     acceleration_scaling: float = 0.1
 
 
 @lru_cache(maxsize=8)
-def _model(urdf, srdf, limits):
+def _model(urdf: str, srdf: str, limits: str) -> PlanningModel:
     """Programs make several commanders of one robot; building its model takes longer than all the rest."""
     return PlanningModel.from_xml(urdf, srdf, yaml.safe_load(limits))
 
 
-def _parameter_name(name, namespace):
+def _parameter_name(name: str, namespace: str) -> str:
     """The full name of the robot's description: resolved like the program's own names, else in the namespace of
     move_group."""
     if name.startswith("/"):
@@ -37,7 +40,7 @@ def _parameter_name(name, namespace):
     return rospy.search_param(name) or rospy.resolve_name("/".join(filter(None, [namespace, name])))
 
 
-def load(robot_description, namespace):
+def load(robot_description: str, namespace: str) -> Description:
     """Return the :class:`Description` under the parameter ``robot_description`` and those named after it.
 
     Raises RuntimeError if the URDF or the SRDF is missing or invalid; the text says which.

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links as markers for rviz."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
@@ -10,10 +15,14 @@ from urdf_model import Box, Cylinder, Mesh, Sphere
 from .conversions import pose_of
 from .exception import MoveItCommanderException
 
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel, State
+    from urdf_model import Shape
+
 _GREY = (0.5, 0.5, 0.5, 1.0)
 
 
-def link_markers(model, state, links):
+def link_markers(model: PlanningModel, state: State, links: Iterable[str]) -> list[Marker]:
     """Return a Marker for each visual shape of ``links`` in the planning frame. Planes are left out."""
     markers = []
     for name in links:
@@ -30,7 +39,7 @@ def link_markers(model, state, links):
     return markers
 
 
-def _marker(shape):
+def _marker(shape: Shape) -> Marker | None:
     geometry = shape.geometry
     marker = Marker(color=ColorRGBA(*(shape.colour or _GREY)))
     if isinstance(geometry, Box):

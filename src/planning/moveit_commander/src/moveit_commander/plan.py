@@ -1,6 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The result of plan(): noetic's tuple, which melodic's programs can use as the trajectory that they expect."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from moveit_msgs.msg import RobotTrajectory
+
+if TYPE_CHECKING:
+    from trajectory_msgs.msg import JointTrajectory
+
+    Motion = tuple | RobotTrajectory | JointTrajectory
 
 
 class Plan(tuple):
@@ -11,20 +20,20 @@ class Plan(tuple):
     """
 
     @property
-    def trajectory(self):
+    def trajectory(self) -> RobotTrajectory:
         return self[1]
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         # Only names that a tuple does not have; Python's special names are looked up while a plan is copied.
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self[1], name)
 
-    def __setattr__(self, name, value):
+    def __setattr__(self, name: str, value: object) -> None:
         setattr(self[1], name, value)
 
 
-def trajectory_of(plan):
+def trajectory_of(plan: Motion) -> RobotTrajectory:
     """Return the RobotTrajectory in a Plan, a tuple like it, a RobotTrajectory or a JointTrajectory.
 
     Raises TypeError for anything else.

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests and goals for move_group, built from a commander's settings."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion, Vector3
 from moveit_msgs.msg import (
@@ -23,6 +27,11 @@ from shape_msgs.msg import SolidPrimitive
 
 from .exception import MoveItCommanderException
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import RobotState
+
+    from motion_planning.model import Group
+
 #: Kinds of goal: joints, or a pose and what of it counts.
 JOINTS = "joints"
 POSE, POSITION, ORIENTATION = "pose", "position", "orientation"
@@ -31,7 +40,7 @@ _CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if name.
 _PLACE_DISTANCE_M, _PLACE_MIN_DISTANCE_M = 0.2, 0.1
 
 
-def code_name(code):
+def code_name(code: int) -> str | int:
     """The name of one of MoveItErrorCodes, or the number where it has none."""
     return _CODES.get(code, code)
 
@@ -51,18 +60,18 @@ class RequestSettings:
     joint_tolerance: float = 1e-4
     position_tolerance: float = 1e-4
     orientation_tolerance: float = 1e-3
-    workspace: tuple = (0.0,) * 6
+    workspace: tuple[float, ...] = (0.0,) * 6
     looking: bool = False
     replanning: bool = False
     replan_attempts: int = 1
     replan_delay: float = 2.0
     support_surface: str = ""
-    start_state: object = None  # a RobotState; None for the current state
+    start_state: RobotState | None = None  # None for the current state
     path_constraints: Constraints = field(default_factory=Constraints)
     trajectory_constraints: TrajectoryConstraints = field(default_factory=TrajectoryConstraints)
 
 
-def joint_goal(names, values, tolerance):
+def joint_goal(names: Sequence[str], values: Sequence[float], tolerance: float) -> Constraints:
     """Return the Constraints that hold joints at ``values``, up to ``tolerance``."""
     return Constraints(joint_constraints=[
         JointConstraint(joint_name=name, position=value, tolerance_above=tolerance, tolerance_below=tolerance,
@@ -70,7 +79,7 @@ def joint_goal(names, values, tolerance):
         for name, value in zip(names, values, strict=True)])
 
 
-def pose_goals(poses, kind, settings):
+def pose_goals(poses: Mapping[str, Sequence[PoseStamped]], kind: str, settings: RequestSettings) -> list[Constraints]:
     """Return the alternatives, a list of Constraints, that ``poses``, {link: [PoseStamped]}, mean.
 
     The first poses of all links belong together, the second ones, and so on. ``kind``: POSE, POSITION or ORIENTATION.
@@ -85,20 +94,21 @@ def pose_goals(poses, kind, settings):
     return goals
 
 
-def _position_constraint(link, pose, tolerance):
+def _position_constraint(link: str, pose: PoseStamped, tolerance: float) -> PositionConstraint:
     sphere = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[tolerance])
     place = Pose(position=pose.pose.position, orientation=Quaternion(0.0, 0.0, 0.0, 1.0))
     return PositionConstraint(header=pose.header, link_name=link, weight=1.0,
                               constraint_region=BoundingVolume(primitives=[sphere], primitive_poses=[place]))
 
 
-def _orientation_constraint(link, pose, tolerance):
+def _orientation_constraint(link: str, pose: PoseStamped, tolerance: float) -> OrientationConstraint:
     return OrientationConstraint(
         header=pose.header, link_name=link, orientation=pose.pose.orientation, absolute_x_axis_tolerance=tolerance,
         absolute_y_axis_tolerance=tolerance, absolute_z_axis_tolerance=tolerance, weight=1.0)
 
 
-def motion_plan_request(group, frame, goals, settings):
+def motion_plan_request(group: str, frame: str, goals: Sequence[Constraints],
+                        settings: RequestSettings) -> MotionPlanRequest:
     """Return the MotionPlanRequest for one of ``goals`` (Constraints). ``frame``: of the workspace, planning's own."""
     request = MotionPlanRequest(
         group_name=group, goal_constraints=goals, pipeline_id=settings.pipeline_id, planner_id=settings.planner_id,
@@ -114,7 +124,7 @@ def motion_plan_request(group, frame, goals, settings):
     return request
 
 
-def set_start(start_state, settings):
+def set_start(start_state: RobotState, settings: RequestSettings) -> None:
     """Fill a request's start state in place: the one that was set, or nothing, which means the current one."""
     start_state.is_diff = True
     if settings.start_state is not None:
@@ -122,7 +132,7 @@ def set_start(start_state, settings):
             setattr(start_state, name, getattr(settings.start_state, name))
 
 
-def planning_options(settings, plan_only):
+def planning_options(settings: RequestSettings, plan_only: bool) -> PlanningOptions:
     """Return the PlanningOptions of a goal; the scene is left as it is."""
     options = PlanningOptions(
         plan_only=plan_only, look_around=settings.looking, replan=settings.replanning,
@@ -131,7 +141,7 @@ def planning_options(settings, plan_only):
     return options
 
 
-def move_group_goal(request, settings, plan_only):
+def move_group_goal(request: MotionPlanRequest, settings: RequestSettings, plan_only: bool) -> MoveGroupGoal:
     """Return the goal of the action move_group."""
     options = planning_options(settings, plan_only)
     if plan_only:
@@ -139,7 +149,8 @@ def move_group_goal(request, settings, plan_only):
     return MoveGroupGoal(request, options)
 
 
-def pickup_goal(group, target, grasps, settings, plan_only):
+def pickup_goal(group: Group, target: str, grasps: Sequence[Grasp], settings: RequestSettings,
+                plan_only: bool) -> PickupGoal:
     """Return the goal of the action pickup. ``group``: the core's Group of the arm."""
     return PickupGoal(
         target_name=target, group_name=group.name, end_effector=next(iter(group.end_effectors), ""),
@@ -149,7 +160,8 @@ def pickup_goal(group, target, grasps, settings, plan_only):
         planning_options=planning_options(settings, plan_only))
 
 
-def place_goal(group, target, locations, settings, plan_only):
+def place_goal(group: Group, target: str, locations: Sequence[PlaceLocation], settings: RequestSettings,
+               plan_only: bool) -> PlaceGoal:
     """Return the goal of the action place. ``group``: the core's Group of the arm."""
     return PlaceGoal(
         group_name=group.name, attached_object_name=target, place_locations=locations,
@@ -158,7 +170,7 @@ def place_goal(group, target, locations, settings, plan_only):
         allowed_planning_time=settings.planning_time, planning_options=planning_options(settings, plan_only))
 
 
-def grasps_of(grasp):
+def grasps_of(grasp: Grasp | str | Iterable[Grasp | str]) -> list[Grasp]:
     """Return a list of Grasps from one, or from a list of them."""
     grasps = list(grasp) if isinstance(grasp, list | tuple) else [grasp]
     if not all(isinstance(one, Grasp) for one in grasps):
@@ -166,7 +178,7 @@ def grasps_of(grasp):
     return grasps
 
 
-def place_locations(location, frame, root, tip):
+def place_locations(location: Any, frame: str, root: str, tip: str) -> list[PlaceLocation]:
     """Return a list of PlaceLocations from what :meth:`MoveGroupCommander.place` takes; None makes an empty list.
 
     ``frame``: of a Pose. A pose alone is approached from above (down in ``root``); the hand retreats along its axis (-x
@@ -188,7 +200,7 @@ def place_locations(location, frame, root, tip):
     return found
 
 
-def _location_at(pose, root, tip):
+def _location_at(pose: PoseStamped, root: str, tip: str) -> PlaceLocation:
     place = PlaceLocation(place_pose=pose)
     for way, link, direction in ((place.pre_place_approach, root, Vector3(0.0, 0.0, -1.0)),
                                  (place.post_place_retreat, tip, Vector3(-1.0, 0.0, 0.0))):

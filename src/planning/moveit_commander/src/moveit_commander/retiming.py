@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """New times for a trajectory that exists."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import rospy
 from moveit_msgs.msg import RobotTrajectory
@@ -7,8 +11,12 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from .exception import MoveItCommanderException
 
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel
 
-def retimed(model, trajectory, scaling, algorithm):
+
+def retimed(model: PlanningModel, trajectory: RobotTrajectory, scaling: tuple[float, float],
+            algorithm: str) -> RobotTrajectory:
     """Return a RobotTrajectory along the same points, as fast as limits allow; empty for an unknown ``algorithm``.
 
     scaling: shares of the limits of velocity and acceleration; one that is not above 0 and at most 1 counts as 1.

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot as a whole: its groups, joints and links."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import rospy
 from geometry_msgs.msg import PoseStamped
 from moveit_msgs.msg import RobotState
@@ -13,42 +17,45 @@ from .exception import MoveItCommanderException
 from .markers import link_markers
 from .move_group import MoveGroupCommander
 
+if TYPE_CHECKING:
+    from motion_planning.model import Group
+
 __all__ = ["RobotCommander"]
 
 
 class Joint:
     """A joint of the robot. Raises MoveItCommanderException for an unknown name."""
 
-    def __init__(self, robot, name):
+    def __init__(self, robot: RobotCommander, name: str) -> None:
         if name not in robot.get_joint_names():
             raise MoveItCommanderException("the robot has no joint '%s'" % name)
         self._robot, self._name = robot, name
 
-    def name(self):
+    def name(self) -> str:
         """Return its name."""
         return self._name
 
-    def variable_count(self):
+    def variable_count(self) -> int:
         """Return how many values it has: none for a fixed joint, 7 where a base floats."""
         return self._robot.variables_of(self._name)
 
-    def bounds(self):
+    def bounds(self) -> list[float | None]:
         """Return [lower, upper], [] for a joint without its own value."""
         return self._robot.bounds_of(self._name)
 
-    def min_bound(self):
+    def min_bound(self) -> float | None | list[float]:
         """Return the lower limit, [] for a joint without its own value."""
         return (self.bounds() or [[]])[0]
 
-    def max_bound(self):
+    def max_bound(self) -> float | None | list[float]:
         """Return the upper limit, [] for a joint without its own value."""
         return (self.bounds() or [[]])[-1]
 
-    def value(self):
+    def value(self) -> float | list[float]:
         """Return its present value; a list for a floating base, [] for a fixed joint."""
         return self._robot.value_of(self._name)
 
-    def move(self, position, wait=True):
+    def move(self, position: float, wait: bool = True) -> bool:
         """Move it alone, with the smallest group that has it; tell whether that succeeded, or was sent."""
         group_name = self._robot.get_default_owner_group(self._name)
         if group_name is None:
@@ -63,16 +70,16 @@ class Joint:
 class Link:
     """A link of the robot. Raises MoveItCommanderException for an unknown name."""
 
-    def __init__(self, robot, name):
+    def __init__(self, robot: RobotCommander, name: str) -> None:
         if name not in robot.get_link_names():
             raise MoveItCommanderException("the robot has no link '%s'" % name)
         self._robot, self._name = robot, name
 
-    def name(self):
+    def name(self) -> str:
         """Return its name."""
         return self._name
 
-    def pose(self):
+    def pose(self) -> PoseStamped:
         """Return its PoseStamped now, in the planning frame."""
         return self._robot.pose_of(self._name)
 
@@ -86,7 +93,7 @@ class RobotCommander:
 
     Joint, Link = Joint, Link
 
-    def __init__(self, robot_description="robot_description", ns=""):
+    def __init__(self, robot_description: str = "robot_description", ns: str = "") -> None:
         self._robot_description, self._namespace = robot_description, ns
         self._connection = connect(ns)
         self._model = load(robot_description, ns).model
@@ -94,23 +101,23 @@ class RobotCommander:
 
     # -- names ------------------------------------------------------------------------------------------------------
 
-    def get_planning_frame(self):
+    def get_planning_frame(self) -> str:
         """Return the frame that planning happens in."""
         return self._model.frame
 
-    def get_root_link(self):
+    def get_root_link(self) -> str:
         """Return the root link."""
         return self._model.root
 
-    def get_group_names(self):
+    def get_group_names(self) -> list[str]:
         """Return the names of all groups."""
         return list(self._model.groups)
 
-    def has_group(self, name):
+    def has_group(self, name: str) -> bool:
         """Tell whether there is a group of this name."""
         return name in self._model.groups
 
-    def get_joint_names(self, group=None):
+    def get_joint_names(self, group: str | None = None) -> list[str]:
         """Return the names of all joints, of a group or of the robot; fixed ones and those that mimic others, too."""
         if group is not None:
             return list(self._group(group).all_joints)
@@ -118,21 +125,21 @@ class RobotCommander:
         joints = [joint.name for joint in map(self._model.robot.parent_joint, self._model.links[1:])]
         return [floating.name, *joints] if floating is not None else joints
 
-    def get_active_joint_names(self, group=None):
+    def get_active_joint_names(self, group: str | None = None) -> list[str]:
         """Return the names of the joints that can be moved, of a group or of the robot."""
         return list(self._model.variables if group is None else self._group(group).joints)
 
-    def get_link_names(self, group=None):
+    def get_link_names(self, group: str | None = None) -> list[str]:
         """Return the names of the links, of a group or of the robot."""
         return list(self._model.links if group is None else self._group(group).links)
 
-    def get_default_owner_group(self, joint_name):
+    def get_default_owner_group(self, joint_name: str) -> str | None:
         """Return the name of the group with the fewest links that has a joint, None where none has it."""
         self.get_joint(joint_name)
         owners = [group for group in self._model.groups.values() if joint_name in group.all_joints]
         return min(owners, key=lambda group: len(group.links)).name if owners else None
 
-    def _group(self, name):
+    def _group(self, name: str) -> Group:
         if name not in self._model.groups:
             raise MoveItCommanderException("there is no group '%s'; the robot has %s"
                                            % (name, ", ".join(self._model.groups) or "no groups"))
@@ -140,22 +147,22 @@ class RobotCommander:
 
     # -- parts ------------------------------------------------------------------------------------------------------
 
-    def get_group(self, name):
+    def get_group(self, name: str) -> MoveGroupCommander:
         """Return the MoveGroupCommander of a group, the same one each time."""
         self._group(name)
         if name not in self._groups:
             self._groups[name] = MoveGroupCommander(name, self._robot_description, self._namespace)
         return self._groups[name]
 
-    def get_joint(self, name):
+    def get_joint(self, name: str) -> Joint:
         """Return a :class:`Joint`."""
         return Joint(self, name)
 
-    def get_link(self, name):
+    def get_link(self, name: str) -> Link:
         """Return a :class:`Link`."""
         return Link(self, name)
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> MoveGroupCommander | Joint | Link:
         if name.startswith("_"):
             raise AttributeError(name)
         if name in self._model.groups:
@@ -168,46 +175,46 @@ class RobotCommander:
 
     # -- state ------------------------------------------------------------------------------------------------------
 
-    def get_current_state(self):
+    def get_current_state(self) -> RobotState:
         """Return the RobotState now. Raises MoveItCommanderException when move_group does not answer."""
         return scene_calls.robot_state(self._connection)
 
-    def get_current_variable_values(self):
+    def get_current_variable_values(self) -> dict[str, float]:
         """Return {variable: value}; a floating base has seven, as "world_joint/trans_x"."""
         state = states.state_of(self._model, self.get_current_state())
         return {**states.base_variables(self._model, state), **self._model.joint_values(state.q)}
 
-    def pose_of(self, link):
+    def pose_of(self, link: str) -> PoseStamped:
         """Return the PoseStamped of a link now, in the planning frame."""
         state = states.state_of(self._model, self.get_current_state())
         message = PoseStamped(pose=pose_of(self._model.frame_of(state.q, link, state.base)))
         message.header.frame_id, message.header.stamp = self._model.frame, rospy.Time.now()
         return message
 
-    def variables_of(self, joint):
+    def variables_of(self, joint: str) -> int:
         """Return how many values a joint has."""
         if self._is_floating(joint):
             return len(states.base_variables(self._model, self._model.default_state()))
         return int(joint in self._model.index or joint in self._model.mimics)
 
-    def bounds_of(self, joint):
+    def bounds_of(self, joint: str) -> list[float | None]:
         """Return [lower, upper] of a joint, [] if it has no own value or several."""
         if joint in self._model.mimics:
             limit = self._model.robot.joints[joint].limit
             return [limit.lower, limit.upper]
         return self._model.bounds[self._model.index[joint]].tolist() if joint in self._model.index else []
 
-    def value_of(self, joint):
+    def value_of(self, joint: str) -> float | list[float]:
         """Return a joint's present value; a list for a floating base, [] for a fixed joint."""
         values = self.get_current_variable_values()
         if self._is_floating(joint):
             return [value for name, value in values.items() if name.startswith(joint + "/")]
         return values.get(joint, [])
 
-    def _is_floating(self, joint):
+    def _is_floating(self, joint: str) -> bool:
         return self._model.virtual_joint is not None and joint == self._model.virtual_joint.name
 
-    def get_robot_markers(self, *args):
+    def get_robot_markers(self, *args: Any) -> MarkerArray:
         """Return a MarkerArray that draws the robot.
 
         args: nothing, for where it is now; a RobotState; {joint: value}; these and a list of links; the name of a

@@ -1,18 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planning scene of a running move_group: asked for, and changed. ``connection``: a connection.Connection."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
 import rospy
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
 
 from .conversions import matrix_of
 from .exception import MoveItCommanderException
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import RobotState
 
-def scene(connection, components):
+    from moveit_commander.connection import Connection
+
+
+def scene(connection: Connection, components: int) -> PlanningScene:
     """Return the PlanningScene with the parts that ``components``, a sum of PlanningSceneComponents' numbers, names."""
     return connection.call("get_planning_scene", components=PlanningSceneComponents(components)).scene
 
 
-def robot_state(connection):
+def robot_state(connection: Connection) -> RobotState:
     """Return the RobotState now, with what the robot holds. It has no stamp, as MoveIt's: programs compare states."""
     state = scene(connection, PlanningSceneComponents.ROBOT_STATE
                   | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS).robot_state
@@ -20,7 +31,7 @@ def robot_state(connection):
     return state
 
 
-def held_frame(connection, name):
+def held_frame(connection: Connection, name: str) -> tuple[str, np.ndarray]:
     """Return (link, pose (4, 4) in it) of an attached object, or of "object/subframe" of one. Raises
     MoveItCommanderException for other names."""
     owner, _, subframe = name.rpartition("/")
@@ -34,21 +45,21 @@ def held_frame(connection, name):
     raise MoveItCommanderException("the robot has no link '%s', and holds no object or subframe of that name" % name)
 
 
-def difference():
+def difference() -> PlanningScene:
     """Return a PlanningScene that changes nothing yet."""
     message = PlanningScene(is_diff=True)
     message.robot_state.is_diff = True
     return message
 
 
-def attach(connection, attached):
+def attach(connection: Connection, attached: AttachedCollisionObject) -> bool:
     """Attach or detach (AttachedCollisionObject), and return whether that was done."""
     message = difference()
     message.robot_state.attached_collision_objects = [attached]
     return connection.call("apply_planning_scene", scene=message).success
 
 
-def attached_object(name, link, operation, touch_links=()):
+def attached_object(name: str, link: str, operation: int, touch_links: Iterable[str] = ()) -> AttachedCollisionObject:
     """Return the AttachedCollisionObject that takes the world's object ``name`` over, or gives it back."""
     message = AttachedCollisionObject(link_name=link, touch_links=list(touch_links))
     message.object = CollisionObject(id=name, operation=operation)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """moveit_msgs/RobotState and the core's states."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from moveit_msgs.msg import RobotState
 
 from command_line.options import counted
@@ -9,8 +13,13 @@ from urdf_model.transforms import rpy_from_matrix
 from .conversions import list_to_pose, list_to_transform, matrix_of, pose_of, pose_to_list, transform_to_list
 from .exception import MoveItCommanderException
 
+if TYPE_CHECKING:
+    from sensor_msgs.msg import JointState
 
-def named_positions(joints):
+    from motion_planning.model import PlanningModel, State
+
+
+def named_positions(joints: JointState) -> dict[str, float]:
     """Return {joint: position} of a sensor_msgs/JointState. Raises MoveItCommanderException for unequal lists."""
     if len(joints.name) != len(joints.position):
         raise MoveItCommanderException("the joint state has %s and %s"
@@ -18,7 +27,7 @@ def named_positions(joints):
     return dict(zip(joints.name, joints.position, strict=True))
 
 
-def state_of(model, message):
+def state_of(model: PlanningModel, message: RobotState) -> State:
     """Return the core's State of a RobotState: joints that it does not name stand at their default, nothing attached.
 
     Names that are not joint variables of the model are ignored. Raises MoveItCommanderException for a value that is not
@@ -36,7 +45,7 @@ def state_of(model, message):
     return state.with_base(matrix_of(list_to_pose(transform_to_list(transform))))
 
 
-def message_of(model, state):
+def message_of(model: PlanningModel, state: State) -> RobotState:
     """Return the RobotState of a State: all joints that have a value, and the virtual joint where there is one."""
     message = RobotState()
     message.joint_state.header.frame_id = message.multi_dof_joint_state.header.frame_id = model.frame
@@ -48,7 +57,7 @@ def message_of(model, state):
     return message
 
 
-def base_variables(model, state):
+def base_variables(model: PlanningModel, state: State) -> dict[str, float]:
     """Return {variable: value} of a base that can move, empty for one that cannot.
 
     Position and quaternion of a base that floats; x, y, theta of one that moves in a plane.

@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Target joint values of a group. No ROS needed; angles in rad, lengths in m."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from command_line.options import counted
 from motion_planning.model import ModelError
 
 from .exception import MoveItCommanderException
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import ArrayLike
+
+    from motion_planning.model import Group, PlanningModel
 
 
 class JointTarget:
@@ -16,24 +27,24 @@ class JointTarget:
     than ``tolerance``, and for names and numbers of values that do not fit.
     """
 
-    def __init__(self, model, group):
+    def __init__(self, model: PlanningModel, group: Group) -> None:
         self._model, self._group = model, group
         self._state = model.default_state()
 
     @property
-    def q(self):
+    def q(self) -> np.ndarray:
         """The whole model's values (n,)."""
         return self._state.q
 
-    def values(self):
+    def values(self) -> list[float]:
         """The group's values, in the order of its ``valued_joints``."""
         return values_of(self._model, self._group, self._state.q)
 
-    def moved(self):
+    def moved(self) -> list[float]:
         """The values of the group's ``joints``, those that can be moved."""
         return self._state.q[self._group.indices].tolist()
 
-    def set_values(self, values, tolerance):
+    def set_values(self, values: ArrayLike, tolerance: float) -> None:
         """Set all values of the group, given in the order of its ``valued_joints``, or of its ``joints``."""
         names, values = self._group.valued_joints, [float(value) for value in values]
         if len(values) != len(names):
@@ -44,7 +55,7 @@ class JointTarget:
                 ", ".join(self._group.valued_joints), counted(len(values), "value")))
         self.set_by_name(dict(zip(names, values, strict=True)), tolerance)
 
-    def set_by_name(self, values, tolerance):
+    def set_by_name(self, values: Mapping[str, float], tolerance: float) -> None:
         """Set the values, {joint: value}, of some of the group's joints; the others stay as they are.
 
         The values of joints that mimic others are ignored: they follow.
@@ -56,7 +67,7 @@ class JointTarget:
                 self._group.name, ", ".join("'%s'" % name for name in foreign), ", ".join(known)))
         self._set({name: value for name, value in values.items() if name in self._group.joints}, tolerance)
 
-    def set_robot(self, values, tolerance):
+    def set_robot(self, values: Mapping[str, float], tolerance: float) -> None:
         """Set the values, {joint: value}, of any joints of the robot; fixed and mimic joints are ignored."""
         known = self._model.robot.joints
         unknown = [name for name in values if name not in known]
@@ -64,7 +75,7 @@ class JointTarget:
             raise MoveItCommanderException("the robot has no joint %s" % ", ".join("'%s'" % name for name in unknown))
         self._set({name: value for name, value in values.items() if name in self._model.variables}, tolerance)
 
-    def _set(self, values, tolerance):
+    def _set(self, values: Mapping[str, float], tolerance: float) -> None:
         try:
             state = self._state.with_joints({name: float(value) for name, value in values.items()})
         except ModelError as error:
@@ -72,7 +83,7 @@ class JointTarget:
         self.check(state.q, tolerance)
         self._state = state
 
-    def check(self, q, tolerance):
+    def check(self, q: np.ndarray, tolerance: float) -> None:
         """Raise MoveItCommanderException where the group's part of ``q`` (n,) is beyond the limits."""
         beyond = self._model.beyond_limits(q, tolerance, self._group.indices)
         if beyond:
@@ -80,20 +91,20 @@ class JointTarget:
                 "%s = %g, limits are %g to %g" % one for one in beyond))
 
 
-def values_of(model, group, q):
+def values_of(model: PlanningModel, group: Group, q: np.ndarray) -> list[float]:
     """Return the values of the group's ``valued_joints`` at ``q`` (n,), as a list."""
     values = model.joint_values(q)
     return [values[name] for name in group.valued_joints]
 
 
-def with_followers(model, group, values):
+def with_followers(model: PlanningModel, group: Group, values: Mapping[str, float]) -> dict[str, float]:
     """Return ``values``, {joint: value}, with those of the group's joints that mimic them."""
     followers = {name: model.mimics[name] for name in group.valued_joints if name in model.mimics}
     return {**values, **{name: multiplier * values[source] + offset
                          for name, (source, multiplier, offset) in followers.items() if source in values}}
 
 
-def random_values(model, group, generator):
+def random_values(model: PlanningModel, group: Group, generator: Generator) -> np.ndarray:
     """Return values (k,) of the group's ``joints`` within the limits, evenly spread.
 
     ``generator``: numpy.random.Generator. Raises MoveItCommanderException for joints without limits.
@@ -104,13 +115,13 @@ def random_values(model, group, generator):
     return generator.uniform(low, high)
 
 
-def within_limits(model, q):
+def within_limits(model: PlanningModel, q: np.ndarray) -> np.ndarray:
     """Return ``q`` (n,) with every joint inside its limits; continuous joints are wrapped to -pi to pi."""
     q = model.wrapped(q)
     return np.where(model.continuous, q, np.clip(q, model.bounds[:, 0], model.bounds[:, 1]))
 
 
-def jacobian(group, values, reference_point):
+def jacobian(group: Group, values: Sequence[float], reference_point: Sequence[float]) -> np.ndarray:
     """Return the Jacobian (6, k) of a point of the group's tip, velocity [m/s] above angular velocity [rad/s].
 
     Both in the frame of the link that the group's chain begins at. ``reference_point`` (3,): in the tip's frame [m].
