@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import actionlib
+import numpy as np
 import rospy
 from moveit_msgs import msg, srv
 from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents
@@ -15,6 +17,14 @@ from std_msgs.msg import String
 from motion_planning.errors import PlanningError
 from motion_planning_rviz.interaction import group_values
 from motion_planning_rviz.messages import code_name, goal_constraints, pose_message, state_message, state_values
+
+if TYPE_CHECKING:
+    import genpy
+    from actionlib import ClientGoalHandle
+
+    from motion_planning.model import PlanningModel, State
+    from motion_planning_rviz.drawing import Colour
+    from motion_planning_rviz.interaction import Handle, Query
 
 SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "check_state_validity": srv.GetStateValidity,
             "compute_ik": srv.GetPositionIK, "get_planning_scene": srv.GetPlanningScene,
@@ -31,7 +41,7 @@ class NoAnswer(PlanningError):
 class NoPosture(PlanningError):
     """Inverse kinematics found nothing. code: the name of MoveIt's error code."""
 
-    def __init__(self, code):
+    def __init__(self, code: str) -> None:
         super().__init__(code)
         self.code = code
 
@@ -42,9 +52,9 @@ class Touch(NamedTuple):
 
     a: str
     b: str
-    links: tuple
-    held: tuple
-    point: tuple
+    links: tuple[str, ...]
+    held: tuple[str, ...]
+    point: tuple[float, float, float]
     frame: str
 
 
@@ -53,10 +63,10 @@ class Snapshot(NamedTuple):
     {object: r g b a}; is_measured: whether move_group has heard from the joints, which otherwise stand at their
     defaults."""
 
-    values: dict
-    objects: list
-    attached: list
-    colours: dict
+    values: dict[str, float]
+    objects: list[msg.CollisionObject]
+    attached: list[msg.AttachedCollisionObject]
+    colours: dict[str, Colour]
     is_measured: bool = True
 
 
@@ -73,9 +83,9 @@ class Outcome(NamedTuple):
 class MoveGroupClient:
     """Calls and goals. model: PlanningModel; planning_time_s: allowed for a plan."""
 
-    def __init__(self, model, planning_time_s):
+    def __init__(self, model: PlanningModel, planning_time_s: float) -> None:
         self._model, self._planning_time_s = model, planning_time_s
-        self._proxies = {}
+        self._proxies: dict[str, rospy.ServiceProxy] = {}
         self._clients = {name: actionlib.ActionClient(name, kind) for name, kind in ACTIONS.items()}
         self._event = rospy.Publisher("trajectory_execution_event", String, queue_size=5)
         self._lock = threading.Lock()
@@ -83,7 +93,7 @@ class MoveGroupClient:
 
     # -- questions ----------------------------------------------------------------------------------------------
 
-    def snapshot(self):
+    def snapshot(self) -> Snapshot:
         """Return a Snapshot of the present scene. Raises NoAnswer."""
         parts = PlanningSceneComponents
         scene = self._call("get_planning_scene", parts(
@@ -95,7 +105,7 @@ class MoveGroupClient:
                         list(scene.robot_state.attached_collision_objects), colours,
                         not scene.robot_state.joint_state.header.stamp.is_zero())
 
-    def posture(self, handle, pose, state, avoid):
+    def posture(self, handle: Handle, pose: np.ndarray, state: State, avoid: bool) -> dict[str, float]:
         """Return {joint: value} that put a handle's link to ``pose`` (4, 4) in the root link, near ``state``.
 
         Raises NoPosture and NoAnswer.
@@ -109,12 +119,12 @@ class MoveGroupClient:
             raise NoPosture(code_name(answer.error_code.val))
         return state_values(answer.solution)
 
-    def validity(self, group, state):
+    def validity(self, group: str, state: State) -> tuple[bool, list[Touch]]:
         """Return (whether move_group takes ``state``, [Touch ...]). Raises NoAnswer."""
         answer = self._call("check_state_validity", state_message(state.positions), group, msg.Constraints())
         return answer.valid, [_touch(contact) for contact in answer.contacts]
 
-    def planners(self, group):
+    def planners(self, group: str) -> tuple[tuple[str, str], ...]:
         """Return ((pipeline, planner), ...) for a group. Raises NoAnswer."""
         found = []
         for interface in self._call("query_planner_interface").planner_interfaces:
@@ -126,7 +136,7 @@ class MoveGroupClient:
                 found.append((interface.pipeline_id, rest.rstrip("]") if bracket else name))
         return tuple(dict.fromkeys(found))
 
-    def _call(self, name, *values):
+    def _call(self, name: str, *values: object) -> Any:
         """Return a service's response. Connections stay open: a marker that is dragged calls often."""
         for attempt in (1, 2):
             try:
@@ -144,7 +154,7 @@ class MoveGroupClient:
 
     # -- the scene ----------------------------------------------------------------------------------------------
 
-    def add_box(self, name, size, pose):
+    def add_box(self, name: str, size: float, pose: np.ndarray) -> None:
         """Put a cube with sides of ``size`` [m] at ``pose`` (4, 4) in the root link. Raises NoAnswer."""
         box = msg.CollisionObject(id=name, operation=msg.CollisionObject.ADD,
                                   primitives=[SolidPrimitive(SolidPrimitive.BOX, [size] * 3)],
@@ -152,23 +162,24 @@ class MoveGroupClient:
         box.header.frame_id = self._model.root
         self._apply(objects=[box])
 
-    def remove(self, name):
+    def remove(self, name: str) -> None:
         """Take an object out of the world. Raises NoAnswer."""
         self._apply(objects=[msg.CollisionObject(id=name, operation=msg.CollisionObject.REMOVE)])
 
-    def attach(self, name, link, touch_links):
+    def attach(self, name: str, link: str, touch_links: Iterable[str]) -> None:
         """Fix an object of the world to a link. Raises NoAnswer."""
         held = msg.AttachedCollisionObject(link_name=link, touch_links=list(touch_links))
         held.object.id, held.object.operation = name, msg.CollisionObject.ADD
         self._apply(attached=[held])
 
-    def detach(self, name, link):
+    def detach(self, name: str, link: str) -> None:
         """Put what a link holds back into the world. Raises NoAnswer."""
         held = msg.AttachedCollisionObject(link_name=link)
         held.object.id, held.object.operation = name, msg.CollisionObject.REMOVE
         self._apply(attached=[held])
 
-    def _apply(self, objects=(), attached=()):
+    def _apply(self, objects: Iterable[msg.CollisionObject] = (),
+               attached: Iterable[msg.AttachedCollisionObject] = ()) -> None:
         scene = msg.PlanningScene(is_diff=True)
         scene.robot_state.is_diff = True
         scene.world.collision_objects, scene.robot_state.attached_collision_objects = list(objects), list(attached)
@@ -177,7 +188,7 @@ class MoveGroupClient:
 
     # -- motions ------------------------------------------------------------------------------------------------
 
-    def plan(self, query, execute, done):
+    def plan(self, query: Query, execute: bool, done: Callable[[Outcome], None]) -> None:
         """Plan for an interaction.Query, and ``execute`` it at once where that is true; ``done(Outcome)`` is called in
         a thread of actionlib's. Raises NoAnswer."""
         goal = msg.MoveGroupGoal()
@@ -191,11 +202,11 @@ class MoveGroupClient:
         options.planning_scene_diff.is_diff = options.planning_scene_diff.robot_state.is_diff = True
         self._send("move_group", goal, done)
 
-    def execute(self, trajectory, done):
+    def execute(self, trajectory: msg.RobotTrajectory, done: Callable[[Outcome], None]) -> None:
         """Follow a RobotTrajectory; ``done(Outcome)`` as in :meth:`plan`. Raises NoAnswer."""
         self._send("execute_trajectory", msg.ExecuteTrajectoryGoal(trajectory), done)
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop all planning and execution, also that of other clients."""
         with self._lock:
             handles = tuple(self._handles)
@@ -203,7 +214,7 @@ class MoveGroupClient:
             handle.cancel()
         self._event.publish("stop")
 
-    def _send(self, name, goal, done):
+    def _send(self, name: str, goal: genpy.Message, done: Callable[[Outcome], None]) -> None:
         client = self._clients[name]
         # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
         if not client.wait_for_server(rospy.Duration(0, -1)):
@@ -211,7 +222,7 @@ class MoveGroupClient:
 
         ended = threading.Event()
 
-        def transition(handle):
+        def transition(handle: ClientGoalHandle) -> None:
             if handle.get_comm_state() == actionlib.CommState.DONE:
                 ended.set()
                 with self._lock:
@@ -226,7 +237,7 @@ class MoveGroupClient:
                 self._handles.add(handle)
 
 
-def _touch(contact):
+def _touch(contact: msg.ContactInformation) -> Touch:
     bodies = ((contact.contact_body_1, contact.body_type_1), (contact.contact_body_2, contact.body_type_2))
     kinds = msg.ContactInformation
     return Touch(contact.contact_body_1, contact.contact_body_2,
@@ -235,7 +246,7 @@ def _touch(contact):
                  (contact.position.x, contact.position.y, contact.position.z), contact.header.frame_id)
 
 
-def _outcome(handle):
+def _outcome(handle: ClientGoalHandle) -> Outcome:
     result, text = handle.get_result(), handle.get_goal_status_text()
     if result is None:
         return Outcome(False, text or "no result came")

@@ -2,12 +2,19 @@
 """Links as shapes that rviz's markers can show."""
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Mesh, Plane, Sphere
+
+if TYPE_CHECKING:
+    from urdf_model import Robot
+
+    #: Red, green, blue, alpha.
+    Colour = tuple[float, float, float, float]
 
 GOAL, START, PATH = (1.0, 0.55, 0.1, 0.65), (0.2, 0.75, 0.3, 0.65), (0.45, 0.65, 1.0, 0.5)
 COLLIDING = (0.95, 0.1, 0.1, 0.85)
@@ -24,7 +31,7 @@ class Solid(NamedTuple):
 
     kind: str
     pose: np.ndarray
-    size: tuple
+    size: tuple[float, float, float]
     mesh: str = ""
     points: np.ndarray | None = None
 
@@ -37,10 +44,10 @@ class Drawn(NamedTuple):
     number: int
     solid: Solid
     pose: np.ndarray
-    colour: tuple
+    colour: Colour
 
 
-def solid_of(geometry, pose):
+def solid_of(geometry: object, pose: np.ndarray) -> Solid | None:
     """Return the Solid of a shape of urdf_model or motion_planning.shapes; None for what cannot be drawn."""
     if isinstance(geometry, Box):
         return Solid("box", pose, tuple(geometry.size))
@@ -59,7 +66,7 @@ def solid_of(geometry, pose):
     return None
 
 
-def _cone(cone):
+def _cone(cone: Cone) -> np.ndarray:
     """Corners (3 k, 3) of the triangles of a Cone, outsides outwards."""
     angles = np.linspace(0.0, 2.0 * np.pi, _CONE_SIDES + 1)
     rim = np.stack([cone.radius * np.cos(angles), cone.radius * np.sin(angles),
@@ -70,7 +77,7 @@ def _cone(cone):
     return np.array(sides + base, dtype=float).reshape(-1, 3)
 
 
-def link_solids(robot, links):
+def link_solids(robot: Robot, links: Iterable[str]) -> dict[str, tuple[Solid, ...]]:
     """Return {link: (Solid, ...)} of what is seen of ``links`` of a urdf_model.Robot; no entry without visuals."""
     solids = {}
     for name in links:
@@ -81,7 +88,8 @@ def link_solids(robot, links):
     return solids
 
 
-def drawn(solids, poses, colour, special=None):
+def drawn(solids: Mapping[str, Sequence[Solid]], poses: Mapping[str, np.ndarray], colour: Colour,
+          special: Mapping[str, Colour] | None = None) -> list[Drawn]:
     """Return the Drawn of ``solids`` {name: (Solid, ...)}. poses: {name: (4, 4)}; special: {name: its own colour}."""
     return [Drawn(name, number, solid, poses[name] @ solid.pose, (special or {}).get(name, colour))
             for name, several in solids.items() for number, solid in enumerate(several)]

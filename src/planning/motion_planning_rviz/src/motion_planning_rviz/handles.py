@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Interactive markers at the ends of arms, under the names that MoveIt's panel gives them."""
-import threading
+from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from std_msgs.msg import ColorRGBA
@@ -9,6 +14,11 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 
 from motion_planning_rviz.drawing import GOAL, START
 from motion_planning_rviz.messages import pose_message
+
+if TYPE_CHECKING:
+    from visualization_msgs.msg import InteractiveMarkerFeedback
+
+    from motion_planning_rviz.menu import Entry
 
 #: The topic of MoveIt's panel for its markers; programs expect them there.
 TOPIC = "/rviz_moveit_motion_planning_display/robot_interaction_interactive_marker_topic"
@@ -19,12 +29,12 @@ _AXES = {"x": Quaternion(0.0, 0.0, 0.0, 1.0), "y": Quaternion(0.0, 0.0, _HALF, _
 _BALL = 0.35
 
 
-def marker_name(which, link):
+def marker_name(which: str, link: str) -> str:
     """Return the name of the marker that drags ``link`` of "goal" or "start"."""
     return "EE:%s_%s" % (which, link)
 
 
-def marker_message(which, link, pose, frame, scale):
+def marker_message(which: str, link: str, pose: np.ndarray, frame: str, scale: float) -> InteractiveMarker:
     """Return the InteractiveMarker of ``which`` ("goal", "start") for a link at ``pose`` (4, 4) in ``frame``: arrows
     and rings along and about three axes, and a ball. scale [m]."""
     message = InteractiveMarker(name=marker_name(which, link), scale=scale, pose=pose_message(pose))
@@ -43,7 +53,7 @@ def marker_message(which, link, pose, frame, scale):
     return message
 
 
-def menu_entries(entries):
+def menu_entries(entries: Iterable[Entry]) -> list[MenuEntry]:
     """Return the MenuEntries of menu.Entries."""
     return [MenuEntry(id=entry.number, parent_id=entry.parent, title=entry.title, command_type=MenuEntry.FEEDBACK)
             for entry in entries]
@@ -52,13 +62,14 @@ def menu_entries(entries):
 class Handles:
     """The markers on ``topic``. on_feedback: function of an InteractiveMarkerFeedback; frame: the robot's root link."""
 
-    def __init__(self, topic, frame, scale, on_feedback):
+    def __init__(self, topic: str, frame: str, scale: float,
+                 on_feedback: Callable[[InteractiveMarkerFeedback], None]) -> None:
         self._frame, self._scale, self._on_feedback = frame, scale, on_feedback
         self._server = InteractiveMarkerServer(topic)
         self._lock = threading.Lock()
         self._names, self._menu = set(), []
 
-    def place(self, which, poses):
+    def place(self, which: str, poses: Mapping[str, np.ndarray]) -> None:
         """Show markers of "goal" or "start" at ``poses`` {link: (4, 4)}, new ones and those that there are."""
         with self._lock:
             for link, pose in poses.items():
@@ -72,7 +83,7 @@ class Handles:
                     self._names.add(name)
             self._server.applyChanges()
 
-    def erase(self, which=""):
+    def erase(self, which: str = "") -> None:
         """Take the markers of "goal" or "start" away, or all."""
         with self._lock:
             gone = {name for name in self._names if name.startswith("EE:" + which)}
@@ -81,7 +92,7 @@ class Handles:
             self._names -= gone
             self._server.applyChanges()
 
-    def set_menu(self, entries):
+    def set_menu(self, entries: Iterable[Entry]) -> None:
         """Give every marker the menu of these menu.Entries."""
         with self._lock:
             self._menu = menu_entries(entries)

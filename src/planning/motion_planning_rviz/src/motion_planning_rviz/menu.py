@@ -2,7 +2,7 @@
 """The menu behind a right click, as data."""
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0)
 BOX_SIZES_M = (0.05, 0.1, 0.2)
@@ -15,26 +15,26 @@ class Entry(NamedTuple):
     number: int
     parent: int
     title: str
-    command: tuple
+    command: tuple[Any, ...]
 
 
 class MenuState(NamedTuple):
     """The state that the menu shows. groups, states, objects, attached: names; planners: ((pipeline, planner), ...)."""
 
-    groups: tuple = ()
+    groups: tuple[str, ...] = ()
     group: str = ""
-    states: tuple = ()
-    planners: tuple = ()
-    planner: tuple = ("", "")
+    states: tuple[str, ...] = ()
+    planners: tuple[tuple[str, str], ...] = ()
+    planner: tuple[str, str] = ("", "")
     speed: float = 1.0
     avoid: bool = False
     own_start: bool = False
     path: bool = True
-    objects: tuple = ()
-    attached: tuple = ()
+    objects: tuple[str, ...] = ()
+    attached: tuple[str, ...] = ()
 
 
-def build(state):
+def build(state: MenuState) -> list[Entry]:
     """Return the Entries for a MenuState."""
     menu = _Menu()
     for title, command in (("Plan", "plan"), ("Execute", "execute"), ("Plan and execute", "plan_and_execute"),
@@ -82,12 +82,12 @@ def build(state):
 
 
 class _Menu:
-    def __init__(self):
-        self.entries = []
+    def __init__(self) -> None:
+        self.entries: list[Entry] = []
 
-    def add(self, parent, title, *command):
+    def add(self, parent: int, title: str, *command: object) -> int:
         self.entries.append(Entry(len(self.entries) + 1, parent, title, command))
         return len(self.entries)
 
-    def choice(self, parent, title, chosen, *command):
+    def choice(self, parent: int, title: str, chosen: bool, *command: object) -> int:
         return self.add(parent, ("[x] " if chosen else "[  ] ") + title, *command)

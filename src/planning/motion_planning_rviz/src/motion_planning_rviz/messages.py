@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses, shapes, states and markers as messages, and back."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
@@ -15,6 +19,12 @@ from motion_planning_rviz.playback import Playback
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, quaternion_from_matrix, rigid
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import CollisionObject, DisplayTrajectory, PlanningScene
+
+    from motion_planning.model import PlanningModel
+    from motion_planning_rviz.drawing import Colour, Drawn, Solid
+
 #: Tolerance of a joint goal [rad or m], as in MoveIt's programs.
 JOINT_TOLERANCE = 1e-4
 _KINDS = {"box": Marker.CUBE, "sphere": Marker.SPHERE, "cylinder": Marker.CYLINDER, "mesh": Marker.MESH_RESOURCE,
@@ -22,12 +32,12 @@ _KINDS = {"box": Marker.CUBE, "sphere": Marker.SPHERE, "cylinder": Marker.CYLIND
 _CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if isinstance(value, int) and name.isupper()}
 
 
-def code_name(code):
+def code_name(code: int) -> str:
     """Return the name of a value of MoveItErrorCodes."""
     return _CODES.get(code, "error code %d" % code)
 
 
-def matrix_of(pose):
+def matrix_of(pose: Pose) -> np.ndarray:
     """Return the (4, 4) of a Pose; a quaternion of zeros is the identity. Raises ValueError for what is not a pose."""
     point, turn = pose.position, pose.orientation
     position, quaternion = (point.x, point.y, point.z), (turn.x, turn.y, turn.z, turn.w)
@@ -36,24 +46,24 @@ def matrix_of(pose):
     return rigid(np.eye(3) if not any(quaternion) else matrix_from_quaternion(quaternion), position)
 
 
-def pose_message(matrix):
+def pose_message(matrix: np.ndarray) -> Pose:
     """Return the Pose of a (4, 4)."""
     return Pose(Point(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
 
 
-def state_message(values):
+def state_message(values: Mapping[str, float]) -> RobotState:
     """Return the RobotState that lays ``values`` {joint: value} over the current state."""
     message = RobotState(is_diff=True)
     message.joint_state.name, message.joint_state.position = list(values), list(values.values())
     return message
 
 
-def state_values(message):
+def state_values(message: RobotState) -> dict[str, float]:
     """Return {joint: value} of a RobotState."""
     return dict(zip(message.joint_state.name, message.joint_state.position, strict=False))
 
 
-def tells_joints_alone(message):
+def tells_joints_alone(message: PlanningScene) -> bool:
     """Whether a PlanningScene diff tells where the joints are and nothing else.
 
     A diff without anything is the sum of changes that undo each other: what was seen between them is gone.
@@ -65,13 +75,13 @@ def tells_joints_alone(message):
         or message.link_scale))
 
 
-def goal_constraints(values):
+def goal_constraints(values: Mapping[str, float]) -> Constraints:
     """Return the Constraints that ask for ``values`` {joint: value}."""
     return Constraints(joint_constraints=[JointConstraint(name, value, JOINT_TOLERANCE, JOINT_TOLERANCE, 1.0)
                                           for name, value in values.items()])
 
 
-def playback_of(model, message):
+def playback_of(model: PlanningModel, message: DisplayTrajectory) -> Playback:
     """Return the Playback of a DisplayTrajectory, whose parts follow on each other. Raises ValueError for an empty one
     and for one that cannot be shown."""
     state = model.default_state()
@@ -88,7 +98,7 @@ def playback_of(model, message):
     return Playback(model, times, postures)
 
 
-def _laid_over(q, model, values):
+def _laid_over(q: np.ndarray, model: PlanningModel, values: Mapping[str, float]) -> np.ndarray:
     q = np.array(q)
     for name, value in values.items():
         if name in model.index:
@@ -96,7 +106,7 @@ def _laid_over(q, model, values):
     return q
 
 
-def object_solids(message):
+def object_solids(message: CollisionObject) -> list[Solid]:
     """Return the Solids of a CollisionObject; their poses are in its header's frame. Shapes that are none are left out.
 
     Objects of MoveIt's newer form have a pose; the poses of their shapes are relative to it.
@@ -117,7 +127,7 @@ def object_solids(message):
     return [solid for solid in found if solid is not None]
 
 
-def _primitive(message):
+def _primitive(message: SolidPrimitive) -> Box | Sphere | Cylinder | Cone | None:
     sizes = list(message.dimensions)
     if message.type == SolidPrimitive.BOX and len(sizes) >= 3:
         return Box(tuple(sizes[:3]))
@@ -129,7 +139,7 @@ def _primitive(message):
     return None
 
 
-def _plane_pose(coefficients):
+def _plane_pose(coefficients: Sequence[float]) -> np.ndarray:
     """The pose (4, 4) whose x-y plane is a x + b y + c z + d = 0; the identity for coefficients of no plane."""
     normal, length = np.array(coefficients[:3]), float(np.linalg.norm(coefficients[:3]))
     if not length > 1e-9:
@@ -141,7 +151,7 @@ def _plane_pose(coefficients):
     return rigid(turn, -coefficients[3] / length * normal)
 
 
-def marker_of(one, frame, prefix=""):
+def marker_of(one: Drawn, frame: str, prefix: str = "") -> Marker:
     """Return the Marker of a drawing.Drawn whose pose is in ``frame``."""
     solid = one.solid
     marker = Marker(ns=prefix + one.name, id=one.number, type=_KINDS[solid.kind], action=Marker.ADD,
@@ -153,7 +163,7 @@ def marker_of(one, frame, prefix=""):
     return marker
 
 
-def text_marker(text, position, frame, height):
+def text_marker(text: str, position: Iterable[float], frame: str, height: float) -> Marker:
     """Return a Marker that writes ``text`` above ``position`` (3,); letters of ``height`` [m]."""
     marker = Marker(ns="text", type=Marker.TEXT_VIEW_FACING, action=Marker.ADD, text=text,
                     pose=Pose(Point(*map(float, position)), Quaternion(0.0, 0.0, 0.0, 1.0)),
@@ -162,7 +172,7 @@ def text_marker(text, position, frame, height):
     return marker
 
 
-def line_marker(name, points, frame, colour, width):
+def line_marker(name: str, points: np.ndarray, frame: str, colour: Colour, width: float) -> Marker:
     """Return a Marker with a line through ``points`` (m, 3), ``width`` [m]."""
     marker = Marker(ns=name, type=Marker.LINE_STRIP, action=Marker.ADD, scale=Vector3(width, 0.0, 0.0),
                     pose=Pose(Point(), Quaternion(0.0, 0.0, 0.0, 1.0)), color=ColorRGBA(*colour),

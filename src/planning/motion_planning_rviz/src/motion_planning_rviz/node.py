@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node: passes messages from rviz and other programs to the panel."""
+from __future__ import annotations
+
 import logging
 import sys
 import time
+from collections.abc import Callable, Hashable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospkg
@@ -24,6 +28,12 @@ from motion_planning_rviz.view import View
 from motion_planning_rviz.worker import Worker
 from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
+if TYPE_CHECKING:
+    import genpy
+    from std_msgs.msg import Header
+
+    from motion_planning_rviz.interaction import Handle
+
 # Wall time to wait for the robot's model, and between two log lines about waiting for move_group [s].
 _DESCRIPTION_TIMEOUT_S, _TOLD_EVERY_S = 60.0, 10.0
 # Wall time from the first answer of a move_group that has not heard from the joints [s]. Another one than ours may
@@ -43,7 +53,7 @@ _OF_A_HANDLE = ("add_box", "attach")
 class PanelNode:
     """Subscriptions around a Panel."""
 
-    def __init__(self, model):
+    def __init__(self, model: PlanningModel) -> None:
         self._model = model
         scale = float(rospy.get_param("~marker_scale", 0.2))
         markers = handles.Handles(rospy.get_param("~marker_topic", handles.TOPIC), model.root, scale, self._on_feedback)
@@ -55,7 +65,7 @@ class PanelNode:
         self._doubted = 0
         self._subscribers = []
 
-    def begin(self, description):
+    def begin(self, description: str) -> None:
         """Wait for move_group, then serve. description: name of the parameter that holds the URDF."""
         speed = rospy.get_param("~speed", rospy.get_param("%s_planning/%s" % (description, _SPEED), _USUAL_SPEED))
         group = rospy.get_param("~group", "")
@@ -76,7 +86,7 @@ class PanelNode:
                 time.sleep(0.2)
         self._subscribe()
 
-    def _subscribe(self):
+    def _subscribe(self) -> None:
         panel = self._panel
         for name, action in (("plan", panel.plan), ("execute", panel.execute)):
             self._listen("/rviz/moveit/" + name, Empty, lambda _, action=action: self._put(action))
@@ -97,26 +107,26 @@ class PanelNode:
                      lambda message: self._put(lambda: self._view.path(message)))
         self._listen("move_group/monitored_planning_scene", PlanningScene, self._on_scene)
 
-    def _listen(self, name, kind, callback):
+    def _listen(self, name: str, kind: type[genpy.Message], callback: Callable[[Any], None]) -> None:
         self._subscribers.append(rospy.Subscriber(name, kind, callback, queue_size=10))
 
-    def _put(self, function, key=None):
+    def _put(self, function: Callable[[], None], key: Hashable = None) -> None:
         self._worker.put(function, key)
 
-    def _on_error(self, error):
+    def _on_error(self, error: Exception) -> None:
         if isinstance(error, PlanningError | ValueError | tf2_ros.TransformException):
             self._panel.complain(str(error))
         else:
             rospy.logerr("%s: %s", type(error).__name__, error)
 
-    def _on_scene(self, message):
+    def _on_scene(self, message: PlanningScene) -> None:
         doubted, self._doubted = self._doubted, max(self._doubted - 1, 0)
         if doubted or not tells_joints_alone(message):
             self._put(self._panel.refresh, "scene")
 
     # -- markers ------------------------------------------------------------------------------------------------
 
-    def _on_feedback(self, message):
+    def _on_feedback(self, message: InteractiveMarkerFeedback) -> None:
         which, _, link = message.marker_name.partition(":")[2].partition("_")
         kinds = InteractiveMarkerFeedback
         if message.event_type == kinds.POSE_UPDATE:
@@ -126,14 +136,14 @@ class PanelNode:
         elif message.event_type == kinds.MENU_SELECT:
             self._choose(self._view.command(message.menu_entry_id), link)
 
-    def _move(self, which, link, header, pose, released=True):
-        def move():
+    def _move(self, which: str, link: str, header: Header, pose: Pose, released: bool = True) -> None:
+        def move() -> None:
             handle = self._handle(link)
             self._panel.drag(which, handle, self._in_root(header.frame_id) @ matrix_of(pose), released)
 
         self._put(move, None if released else (which, link))
 
-    def _choose(self, command, link):
+    def _choose(self, command: Sequence[Any], link: str) -> None:
         if not command:
             return
         what, *values = command
@@ -141,7 +151,7 @@ class PanelNode:
             self._panel.stop()
             return
 
-        def choose():
+        def choose() -> None:
             handle = [self._handle(link)] if what in _OF_A_HANDLE else []
             try:
                 getattr(self._panel, "select_group" if what == "group" else what)(*handle, *values)
@@ -150,13 +160,13 @@ class PanelNode:
 
         self._put(choose)
 
-    def _handle(self, link):
+    def _handle(self, link: str) -> Handle | None:
         for handle in self._panel.handles:
             if handle.link == link:
                 return handle
         raise InteractionError("link '%s' is not an end of group '%s'" % (link, self._panel.query.group))
 
-    def _in_root(self, frame):
+    def _in_root(self, frame: str) -> np.ndarray | None:
         """The pose (4, 4) of a frame in the root link, by tf where it is another."""
         frame = frame.lstrip("/")
         if frame in ("", self._model.root):
@@ -175,7 +185,7 @@ class PanelNode:
                 time.sleep(0.02)
 
 
-def main():
+def main() -> None:
     """Run the node until it is shut down."""
     end_on_signals()
     limit_ports()

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import functools
 import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning_rviz import interaction, menu
 from motion_planning_rviz.client import NoPosture
 from motion_planning_rviz.interaction import WHICH, InteractionError
+
+if TYPE_CHECKING:
+    from numpy.random import Generator as Random
+
+    from motion_planning.model import PlanningModel, State
+    from motion_planning_rviz.client import MoveGroupClient, Outcome, Touch
+    from motion_planning_rviz.interaction import Handle
+    from motion_planning_rviz.view import View
+    from motion_planning_rviz.worker import Worker
 
 #: Number of postures to try for a random valid state.
 _TRIES = 200
@@ -25,7 +38,8 @@ class Panel:
     has ``put(function)``, for work after the end of an action. generator: numpy.random.Generator.
     """
 
-    def __init__(self, model, client, view, worker, generator):
+    def __init__(self, model: PlanningModel, client: MoveGroupClient, view: View, worker: Worker,
+                 generator: Random) -> None:
         self.model, self.client, self.view, self.worker = model, client, view, worker
         self._generator = generator
         self.groups = interaction.plannable(model)
@@ -42,7 +56,7 @@ class Panel:
 
     # -- what is shown ------------------------------------------------------------------------------------------
 
-    def begin(self, group, speed, measured=False):
+    def begin(self, group: str, speed: float, measured: bool = False) -> None:
         """Set the goal to the robot's present state. Raises PlanningError if move_group does not answer, and with
         ``measured`` if it has not heard where the joints are."""
         self._look()
@@ -53,7 +67,7 @@ class Panel:
         self.view.scene(self._snapshot)
         self.select_group(group or self.query.group)
 
-    def select_group(self, name):
+    def select_group(self, name: str) -> None:
         """Plan for another group from now on. Raises InteractionError."""
         if name not in self.groups:
             raise InteractionError("there is no group '%s' to plan for; there are %s" % (name, ", ".join(self.groups)))
@@ -66,7 +80,7 @@ class Panel:
             self._show(which)
         self._show_menu()
 
-    def refresh(self):
+    def refresh(self) -> None:
         """Read the scene again, and check whether the goal is in collision now."""
         self._look()
         self.view.scene(self._snapshot)
@@ -74,10 +88,11 @@ class Panel:
             self._show(which, moved=False)
         self._show_menu()
 
-    def _look(self):
+    def _look(self) -> None:
         self._snapshot = self.client.snapshot()
 
-    def _show(self, which, moved=True, unreached=None, reason=""):
+    def _show(self, which: str, moved: bool = True, unreached: tuple[Handle, np.ndarray] | None = None,
+              reason: str = "") -> None:
         """Draw "goal" or "start". moved: handles follow; unreached: (handle, pose (4, 4)) that could not be reached,
         and the ``reason``."""
         state = self.query.state(which)
@@ -100,22 +115,22 @@ class Panel:
                                     for handle in self.handles})
         self._say()
 
-    def _invalid(self, state, touches):
+    def _invalid(self, state: State, touches: Sequence[Touch]) -> str:
         beyond = ["joint '%s' is at %.4g, beyond %.4g to %.4g" % found for found in self.model.beyond_limits(
             state.q, 1e-6, self.model.group(self.query.group).indices)]
         pairs = list(dict.fromkeys("%s touches %s" % (touch.a, touch.b) for touch in touches))
         more = ["and %d more" % (len(pairs) - _NAMED_CONTACTS)] if len(pairs) > _NAMED_CONTACTS else []
         return ", ".join(beyond + pairs[:_NAMED_CONTACTS] + more) or "not valid, for move_group"
 
-    def complain(self, text):
+    def complain(self, text: str) -> None:
         """Report that something was not done, and why."""
         self._say(motion=text)
 
-    def _say(self, **lines):
+    def _say(self, **lines: str) -> None:
         self._lines.update(lines)
         self.view.say(self._lines["motion"], [self._lines[which] for which in WHICH])
 
-    def _show_menu(self):
+    def _show_menu(self) -> None:
         query, seen = self.query, self._snapshot
         self.view.menu(menu.build(menu.MenuState(
             groups=self.groups, group=query.group, states=tuple(self.model.group(query.group).states),
@@ -124,7 +139,7 @@ class Panel:
             objects=tuple(one.id for one in seen.objects) if seen else (),
             attached=tuple(one.object.id for one in seen.attached) if seen else ())))
 
-    def _planners_of(self, group):
+    def _planners_of(self, group: str) -> tuple[tuple[str, str], ...]:
         if group not in self._planners:
             try:
                 self._planners[group] = self.client.planners(group)
@@ -134,7 +149,7 @@ class Panel:
 
     # -- goal and start -----------------------------------------------------------------------------------------
 
-    def drag(self, which, handle, pose, released=True):
+    def drag(self, which: str, handle: Handle, pose: np.ndarray, released: bool = True) -> None:
         """Let the joints follow a handle's link to ``pose`` (4, 4) in the root link.
 
         released: the handle may move to the link. If no posture reaches the pose, the ghost stays and the reason is
@@ -153,44 +168,44 @@ class Panel:
         self.query = self.query.with_state(which, moved)
         self._show(which, moved=released)
 
-    def _why_unreached(self, handle, pose, state, error):
+    def _why_unreached(self, handle: Handle, pose: np.ndarray, state: State, error: NoPosture) -> str:
         reason = interaction.why_unreachable(self.model, handle, pose, state)
         if reason is not None:
             return reason
         return "link '%s' cannot be put there: %s" % (
             handle.link, "every posture that was found is in collision" if self.query.avoid else error.code)
 
-    def set_state(self, which, values):
+    def set_state(self, which: str, values: Mapping[str, float]) -> None:
         """Set joints of "goal" or "start" to ``values`` {joint: value}. Raises PlanningError."""
         state = self.query.state(which) or self._robot()
         self._set(which, interaction.with_known(state, values))
 
-    def _set(self, which, state):
+    def _set(self, which: str, state: State | None) -> None:
         menu_changes = which == "start" and (self.query.start is None) != (state is None)
         self.query = self.query.with_state(which, state)
         self._show(which)
         if menu_changes:
             self._show_menu()
 
-    def _robot(self):
+    def _robot(self) -> State:
         self._look()
         return interaction.with_known(self.query.goal, self._snapshot.values)
 
-    def current(self, which):
+    def current(self, which: str) -> None:
         """Set the goal to the robot's present state; from now on the start follows the robot."""
         self._set(which, None if which == "start" else self._robot())
 
-    def copy(self, which):
+    def copy(self, which: str) -> None:
         """The goal becomes the start, or the start gets its own marker, at the goal."""
         other = self.query.state("start" if which == "goal" else "goal")
         self._set(which, other if other is not None else self._robot())
 
-    def named(self, which, name):
+    def named(self, which: str, name: str) -> None:
         """Set the joints of the group as the SRDF's state ``name`` says. Raises InteractionError."""
         state = self.query.state(which) or self._robot()
         self._set(which, interaction.named_state(self.model, state, self.query.group, name))
 
-    def random(self, which):
+    def random(self, which: str) -> None:
         """Set a random state that move_group accepts. Raises InteractionError if none is found."""
         state = self.query.state(which) or self._robot()
         for _ in range(_TRIES):
@@ -202,15 +217,15 @@ class Panel:
 
     # -- settings -----------------------------------------------------------------------------------------------
 
-    def planner(self, pipeline, name):
+    def planner(self, pipeline: str, name: str) -> None:
         self.query = replace(self.query, pipeline=pipeline, planner=name)
         self._show_menu()
 
-    def speed(self, share):
+    def speed(self, share: float) -> None:
         self.query = replace(self.query, speed=share)
         self._show_menu()
 
-    def toggle(self, what):
+    def toggle(self, what: str) -> None:
         if what == "avoid":
             self.query = replace(self.query, avoid=not self.query.avoid)
         else:
@@ -220,7 +235,7 @@ class Panel:
 
     # -- the scene ----------------------------------------------------------------------------------------------
 
-    def add_box(self, handle, size):
+    def add_box(self, handle: Handle, size: float) -> None:
         """Put a cube with sides of ``size`` [m] in front of a handle's link at the goal."""
         taken = {one.id for one in self._snapshot.objects} | {one.object.id for one in self._snapshot.attached}
         name = next(name for name in ("box_%d" % number for number in itertools.count(1)) if name not in taken)
@@ -229,45 +244,46 @@ class Panel:
         self.client.add_box(name, size, pose)
         self.refresh()
 
-    def remove(self, name):
+    def remove(self, name: str) -> None:
         self.client.remove(name)
         self.refresh()
 
-    def attach(self, handle, name):
+    def attach(self, handle: Handle, name: str) -> None:
         """Fix an object to a handle's link, as far from it as it is now from the robot's."""
         self.client.attach(name, handle.link, interaction.touch_links(self.model, handle))
         self.refresh()
 
-    def detach(self, name):
+    def detach(self, name: str) -> None:
         link = next((one.link_name for one in self._snapshot.attached if one.object.id == name), "")
         self.client.detach(name, link)
         self.refresh()
 
     # -- motions ------------------------------------------------------------------------------------------------
 
-    def plan(self):
+    def plan(self) -> None:
         self._begin("planning", functools.partial(self.client.plan, self.query, False), self._planned)
 
-    def plan_and_execute(self):
+    def plan_and_execute(self) -> None:
         self._begin("planning and executing", functools.partial(self.client.plan, self.query, True), self._executed)
 
-    def execute(self):
+    def execute(self) -> None:
         if self.trajectory is None:
             raise InteractionError("there is no plan to execute; plan first")
         self._begin("executing", functools.partial(self.client.execute, self.trajectory), self._executed)
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop the present action. May be called from any thread."""
         self.client.stop()
         self.worker.put(self._stopped)
 
-    def _stopped(self):
+    def _stopped(self) -> None:
         if self._busy:
             self._generation += 1
             self._busy = ""
         self._say(motion="stopped")
 
-    def _begin(self, what, send, ended):
+    def _begin(self, what: str, send: Callable[[Callable[[Outcome], None]], None],
+               ended: Callable[[Outcome], None]) -> None:
         if self._busy:
             raise InteractionError("still %s; stop that first" % self._busy)
         self._busy, generation = what, self._generation
@@ -278,13 +294,13 @@ class Panel:
             self._busy = ""
             raise
 
-    def _ended(self, generation, outcome, ended):
+    def _ended(self, generation: int, outcome: Outcome, ended: Callable[[Outcome], None]) -> None:
         # A result after a stop is ignored.
         if generation == self._generation:
             self._busy = ""
             ended(outcome)
 
-    def _planned(self, outcome):
+    def _planned(self, outcome: Outcome) -> None:
         self.trajectory = outcome.trajectory if outcome.success else None
         if not outcome.success:
             self._say(motion="no plan: " + outcome.text)
@@ -293,7 +309,7 @@ class Panel:
         seconds = points[-1].time_from_start.to_sec() if points else 0.0
         self._say(motion="planned: %.2f s long, found in %.3f s" % (seconds, outcome.seconds))
 
-    def _executed(self, outcome):
+    def _executed(self, outcome: Outcome) -> None:
         if outcome.success:
             self.trajectory = None
             self.view.forget_path()

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The panel's output: markers on topics for rviz's own displays."""
+from __future__ import annotations
+
 import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -12,6 +16,16 @@ from motion_planning_rviz import drawing
 from motion_planning_rviz.film import Film, Picture
 from motion_planning_rviz.interaction import WHICH
 from motion_planning_rviz.messages import line_marker, marker_of, object_solids, playback_of, text_marker
+
+if TYPE_CHECKING:
+    from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, DisplayTrajectory
+
+    from motion_planning.model import PlanningModel, State
+    from motion_planning_rviz.client import Snapshot, Touch
+    from motion_planning_rviz.drawing import Colour
+    from motion_planning_rviz.handles import Handles
+    from motion_planning_rviz.interaction import Handle
+    from motion_planning_rviz.menu import Entry
 
 _COLOURS = {"goal": drawing.GOAL, "start": drawing.START}
 #: Topics with pictures, below the node's name.
@@ -28,7 +42,7 @@ class View:
     and ``~text`` (all MarkerArray), and ``~status`` (String). handles: handles.Handles; scale: size of its markers [m].
     """
 
-    def __init__(self, model, handles, scale):
+    def __init__(self, model: PlanningModel, handles: Handles, scale: float) -> None:
         self._model, self._handles, self._scale = model, handles, scale
         self._pictures = {name: Picture("~" + name, model.root) for name in PICTURES}
         self._status = rospy.Publisher("~status", String, queue_size=10, latch=True)
@@ -39,7 +53,7 @@ class View:
 
     # -- ghosts and handles -------------------------------------------------------------------------------------
 
-    def group(self, name, handles):
+    def group(self, name: str, handles: Iterable[Handle]) -> None:
         """Another group: its links are the ghosts'."""
         for which in WHICH:
             self._handles.erase(which)
@@ -48,7 +62,8 @@ class View:
         self._links = tuple(handle.link for handle in handles)
         self._film.forget()
 
-    def ghost(self, which, state, touches, attached, unreached):
+    def ghost(self, which: str, state: State, touches: Sequence[Touch], attached: Iterable[AttachedCollisionObject],
+              unreached: tuple[Handle, np.ndarray] | None) -> None:
         """Draw the group's links at ``state`` and their attached objects; bodies in contact are red.
 
         touches: client.Touches. attached: AttachedCollisionObjects. unreached: None, or (handle, pose (4, 4)) that the
@@ -76,27 +91,27 @@ class View:
             # Above the whole robot: an arm in front of the text would hide it.
             self._anchor = np.append(poses[self._links[0]][:2, 3], frames[:, 2, 3].max())
 
-    def clear(self, which):
+    def clear(self, which: str) -> None:
         """No ghost and no markers of "goal" or "start"."""
         self._handles.erase(which)
         self._pictures[which + "_state"].show([])
         self._touches.pop(which, None)
         self._show_contacts()
 
-    def place(self, which, poses):
+    def place(self, which: str, poses: Mapping[Handle, np.ndarray]) -> None:
         """Put markers to ``poses`` {Handle: (4, 4)}."""
         self._handles.place(which, {handle.link: pose for handle, pose in poses.items()})
 
-    def menu(self, entries):
+    def menu(self, entries: Iterable[Entry]) -> None:
         """Show menu.Entries behind a right click."""
         self._handles.set_menu(entries)
         self._entries = {entry.number: entry.command for entry in entries}
 
-    def command(self, number):
+    def command(self, number: int) -> tuple[Any, ...]:
         """The command of a menu entry, empty for an unknown one."""
         return self._entries.get(number, ())
 
-    def _show_contacts(self):
+    def _show_contacts(self) -> None:
         markers = []
         for touch in (touch for touches in self._touches.values() for touch in touches):
             marker = Marker(ns="%s=%s" % (touch.a, touch.b), id=len(markers), type=Marker.SPHERE,
@@ -108,7 +123,7 @@ class View:
 
     # -- text, scene, path --------------------------------------------------------------------------------------
 
-    def say(self, motion, notes):
+    def say(self, motion: str, notes: Sequence[str]) -> None:
         """Write lines above the robot at its goal, the ends of long ones left out, and all of them onto ``~status``.
 
         motion: the present action; it is also logged.
@@ -126,7 +141,7 @@ class View:
             rospy.loginfo("%s", motion)
         self._logged = motion
 
-    def scene(self, snapshot):
+    def scene(self, snapshot: Snapshot) -> None:
         """Draw the objects of the world and attached objects at their present poses, from a client.Snapshot."""
         markers = []
         for one in snapshot.objects:
@@ -136,20 +151,20 @@ class View:
                                snapshot.colours.get(body.object.id, drawing.HELD))
         self._pictures["planning_scene"].show(markers)
 
-    def path(self, message):
+    def path(self, message: DisplayTrajectory) -> None:
         """Show a DisplayTrajectory again and again. Raises ValueError for one that cannot be shown."""
         self._film.show(playback_of(self._model, message), self._links)
 
-    def show_path(self, shown):
+    def show_path(self, shown: bool) -> None:
         """Show the planned path, or hide it."""
         self._film.enable(shown)
 
-    def forget_path(self):
+    def forget_path(self) -> None:
         """Remove the planned path."""
         self._film.forget()
 
 
-def _object(message, frame, colour):
+def _object(message: CollisionObject, frame: str, colour: Colour) -> list[Marker]:
     poses = {message.id: np.eye(4)}
     markers = [marker_of(one, frame) for one in drawing.drawn({message.id: object_solids(message)}, poses, colour)]
     for marker in markers:
