@@ -14,7 +14,7 @@ from .quiet_pybullet import pybullet
 
 # Shallower overlaps stay: bodies that rest on each other have them [m]. Soft surfaces, whose stiffness turns an overlap
 # into a speed, keep no more than the one in which they bear the model's weight, and this at least.
-_ALLOWED_M, _LEAST_M = 1e-3, 1e-5
+_ALLOWED_M, _MIN_M = 1e-3, 1e-5
 # Each moves a model out of what it is deepest in; in a corner the next one leads out of the other wall.
 _ROUNDS = 10
 
@@ -49,7 +49,7 @@ def _deepest(client, model, body, others, weight):
     """Return the way (3,) [m, world] out of what the multibody ``body`` of ``model`` is deepest in, or None."""
     depth, way = 0.0, None
     for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
-        for point in pybullet.getClosestPoints(body, obstacle, -_LEAST_M, physicsClientId=client) or ():
+        for point in pybullet.getClosestPoints(body, obstacle, -_MIN_M, physicsClientId=client) or ():
             surfaces = _surface(model, body, point[3]), _surface(owner, obstacle, point[4])
             if -point[8] > max(depth, _allowed(weight, surfaces)) and _bits(surfaces[0]) & _bits(surfaces[1]):
                 # The normal points to the first body.
@@ -63,7 +63,7 @@ def _allowed(weight, surfaces):
     softest = min((surface.stiffness for surface in surfaces if not is_rigid(surface.stiffness)), default=None)
     if softest is None:
         return _ALLOWED_M
-    return min(max(weight / softest, _LEAST_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
+    return min(max(weight / softest, _MIN_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
 
 
 def _surface(model, body, index):

@@ -10,7 +10,7 @@ from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
 from urdf_model.transforms import pose_matrix
 
-_MOST_N = 1e6  # of a joint without an effort limit
+_MAX_N = 1e6  # of a joint without an effort limit
 _FASTEST_M_PER_S = 10.0
 
 
@@ -40,7 +40,7 @@ class Harness(ModelPlugin):
         self._axis = pose_matrix(rpy=place[3:])[:3, :3] @ axis / np.linalg.norm(axis)  # in the link's frame
         self._low, self._high, effort = (self._numbers(joint, "axis/limit/" + tag, default, 1)[0] for tag, default in (
             ("lower", "-1e16"), ("upper", "1e16"), ("effort", "-1")))
-        self._effort = _MOST_N if effort < 0.0 else min(effort, _MOST_N)
+        self._effort = _MAX_N if effort < 0.0 else min(effort, _MAX_N)
         self._velocities = context.subscription("/%s/harness/velocity" % context.model.name, Float32)
         self._detach = context.subscription("/%s/harness/detach" % context.model.name, Bool)
         self._hanging = None

@@ -64,7 +64,7 @@ def test_it_winds_along_an_axis_of_its_link(make):
     np.testing.assert_allclose(place(lab), np.array((0, 0, 1.5)) - 0.1 / math.sqrt(3), atol=1e-3)
 
 
-def test_a_body_that_is_made_anew_goes_on_hanging(make):
+def test_a_body_that_is_rebuilt_goes_on_hanging(make):
     lab = harness(make).run(0.1)
     inertial = lab.model.inertial("link")
     lab.model.set_inertial("link", 0.3, inertial.inertia, (0.0, 0.2, 0.0))
