@@ -19,7 +19,7 @@ from baxter_model import SIDES
 from gripper_action.gripper_action import GripperActionServer
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-g", "--gripper", choices=("both", *SIDES), default="both", help="which gripper (both)")
     arguments = parser.parse_args(rospy.myargv()[1:])

@@ -18,7 +18,7 @@ from baxter_interface.serving import serve
 from head_action.head_action import HeadActionServer
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.parse_args(rospy.myargv()[1:])
 

@@ -31,14 +31,14 @@ CONFIGS = {
 }
 
 
-def positive(text):
+def positive(text: str) -> float:
     number = float(text)
     if not 0.0 < number <= 1000.0:
         raise argparse.ArgumentTypeError("the rate must be above 0 and at most 1000 Hz, got %s" % text)
     return number
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-l", "--limb", choices=("both", *SIDES), default="both", help="which arm (both)")
     parser.add_argument("-r", "--rate", type=positive, default=100.0, help="commands per second [Hz] (100)")

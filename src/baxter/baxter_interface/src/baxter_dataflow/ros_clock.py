@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import rosgraph
 import rospy
@@ -21,7 +22,7 @@ class RosClock:
     `gives_up()` is called several times a second and ends a sleep when it is true; by default at shutdown.
     """
 
-    def __init__(self, gives_up=rospy.is_shutdown) -> None:
+    def __init__(self, gives_up: Callable[[], object] = rospy.is_shutdown) -> None:
         self._gives_up = gives_up
 
     def now(self) -> float:

@@ -22,7 +22,7 @@ class DigitalIO(IOChannel):
 
     KIND, ADJECTIVE, STATE, COMMAND = "digital", "digital", DigitalIOState, DigitalOutputCommand
 
-    def __init__(self, component_id) -> None:
+    def __init__(self, component_id: str) -> None:
         self.state_changed = Signal()
         super().__init__(component_id)
 

@@ -7,7 +7,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import actionlib
 import rospy
@@ -19,6 +19,9 @@ from baxter_model.readiness import lost, why_not_ready
 from .goal_queue import GoalQueue
 from .presence import Presence
 from .resets import PUT_ELSEWHERE, Resets
+
+if TYPE_CHECKING:
+    from .robot_enable import RobotEnable
 
 RATE_HZ = 20.0
 # No goal ends sooner than this after it has come [s, wall]: actionlib's simple client loses a goal, and waits for ever,
@@ -35,10 +38,10 @@ class Work(NamedTuple):
     message; `timeout_s` [s, ROS time], below 0 for none; `refusal` is the reason why the goal is refused, or "".
     """
 
-    step: Callable
-    stop: Callable
-    missed: Callable
-    make_result: Callable
+    step: Callable[[], bool]
+    stop: Callable[[], object]
+    missed: Callable[[], str]
+    make_result: Callable[[], Any]
     timeout_s: float
     refusal: str = ""
 
@@ -51,7 +54,7 @@ class GoalLoop:
     (actionlib's own SimpleActionServer refuses every goal for a while after a simulation was restarted.)
     """
 
-    def __init__(self, name: str, action, robot, label, begin) -> None:
+    def __init__(self, name: str, action: type, robot: RobotEnable, label: str, begin: Callable[[Any], Work]) -> None:
         self._robot = robot
         self._label = label
         self._begin = begin

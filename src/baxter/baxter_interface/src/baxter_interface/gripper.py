@@ -35,7 +35,7 @@ class Gripper:
     rospy.ROSInitException before rospy.init_node.
     """
 
-    def __init__(self, gripper, versioned: bool = False) -> None:
+    def __init__(self, gripper: str, versioned: bool = False) -> None:
         self._link = GripperLink(require_side(gripper))
         self.name = self._link.name
         self.on_type_changed = self._link.on_type_changed

@@ -74,7 +74,7 @@ class GripperLink:
         except JsonRefused:
             return {}
 
-    def command(self, command, block: bool = False, test: Callable[[], bool] | None = None, timeout_s: float = 0.0,
+    def command(self, command: str, block: bool = False, test: Callable[[], bool] | None = None, timeout_s: float = 0.0,
                 args: dict[str, Any] | None = None, delay_s: float = 0.0) -> bool:
         """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.
 
@@ -113,7 +113,7 @@ class GripperLink:
         """Send the parameters."""
         self.command("configure", args=self.parameters)
 
-    def override(self, topic: str, message: Any, test: Callable[[], bool], timeout_s: float):
+    def override(self, topic: str, message: Any, test: Callable[[], bool], timeout_s: float) -> bool:
         """Publish `message` on rsdk/`topic` until `test()`; return whether it came true."""
         publisher = rospy.Publisher(self._prefix + "rsdk/" + topic, type(message), queue_size=10)
         try:

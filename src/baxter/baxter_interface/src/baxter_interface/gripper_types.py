@@ -9,8 +9,12 @@ are 0, 1, or 2 for unknown: only 1 counts as true.
 from __future__ import annotations
 
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from baxter_model import CUSTOM, ELECTRIC, SUCTION
+
+if TYPE_CHECKING:
+    from .gripper_link import GripperLink
 
 CLOSED, OPEN = 0.0, 100.0
 DATE_FORMAT = "%Y/%m/%d %H:%M:%S"
@@ -28,7 +32,7 @@ class CustomGripper:
 
     name, defaults = CUSTOM.name, CUSTOM.parameters
 
-    def __init__(self, link) -> None:
+    def __init__(self, link: GripperLink) -> None:
         self._link = link
 
 
@@ -37,7 +41,7 @@ class ElectricGripper:
 
     name, defaults = ELECTRIC.name, ELECTRIC.parameters
 
-    def __init__(self, link) -> None:
+    def __init__(self, link: GripperLink) -> None:
         self._link = link
 
     def reset(self, block: bool, timeout_s: float) -> bool:
@@ -94,7 +98,7 @@ class SuctionGripper:
 
     name, defaults = SUCTION.name, SUCTION.parameters
 
-    def __init__(self, link) -> None:
+    def __init__(self, link: GripperLink) -> None:
         self._link = link
 
     def stop(self, block: bool, timeout_s: float) -> bool:
@@ -113,7 +117,7 @@ class SuctionGripper:
     def close(self, block: bool, timeout_s: float) -> bool:
         return self.command_suction(block, timeout_s)
 
-    def vacuum_sensor(self):
+    def vacuum_sensor(self) -> float:
         """Vacuum in percent; the sensor counts to 255."""
         return float(self._link.details.get("vacuum sensor", 0.0)) / 255.0 * 100.0
 

@@ -35,7 +35,7 @@ class IOChannel:
 
     KIND = ADJECTIVE = STATE = COMMAND = None
 
-    def __init__(self, component_id) -> None:
+    def __init__(self, component_id: str) -> None:
         self._id = present_name(component_id)
         if self._id != component_id:
             rospy.logwarn("the %s channel %r of SDK 1.0 is now called %r", self.ADJECTIVE, component_id, self._id)

@@ -32,7 +32,7 @@ class Navigator:
     rospy.ROSInitException before rospy.init_node.
     """
 
-    def __init__(self, location) -> None:
+    def __init__(self, location: str) -> None:
         if location not in LOCATIONS:
             raise AttributeError("there is no navigator %r: the navigators are %s"
                                  % (location, ", ".join(map(repr, LOCATIONS))))

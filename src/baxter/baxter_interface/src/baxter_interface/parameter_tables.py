@@ -5,7 +5,7 @@ Free of ROS and of the rest of the package: it is loaded while the workspace is 
 """
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from baxter_model import ELECTRIC, SIDES, SUCTION, joint_names
@@ -65,7 +65,7 @@ HEAD = (
 )
 
 
-def generate(table, name: str) -> None:
+def generate(table: Iterable[Parameter], name: str) -> None:
     """Write the dynamic_reconfigure type `name` for a table of parameters, as a *.cfg file has to."""
     from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator, double_t
 

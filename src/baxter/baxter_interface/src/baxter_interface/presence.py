@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 import xmlrpc.client
+from collections.abc import Callable
 from urllib.parse import urlparse
 
 import rosgraph
@@ -24,14 +25,14 @@ class Presence:
     A paused simulation is silent too, but not gone: its node answers. Cheap, callable from any thread.
     """
 
-    def __init__(self, topic: str, silence_s) -> None:
+    def __init__(self, topic: str, silence_s: Callable[[], float]) -> None:
         self._topic = topic
         self._silence_s = silence_s
         self._lock = threading.Lock()
         self._probe_due_s = 0.0
         self._gone = False
 
-    def is_gone(self):
+    def is_gone(self) -> bool:
         """Whether the topic has no live publisher any more."""
         if self._silence_s() < SILENT_AFTER_S:
             self._gone = False

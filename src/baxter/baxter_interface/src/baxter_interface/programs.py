@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any
 
@@ -115,7 +115,7 @@ class EnabledRobot:
         state = self.switch.state()
         return state.enabled and not state.stopped
 
-    def beats(self, rate_hz: float):
+    def beats(self, rate_hz: float) -> Iterator[None]:
         """Yield `rate_hz` times a second of ROS time until ROS shuts down, while the robot is present and enabled.
 
         Waits for a paused or absent simulation, with log lines. Raises RobotLost.

@@ -2,6 +2,7 @@
 """Count resets of the simulation, which move the robot: commands from before a reset are invalid."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import rospy
@@ -16,7 +17,7 @@ class Resets:
     on_reset: function that is called each time, in a thread of rospy's.
     """
 
-    def __init__(self, on_reset=lambda: None) -> None:
+    def __init__(self, on_reset: Callable[[], object] = lambda: None) -> None:
         #: How often so far.
         self.count = 0
         self._on_reset = on_reset

@@ -64,7 +64,7 @@ class RobotEnable:
         vendor's SDK."""
         self._subscriber.unregister()
 
-    def silence_s(self):
+    def silence_s(self) -> float:
         """Return the time since the robot's last state [s, wall]; a present robot publishes it all the time."""
         with self._lock:
             return time.monotonic() - self._heard_at_s

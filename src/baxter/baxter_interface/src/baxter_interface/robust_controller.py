@@ -2,7 +2,7 @@
 """Run a procedure of the robot, such as taring or calibrating an arm, and wait for its end."""
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rospy
 from baxter_core_msgs.msg import RobustControllerStatus
@@ -12,6 +12,9 @@ from baxter_dataflow.waiting import Stopwatch, Ticker
 
 from . import startup
 from .robust_dialogue import Dialogue, Report, State
+
+if TYPE_CHECKING:
+    from genpy import Message
 
 RATE_HZ = 20.0
 
@@ -30,7 +33,7 @@ class RobustController:
     STATE_RUNNING = int(State.RUNNING)
     STATE_STOPPING = int(State.STOPPING)
 
-    def __init__(self, namespace, enable_msg, disable_msg, timeout: int = 60) -> None:
+    def __init__(self, namespace: str, enable_msg: Message, disable_msg: Message, timeout: int = 60) -> None:
         self._namespace = namespace
         self._messages = {True: enable_msg, False: disable_msg}
         self._timeout_s = timeout

@@ -39,7 +39,7 @@ def _services() -> list[str]:
         return []
 
 
-def call_service(name: str, kind, *arguments, timeout_s: float = 5.0) -> Any:
+def call_service(name: str, kind: type, *arguments: Any, timeout_s: float = 5.0) -> Any:
     """Call the service `name` of type `kind`, waiting for it and then for its answer, `timeout_s` [s, wall] each.
 
     Raises ServiceUnavailable, OSError with errno EIO if the service refused the call.

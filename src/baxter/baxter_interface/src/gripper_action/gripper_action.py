@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
@@ -13,6 +13,9 @@ from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.gripper_types import OPEN, clip_percent
 from baxter_model import ELECTRIC, SUCTION
 from baxter_model.readiness import ENABLE
+
+if TYPE_CHECKING:
+    from baxter_interface.dynamic_parameters import ParameterServer
 
 # Number of steps that the fingers get to release an object before they count as stalled.
 STEPS_TO_BEGIN = 4
@@ -33,7 +36,7 @@ class GripperActionServer:
     OSError if that fails, or if the gripper is neither electric nor a suction cup.
     """
 
-    def __init__(self, gripper, reconfig_server) -> None:
+    def __init__(self, gripper: str, reconfig_server: ParameterServer) -> None:
         self._gripper = Gripper(gripper, CHECK_VERSION)
         self._config = reconfig_server
         name, kind = self._gripper.name, self._gripper.type()
@@ -93,7 +96,7 @@ def _effort(asked: float, default: float) -> float:
 
 
 class _Electric:
-    def __init__(self, gripper, settings: dict[str, float], position: float, effort: float) -> None:
+    def __init__(self, gripper: Gripper, settings: dict[str, float], position: float, effort: float) -> None:
         self._gripper = gripper
         self._position = clip_percent(position)
         self._dead_zone = settings["goal"]
@@ -118,7 +121,7 @@ class _Electric:
 
 
 class _Suction:
-    def __init__(self, gripper, settings: dict[str, float], position: float, effort: float) -> None:
+    def __init__(self, gripper: Gripper, settings: dict[str, float], position: float, effort: float) -> None:
         self._gripper = gripper
         self._opens = position >= OPEN
         self._timeout_s = settings["timeout"] if settings["timeout"] >= 0.0 else LONG_SUCTION_S

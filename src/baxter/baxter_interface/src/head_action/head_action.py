@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rospy
 from control_msgs.msg import SingleJointPositionAction, SingleJointPositionFeedback, SingleJointPositionResult
@@ -12,6 +12,9 @@ from baxter_interface import Head, RobotEnable
 from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.joint_limits import read_joint_limits
 from baxter_model import HEAD_JOINT
+
+if TYPE_CHECKING:
+    from baxter_interface.dynamic_parameters import ParameterServer
 
 ACTION_NAME = "robot/head/head_action"
 
@@ -25,7 +28,7 @@ class HeadActionServer:
     preempted; when it is not reached the head stops where it is. Waits for the robot, and raises, as Head does.
     """
 
-    def __init__(self, reconfig_server) -> None:
+    def __init__(self, reconfig_server: ParameterServer) -> None:
         self._config = reconfig_server
         self._head = Head()
         self._limit = read_joint_limits([HEAD_JOINT])[HEAD_JOINT]

@@ -146,7 +146,7 @@ class ArmMotion:
         return self._output
 
     @property
-    def desired(self):
+    def desired(self) -> np.ndarray:
         """(3, n): position, velocity, acceleration wanted at the last tick; read only."""
         return self._follower.desired
 

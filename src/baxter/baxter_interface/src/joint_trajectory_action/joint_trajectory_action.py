@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import threading
 import traceback
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import numpy as np
@@ -42,6 +42,9 @@ from joint_trajectory import (
 from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, GoalDefaults, Mode
 from .robot_watch import RobotWatch
 
+if TYPE_CHECKING:
+    from baxter_interface.dynamic_parameters import ParameterServer
+
 # Period of an idle server's checks that the robot is still there [s, wall].
 _IDLE_S = 0.5
 # Time to process each point of a goal [s]; a long goal starts this much later, and so without a jump.
@@ -66,7 +69,8 @@ class JointTrajectoryActionServer:
     for the robot, and raises, as Limb does.
     """
 
-    def __init__(self, limb: str, reconfig_server, rate: float = 100.0, mode: str = "position_w_id") -> None:
+    def __init__(self, limb: str, reconfig_server: ParameterServer, rate: float = 100.0,
+                 mode: str = "position_w_id") -> None:
         self._mode = Mode(mode)
         self._config = reconfig_server
         self._limb = Limb(limb)
@@ -98,7 +102,7 @@ class JointTrajectoryActionServer:
         start(self._server)
         self._thread.start()
 
-    def robot_is_enabled(self):
+    def robot_is_enabled(self) -> bool:
         """Tell whether the robot is enabled."""
         return self._watch.is_enabled()
 

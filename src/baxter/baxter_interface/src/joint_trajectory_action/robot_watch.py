@@ -45,13 +45,13 @@ class RobotWatch:
             startup.message_arrives(self._subscribers[0].resolved_name, lambda: self._state is not None),
             startup.message_arrives(self._topic, lambda: self._heard_wall_s is not None)])
 
-    def begin(self):
+    def begin(self) -> str:
         """Forget earlier events; return why the arm cannot be commanded, or ""."""
         with self._lock:
             self._event = ""
         return self.refusal()
 
-    def refusal(self):
+    def refusal(self) -> str:
         """Why the arm cannot be commanded now, or ""."""
         with self._lock:
             state, cuff = self._state, self._cuff
@@ -59,7 +59,7 @@ class RobotWatch:
             return "the robot reports no joint states on %s" % self._topic
         return why_not_ready(state) or ("the %s cuff is squeezed" % self._side if cuff else "")
 
-    def trouble(self):
+    def trouble(self) -> str:
         """The event since :meth:`begin` that ends a motion, or ""."""
         with self._lock:
             event = self._event
@@ -76,12 +76,12 @@ class RobotWatch:
         """Whether an event since :meth:`begin` ends a motion; cheaper than :meth:`trouble`."""
         return bool(self._event)
 
-    def is_enabled(self):
+    def is_enabled(self) -> bool:
         """Whether the robot reports that it is enabled."""
         with self._lock:
             return self._state.enabled and not self._state.stopped
 
-    def is_gone(self):
+    def is_gone(self) -> bool:
         """Whether no node publishes joint states any more. A paused simulation is not gone."""
         return self._presence.is_gone()
 
