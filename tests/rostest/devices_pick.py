@@ -13,6 +13,7 @@ import unittest
 from pathlib import Path
 
 import numpy as np
+import rospkg
 import rospy
 import rostest
 from baxter_core_msgs.msg import DigitalIOState
@@ -27,8 +28,11 @@ from std_msgs.msg import String
 from arm_kinematics import Chain, solve
 from baxter_interface import Gripper, Limb, RobotEnable
 from baxter_model import BASE_HEIGHT_M, joint_names
+from lab_testing.browser import Browser, why_not
 from lab_testing.fake_joystick import FakeJoystick
+from lab_testing.skipping import skip
 from lab_testing.waiting import stretched, wait_for_message, wait_for_time, wait_until
+from lab_web.libraries import fetched
 from processes.ports import free_port
 from urdf_model import parse_urdf
 
@@ -206,6 +210,92 @@ class Cuff:
                              lambda message, state=state: message.state == state)
 
 
+class PageKeys:
+    """Keys that are held in the lab's page, in Chromium. They are let go within a step of the way's end."""
+
+    # The page's slider of speed [%]: of 0.2 m/s.
+    speed = 30
+
+    def __init__(self, case):
+        if reason := why_not():
+            skip(case, reason)
+        fetched(Path(rospkg.RosPack().get_path("lab_web")) / "page")
+        token = "drive"
+        case.start("rosrun", "lab_web", "lab_web", "--port", "0", "--token", token)
+        case.addCleanup(rospy.delete_param, "/lab_web/address")
+        wait_until(lambda: rospy.has_param("/lab_web/address"), "the page's address", 90.0)
+        self.browser = Browser(1000, 800)
+        case.addCleanup(self.browser.close)
+        self.browser.open(rospy.get_param("/lab_web/address") + "?token=" + token)
+        self.browser.wait("globalThis.lab?.state.connected && lab.state.robot && lab.view.revision !== null")
+        self.browser.wait("!document.getElementById('control').disabled")
+        self.browser.click("#control")
+        self.browser.wait("lab.state.mine && lab.state.robot.enabled")
+        self.browser.evaluate("document.getElementById('steering-open').open = true")
+        self.browser.wait("!document.querySelector('#steer-up').disabled")
+        self.browser.evaluate("""(() => {
+            const slider = document.getElementById("steer-speed");
+            slider.value = %d;
+            slider.oninput();
+            document.activeElement.blur();
+        })()""" % self.speed)
+        self._held = set()
+
+    def _hold(self, keys):
+        for name, kind in [*((name, "keyUp") for name in self._held - keys),
+                           *((name, "keyDown") for name in keys - self._held)]:
+            self.browser.call("Input.dispatchKeyEvent", type=kind, key=name, code="Key" + name.upper())
+        self._held = keys
+
+    def push(self, way):
+        if self._held and not self.browser.evaluate("lab.steering.held.size"):
+            self._hold(set())  # a page that was silent too long has let go
+        self._hold({names[value < 0.0] for value, names in zip(way, ("ws", "ad", "rf"), strict=True)
+                    if abs(value) > 0.5 * NEAR_M})
+
+    def let_go(self):
+        self._hold(set())
+
+    def close_gripper(self):
+        self.browser.click("#%s-close" % SIDE)
+
+    def mark(self):
+        self.browser.click("#steer-success")
+
+
+class PagePad(PageKeys):
+    """A gamepad of the browser's Gamepad API, as the page reads it."""
+
+    speed = 100
+
+    def __init__(self, case):
+        super().__init__(case)
+        self.browser.evaluate("""globalThis.pad = {connected: true, mapping: "standard", axes: [0, 0, 0, 0],
+            buttons: Array.from({length: 17}, () => ({pressed: false}))}; navigator.getGamepads = () => [null, pad]""")
+        self.browser.wait("!lab.steering.padLocked")
+
+    def push(self, way):
+        ahead, left, up = np.clip(5.0 * way / FULL_M_S, -1.0, 1.0).tolist()
+        # A page that was silent too long has let go: the button has to be pressed again.
+        self.browser.evaluate("pad.axes = [%g, %g, 0, %g]; pad.buttons[5].pressed = !lab.steering.padLocked"
+                              % (-left, -ahead, -up))
+
+    def let_go(self):
+        self.browser.evaluate("pad.buttons[5].pressed = false; pad.axes = [0, 0, 0, 0]")
+
+    def close_gripper(self):
+        self._press(1)
+
+    def mark(self):
+        self._press(3)
+
+    def _press(self, number):
+        """Press a button as long as the page needs to see it."""
+        for is_pressed in ("true", "false"):
+            self.browser.evaluate("pad.buttons[%d].pressed = %s" % (number, is_pressed))
+            self.browser.evaluate("new Promise((done) => setTimeout(done, 200))")
+
+
 class PickTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -318,6 +408,12 @@ class PickTest(unittest.TestCase):
 
     def test_leader(self):
         self.pick(LeadingRobot)
+
+    def test_page_keys(self):
+        self.pick(PageKeys)
+
+    def test_page_gamepad(self):
+        self.pick(PagePad)
 
     def test_cuff(self):
         self.pick(Cuff)
