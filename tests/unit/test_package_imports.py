@@ -25,11 +25,14 @@ SHARES = (Path("/usr/share"), Path("/opt/ros/noetic/share"))
 NO_PARTS = ("src/courses/rf_checks/exercises/", "src/courses/rf_checks/test/wrong/")
 
 
-def imported(text):
-    """Names of the modules that a program imports, at the top or later, each by its first part."""
+def imported(text, for_types=True):
+    """Names of the modules that a program imports, at the top or later, each by its first part. ``for_types``: those
+    below ``if TYPE_CHECKING``, too."""
     names, left = set(), [ast.parse(text)]
     while left:
         node = left.pop()
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING" and not for_types:
+            continue
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -72,9 +75,12 @@ def uses():
         package = next((name for folder, name in folders if file.startswith(folder)), None)
         if package is None or file.startswith(NO_PARTS) or not is_python(file):
             continue
-        for module in sorted(imported((ROOT / file).read_text(encoding="utf-8"))):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        when_run = imported(text, for_types=False)
+        for module in sorted(imported(text)):
             needed = owner.get(module) or of_ros(module)
-            if needed not in (None, package):
+            # A program runs without what only its types name; of our own packages, types count, too.
+            if needed not in (None, package) and (module in when_run or needed in PACKAGES):
                 found.append((package, file, needed))
     return tuple(found)
 
@@ -155,6 +161,12 @@ def test_a_room_imports_from_itself_and_from_lower_floors_alone():
 ])
 def test_every_kind_of_import_is_seen(text, names):
     assert imported(text) == names
+
+
+def test_imports_for_types_alone_can_be_left_out():
+    text = "import a\nif TYPE_CHECKING:\n    from b import c\nif d:\n    import e"
+    assert imported(text) == {"a", "b", "e"}
+    assert imported(text, for_types=False) == {"a", "e"}
 
 
 def test_a_circle_is_seen():
