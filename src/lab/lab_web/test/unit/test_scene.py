@@ -77,7 +77,7 @@ def test_a_new_body_makes_a_new_picture(writer):
 
 def test_parts_have_the_coarsest_triangles_that_are_near_the_original():
     plain, near, finest = (np.full((3 * count, 6), count, np.float32) for count in (1, 4, 9))
-    levels = tuple(Level(error_m, lambda rows=rows: rows)
+    levels = tuple(Level(error_m, lambda rows=rows: rows, lambda rows=rows: np.zeros((len(rows), 2)))
                    for error_m, rows in ((0.001, finest), (0.0025, near), (0.01, plain)))
     part = Part("shape", plain, (1.0, 0.0, 0.0, 1.0), levels=levels)
     body = SimpleNamespace(parts=[[part, Part("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[], link_names=["a"])

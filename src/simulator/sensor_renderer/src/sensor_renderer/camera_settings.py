@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings of a camera: from parameters at first, then through dynamic_reconfigure."""
+from __future__ import annotations
+
 import dataclasses
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
 
 import rospy
 
@@ -8,6 +12,10 @@ from loop_ros.reconfigure import Setting
 from sensor_renderer.errors import SensorError
 from sensor_renderer.exposure import GAINS_DB, LONGEST_S, ExposureSettings
 from sensor_renderer.topics import ReconfigureServer
+
+if TYPE_CHECKING:
+    from sensor_renderer.imager import Imager
+    from sensor_renderer.topics import LearningTopics
 
 #: Parameters below this name are for all cameras, those below a camera's own name for this one.
 ALL_CAMERAS = "/sensor_renderer"
@@ -37,7 +45,8 @@ class CameraSettings:
     #: These topics need no picture.
     has_listeners = False
 
-    def __init__(self, name, apply, noise=(0.0, 0.0), more=()):
+    def __init__(self, name: str, apply: Callable[[CameraSettings], object], noise: tuple[float, float] = (0.0, 0.0),
+                 more: Iterable[Setting] = ()) -> None:
         """``name``: the camera's in ROS; ``apply(self)`` is called now, and in a service's thread after each change;
         ``noise``: (mean, standard deviation) as the description has it; ``more``: further settings. Raises
         :class:`SensorError` for a parameter that is of no use."""
@@ -52,23 +61,23 @@ class CameraSettings:
         self._values = values
         self._apply(self)
 
-    def value(self, name):
+    def value(self, name: str) -> Any:
         """The value of one setting."""
         return self._values[name]
 
     @property
-    def exposure(self):
+    def exposure(self) -> ExposureSettings:
         """The :class:`sensor_renderer.exposure.ExposureSettings`."""
         return ExposureSettings(**{field.name: self._values[field.name]
                                    for field in dataclasses.fields(ExposureSettings)})
 
-    def apply(self, imager, learning):
+    def apply(self, imager: Imager, learning: LearningTopics) -> None:
         """Pass the values on to a :class:`sensor_renderer.imager.Imager` and to its LearningTopics."""
         imager.exposure = self.exposure
         imager.set_noise(self._values["noise_mean"], self._values["noise_stddev"])
         learning.open(self._values["learning_topics"])
 
-    def close(self):
+    def close(self) -> None:
         """Unregister topics and service."""
         self._server.close()
 

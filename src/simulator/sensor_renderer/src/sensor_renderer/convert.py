@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From pictures to messages."""
+from __future__ import annotations
+
 import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
@@ -8,26 +12,30 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, Poi
 from sensor_renderer.pictures import Cloud, encoded
 from sim_time.stamps import stamp
 
+if TYPE_CHECKING:
+    from sensor_renderer.pinhole import Pinhole
+
+Stamped = TypeVar("Stamped", CameraInfo, CompressedImage, Image, PointCloud2)
 _BIG_ENDIAN = sys.byteorder == "big"
 #: image_transport's own default.
 JPEG_QUALITY = 80
 
 
-def header(message, time_s, frame):
+def header(message: Stamped, time_s: float, frame: str) -> Stamped:
     """``message`` with its header filled: simulation time [s] and frame."""
     message.header.stamp = stamp(time_s)
     message.header.frame_id = frame
     return message
 
 
-def image(picture, encoding):
+def image(picture: np.ndarray, encoding: str) -> Image:
     """sensor_msgs/Image of a colour picture (height, width, 3)."""
     data, step = encoded(picture, encoding)
     return Image(height=picture.shape[0], width=picture.shape[1], encoding=encoding, is_bigendian=0, step=step,
                  data=data)
 
 
-def values_image(values):
+def values_image(values: np.ndarray) -> Image:
     """sensor_msgs/Image of one number a pixel, (height, width): uint8 (mono8), uint16 (mono16), float32 (32FC1); or of
     two, (height, width, 2) of float32 (32FC2)."""
     height, width = values.shape[:2]
@@ -37,7 +45,7 @@ def values_image(values):
                  data=data)
 
 
-def depth_image(values):
+def depth_image(values: np.ndarray) -> Image:
     """sensor_msgs/Image of float32 metres or uint16 millimetres (height, width)."""
     message = values_image(values)
     if message.encoding == "mono16":
@@ -45,7 +53,7 @@ def depth_image(values):
     return message
 
 
-def compressed_image(picture, quality=JPEG_QUALITY):
+def compressed_image(picture: np.ndarray, quality: int = JPEG_QUALITY) -> CompressedImage:
     """sensor_msgs/CompressedImage, JPEG of ``quality`` (1 to 100), of a colour picture (height, width, 3)."""
     import cv2
 
@@ -54,7 +62,7 @@ def compressed_image(picture, quality=JPEG_QUALITY):
     return CompressedImage(format="rgb8; jpeg compressed bgr8", data=data.tobytes())
 
 
-def camera_info(pinhole, baseline_m=0.0, distortion=(0.0,) * 5):
+def camera_info(pinhole: Pinhole, baseline_m: float = 0.0, distortion: Iterable[float] = (0.0,) * 5) -> CameraInfo:
     """sensor_msgs/CameraInfo; ``baseline_m`` as stereo's second camera has it; ``distortion``: k1, k2, p1, p2, k3."""
     fx, fy, cx, cy = pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy
     return CameraInfo(
@@ -63,7 +71,7 @@ def camera_info(pinhole, baseline_m=0.0, distortion=(0.0,) * 5):
         P=[fx, 0.0, cx, -fx * baseline_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
-def point_cloud(points):
+def point_cloud(points: np.ndarray) -> PointCloud2:
     """sensor_msgs/PointCloud2 of :meth:`Cloud.points`."""
     height, width = points.shape[:2]
     fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate(("x", "y", "z", "rgb"))]

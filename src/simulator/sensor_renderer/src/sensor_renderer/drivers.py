@@ -4,7 +4,10 @@
 A driver is made from a :class:`SensorEntry`. The drawing thread asks whether it is due and makes it publish.
 ``config/camera_drivers.yaml`` maps plugin file names to drivers.
 """
+from __future__ import annotations
+
 import zlib
+from typing import TYPE_CHECKING
 
 from rosgraph.names import is_legal_name
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
@@ -19,13 +22,17 @@ from sensor_renderer.structured_light import StructuredLight
 from sensor_renderer.topics import ColourTopics, LearningTopics, Topic, Trigger
 from sim_time.pace import Pace
 
+if TYPE_CHECKING:
+    from sensor_renderer.moments import Moment
+    from sensor_renderer.sensor_element import SensorEntry
+
 _FASTEST_HZ = 1000.0
 
 
 class Driver:
     """Base class: what all cameras have."""
 
-    def __init__(self, entry):
+    def __init__(self, entry: SensorEntry) -> None:
         """Raises :class:`sensor_renderer.errors.SensorError` for a sensor that cannot be used."""
         self.entry = entry
         self.topics = []
@@ -33,7 +40,7 @@ class Driver:
         #: How long the world must remember its states for this sensor [s].
         self.memory_s = 0.0
 
-    def name(self, text):
+    def name(self, text: str) -> str:
         """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for an invalid name."""
         name = text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
         if not is_legal_name(name):
@@ -42,42 +49,42 @@ class Driver:
         return name
 
     @property
-    def rate_setting(self):
+    def rate_setting(self) -> Setting:
         """The setting of the rate, under the name that Gazebo's cameras use."""
         return Setting("imager_rate", self._pace.rate, 0.0, _FASTEST_HZ,
                        "pictures a second [Hz]; 0: one of every state")
 
-    def seed(self, camera_name):
+    def seed(self, camera_name: str) -> int:
         """The seed of a camera's noise: the same in every run, another for each camera."""
         return zlib.crc32(("%s %s" % (self.entry, camera_name)).encode())
 
-    def under_camera(self, text, camera_name):
+    def under_camera(self, text: str, camera_name: str) -> str:
         """A topic below the camera's own name."""
         return self.name(text if text.startswith("/") else "%s/%s" % (camera_name, text))
 
     @property
-    def has_listeners(self):
+    def has_listeners(self) -> bool:
         """Whether a topic of this sensor has subscribers."""
         return any(topic.has_listeners for topic in self.topics)
 
-    def time_was_reset(self):
+    def time_was_reset(self) -> None:
         """The next state is new, even if its time is the same."""
         self._pace.restart()
 
-    def is_due(self, time_s):
+    def is_due(self, time_s: float) -> bool:
         """Whether there is anything to do for the state at ``time_s``."""
         return self._pace.is_due(time_s) and self.has_listeners
 
-    def take(self, moment):
+    def take(self, moment: Moment) -> None:
         """Publish the view at a :class:`sensor_renderer.moments.Moment` of the sensor's link."""
         self._pace.took(moment.time_s)
         self.publish(moment)
 
-    def publish(self, moment):
+    def publish(self, moment: Moment) -> None:
         """Draw and publish the topics that have subscribers."""
         raise NotImplementedError
 
-    def close(self):
+    def close(self) -> None:
         """Close the topics: the sensor was deleted."""
         for topic in self.topics:
             topic.close()
@@ -87,7 +94,7 @@ class Camera(Driver):
     """``libgazebo_ros_camera.so``, ``libgazebo_ros_prosilica.so``, and with a folder for each camera
     ``libgazebo_ros_multicamera.so``."""
 
-    def __init__(self, entry):
+    def __init__(self, entry: SensorEntry) -> None:
         super().__init__(entry)
         cameras = entry.cameras()
         base = entry.text("cameraName", entry.name)
@@ -106,7 +113,7 @@ class Camera(Driver):
                                         more=[self.rate_setting])
         self.topics.append(self._settings)
 
-    def takes(self, number):
+    def takes(self, number: int) -> bool:
         """Whether the camera of that number takes this picture."""
         return True
 
@@ -116,7 +123,7 @@ class Camera(Driver):
         for imager, _, learning, _ in self._cameras:
             settings.apply(imager, learning)
 
-    def publish(self, moment):
+    def publish(self, moment: Moment) -> None:
         for number, (imager, topics, learning, info) in enumerate(self._cameras):
             if not self.takes(number):
                 continue
@@ -130,26 +137,26 @@ class TriggeredCamera(Camera):
     std_msgs/Empty on ``triggerTopicName`` (image_trigger) below the name of each
     camera. A trigger without a subscriber to the pictures is used up."""
 
-    def __init__(self, entry):
+    def __init__(self, entry: SensorEntry) -> None:
         super().__init__(entry)
         self._triggers = [Trigger(self.under_camera(entry.text("triggerTopicName", "image_trigger"), folder))
                           for folder in self._folders]
         self.topics += self._triggers
 
-    def is_due(self, time_s):
+    def is_due(self, time_s: float) -> bool:
         if not self.has_listeners:
             for trigger in self._triggers:
                 trigger.clear()
         return any(trigger.count for trigger in self._triggers) and super().is_due(time_s)
 
-    def takes(self, number):
+    def takes(self, number: int) -> bool:
         return self._triggers[number].take()
 
 
 class DepthCamera(Driver):
     """``libgazebo_ros_openni_kinect.so`` and ``libgazebo_ros_depth_camera.so``: colour, depth, points."""
 
-    def __init__(self, entry):
+    def __init__(self, entry: SensorEntry) -> None:
         super().__init__(entry)
         self._camera = entry.cameras()[0]
         pinhole = self._camera.pinhole
@@ -189,7 +196,7 @@ class DepthCamera(Driver):
         elif self._pattern is None:
             self._pattern = StructuredLight(self._camera.pinhole, self.seed("depth"))
 
-    def publish(self, moment):
+    def publish(self, moment: Moment) -> None:
         points = self._points.has_listeners
         want_colour, want_depth = points or self._colour.want_picture, points or self._depth.has_listeners
         pattern, picture, depth = self._pattern, None, None

@@ -5,6 +5,9 @@ The model is the linear one of EMVA standard 1288 (release 3.1, section 2): a pi
 light and time, up to its full well; their number varies by its root (shot noise) and by that of reading it out; gain
 multiplies all of it. Light is linear here, while pictures carry sRGB's tone curve (IEC 61966-2-1).
 """
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +51,7 @@ class ExposureSettings:
     read_noise: float = 0.0
 
     @property
-    def is_ideal(self):
+    def is_ideal(self) -> bool:
         """Whether pictures stay as they are drawn."""
         return not (self.exposure_time or self.gain or self.auto_exposure or self.full_well)
 
@@ -56,13 +59,13 @@ class ExposureSettings:
 class Exposure:
     """The sensor of one camera."""
 
-    def __init__(self, seed=0):
+    def __init__(self, seed: int = 0) -> None:
         """``seed``: a whole number from 0. Noise depends on it and on the time of the picture."""
         self._seed = seed
         self._bank = None
         self._auto_db = 0.0
 
-    def developed(self, pictures, settings, time_s):
+    def developed(self, pictures: Sequence[np.ndarray], settings: ExposureSettings, time_s: float) -> np.ndarray:
         """The picture (height, width, 3) uint8 that the sensor makes of ``pictures``, the same view at moments spread
         evenly over the exposure, at ``time_s`` [s]. ``settings``: :class:`ExposureSettings`."""
         if settings.is_ideal:
@@ -96,7 +99,7 @@ class Exposure:
         self._auto_db = float(np.clip(self._auto_db + _PACE * step_db, *GAINS_DB))
 
 
-def from_bank(bank, shape, seed, time_s):
+def from_bank(bank: np.ndarray, shape: tuple[int, ...], seed: int, time_s: float) -> np.ndarray:
     """Values of ``bank`` (n,) in the shape of a picture, from a place that the seed and the time [s] decide."""
     start = int(np.random.default_rng([seed, round(1e6 * max(time_s, 0.0))]).integers(len(bank)))
     return np.resize(np.roll(bank, -start), shape)

@@ -1,8 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The floor: a sheet around the part of it to which shadows reach. ROS-free."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sensor_renderer.mirror import FLOOR_HALF_M
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from sensor_renderer.programs import Programs
 
 # Light more slanted than this (sine of its angle to the floor) throws shadows over too much of it.
 _MIN_SLANT = 0.15
@@ -16,7 +26,7 @@ _RING = tuple(corner for k in range(4) for corner in (k, 4 + k, 4 + (k + 1) % 4,
 class Floor:
     """The floor of one context: in software, most of its pixels then need not look into the shadow map."""
 
-    def __init__(self, context, programs):
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         """``programs``: :class:`sensor_renderer.programs.Programs`."""
         self._context = context
         self._programs = programs
@@ -26,19 +36,20 @@ class Floor:
         self._inner_index, self._ring_index = (context.buffer(np.int32(index).tobytes()) for index in (_INNER, _RING))
         self._arrays = ()
 
-    def build(self):
+    def build(self) -> None:
         """Make the vertex arrays for the programs as they are now."""
         layout = [(self._buffer, "3f 3f 4f", "position", "normal", "colour")]
         self._arrays = (self._context.vertex_array(self._programs.floor, layout, self._inner_index),
                         self._context.vertex_array(self._programs.bare_floor, layout, self._ring_index))
 
-    def clear(self):
+    def clear(self) -> None:
         """Release the vertex arrays."""
         for array in self._arrays:
             array.release()
         self._arrays = ()
 
-    def draw(self, colour, matrix, packed, corners):
+    def draw(self, colour: Sequence[float], matrix: np.ndarray, packed: np.ndarray,
+             corners: tuple[np.ndarray, np.ndarray]) -> None:
         """Draw it at ``matrix`` (4, 4), ``packed`` as OpenGL reads it, in ``colour``. ``corners``: as
         :meth:`sensor_renderer.shadows.Shadows.corners`."""
         outer = FLOOR_HALF_M * _SIGNS
@@ -53,7 +64,7 @@ class Floor:
             array.render()
 
 
-def on_floor(matrix, corners, away):
+def on_floor(matrix: np.ndarray, corners: np.ndarray, away: np.ndarray) -> np.ndarray | None:
     """Where the floor at ``matrix`` (4, 4) meets the edges of the column from ``corners`` (4, 3) along ``away`` (3): x
     and y (4, 2) on the floor, counter-clockwise; None where the column hardly meets it."""
     upright = matrix[:3, 2]

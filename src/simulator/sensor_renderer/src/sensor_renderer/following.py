@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A mirror of the world that follows one simulator's snapshot. ROS-free."""
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
 from model_files.resources import ResourceFinder
 from sensor_renderer.mirror import Mirror
 from world_picture.drawing import DrawingCache
@@ -11,7 +16,8 @@ class WorldFollower:
     number of the scene that it shows, None before the first; ``snapshot``: the state that it shows; ``warn(text)``.
     """
 
-    def __init__(self, folder, warn, drawings=None):
+    def __init__(self, folder: str | os.PathLike[str], warn: Callable[[str], object],
+                 drawings: DrawingCache | None = None) -> None:
         """``drawings``: as for :class:`sensor_renderer.mirror.Mirror`; by default all meshes are waited for.
         Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         self._reader = SnapshotReader(folder)
@@ -20,11 +26,11 @@ class WorldFollower:
         self.revision = self.snapshot = None
 
     @property
-    def is_alive(self):
+    def is_alive(self) -> bool:
         """False once the simulator has ended."""
         return self._reader.is_alive
 
-    def follow(self):
+    def follow(self) -> bool:
         """Move the mirror's bodies to the newest state. Returns whether there is one that fits its scene. Raises
         SnapshotError.
         """

@@ -3,9 +3,11 @@
 
 Everything here belongs to the thread that made the renderer.
 """
+from __future__ import annotations
+
 import math
 import os
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +20,10 @@ from sensor_renderer.shadows import Shadows
 from sensor_renderer.sides import Sides
 from sensor_renderer.targets import Targets
 from sensor_renderer.textures import Textures
+
+if TYPE_CHECKING:
+    from sensor_renderer.mirror import Mirror
+    from sensor_renderer.pinhole import Pinhole
 
 # The sky's colours are computed at the corners of so many cells along each side of a picture.
 _SKY_CELLS = 12
@@ -40,7 +46,7 @@ LIVE, STILL = Quality(512, 1), Quality(2048, 5)
 class GlRenderer:
     """Draws a :class:`sensor_renderer.mirror.Mirror`."""
 
-    def __init__(self, still=False):
+    def __init__(self, still: bool = False) -> None:
         """``still``: for pictures that may take a second each, with smoother edges and finer shadows. Raises
         :class:`RenderingError` if EGL is not available."""
         # In software no threads but this one: physics and the user's own programs need the other processors, and
@@ -77,7 +83,8 @@ class GlRenderer:
         # The sky is at the largest depth.
         self._context.depth_func = "<="
 
-    def render(self, mirror, pinhole, pose, colour=True, depth=False):
+    def render(self, mirror: Mirror, pinhole: Pinhole, pose: np.ndarray, colour: bool = True,
+               depth: bool = False) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Draw the view of a camera whose optical frame is at ``pose`` (4, 4) in the world.
 
         Returns (picture, depth): uint8 (height, width, 3) red, green, blue, and float32 (height, width) metres along
@@ -118,7 +125,8 @@ class GlRenderer:
             distance = pinhole.depth_from_buffer(target.depth())
         return picture, distance
 
-    def identify(self, mirror, pinhole, pose):
+    def identify(self, mirror: Mirror, pinhole: Pinhole,
+                 pose: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]], np.ndarray]:
         """The body at each pixel of the same view: (numbers, links, depth).
 
         ``numbers``: uint16 (height, width), 0 for nothing, else one more than the index in ``links``, a list of
@@ -144,13 +152,13 @@ class GlRenderer:
         raw = np.frombuffer(depth_texture.read(alignment=1), np.float32).reshape(size)
         return numbers, links, pinhole.depth_from_buffer(raw)
 
-    def prepare(self, mirror):
+    def prepare(self, mirror: Mirror) -> None:
         """Make all levels of detail of what ``mirror`` shows; what takes long is then on disk."""
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
         self._links.prepare(mirror)
 
-    def close(self):
+    def close(self) -> None:
         """Release the context."""
         self._context.release()
 

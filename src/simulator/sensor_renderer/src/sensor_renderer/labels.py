@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Labels of pixels: masks of models and of their classes, and the pixels' motion. ROS-free."""
+from __future__ import annotations
+
 import fnmatch
 import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from sensor_renderer.moments import Moment
+    from sensor_renderer.sensor_element import CameraElement
 
 #: Largest numbers of the masks; a class beyond is counted as the last one.
 MAX_CLASSES, MAX_MODELS = 255, 65535
@@ -15,7 +23,7 @@ _ENDING = re.compile(r"([_-]?\d+|_clone)+$")
 class Labels:
     """Numbers of models and of classes, the same for all cameras. A number is never used again."""
 
-    def __init__(self, classes=()):
+    def __init__(self, classes: Iterable[tuple[str, Iterable[str]]] = ()) -> None:
         """``classes``: [(class's name, [patterns of models' names, as in a shell])]; they get the numbers from 1 on, in
         this order. Every other model is of the class that has its name, without a number at its end."""
         self._patterns = [(name, tuple(patterns)) for name, patterns in classes]
@@ -24,7 +32,7 @@ class Labels:
             self._number(self._classes, name, MAX_CLASSES)
         self._models = {NOTHING: 0}
 
-    def cover(self, models):
+    def cover(self, models: Iterable[str]) -> None:
         """Give every model in ``models`` (names) its numbers."""
         for model in models:
             if model not in self._models:
@@ -32,16 +40,16 @@ class Labels:
                 self._number(self._classes, self._class_of(model), MAX_CLASSES)
 
     @property
-    def models(self):
+    def models(self) -> dict[int, str]:
         """{number: model's name}."""
         return {number: name for name, number in self._models.items()}
 
     @property
-    def classes(self):
+    def classes(self) -> dict[int, str]:
         """{number: class's name}."""
         return {number: name for name, number in self._classes.items()}
 
-    def masks(self, numbers, links):
+    def masks(self, numbers: np.ndarray, links: Sequence[tuple[str, int]]) -> tuple[np.ndarray, np.ndarray]:
         """(classes uint8, models uint16), (height, width) each, of what :meth:`GlRenderer.identify` returns; 0 is
         nothing."""
         self.cover(model for model, _ in links)
@@ -60,7 +68,7 @@ class Labels:
         table.setdefault(name, min(len(table), most))
 
 
-def classes_of_parameter(value):
+def classes_of_parameter(value: object) -> list[tuple[str, list[str]]]:
     """The list that :class:`Labels` takes, of a list of {class: NAME, models: [PATTERN, ...]}. Raises
     ``ValueError``."""
     found = []
@@ -76,10 +84,11 @@ def classes_of_parameter(value):
 class Motion:
     """Optical flow between the pictures of one camera."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._before = None
 
-    def flow(self, camera, moment, numbers, links, depth):
+    def flow(self, camera: CameraElement, moment: Moment, numbers: np.ndarray, links: Sequence[tuple[str, int]],
+             depth: np.ndarray) -> np.ndarray:
         """float32 (height, width, 2): how far each pixel's point has moved in the picture since the last call, to the
         right and down [pixels]. The point at pixel p was at p - flow. NaN where nothing is, where it was behind the
         camera, and at the first call.

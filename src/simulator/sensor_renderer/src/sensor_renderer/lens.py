@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lenses that distort, by the model that ROS calls plumb_bob (Brown, "Decentering distortion of lenses", 1966, as
 OpenCV documents it). ROS-free."""
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sensor_renderer.errors import SensorError
 from sensor_renderer.pinhole import MAX_PIXELS, Pinhole
@@ -26,7 +29,7 @@ class Distortion(NamedTuple):
     p2: float = 0.0
     k3: float = 0.0
 
-    def distorted(self, rays):
+    def distorted(self, rays: npt.ArrayLike) -> np.ndarray:
         """Where rays (n, 2), x / z and y / z in the optical frame, arrive in the picture [focal lengths]."""
         x, y = np.asarray(rays, dtype=float).T
         square = x * x + y * y
@@ -34,7 +37,7 @@ class Distortion(NamedTuple):
         return np.stack([x * radial + 2.0 * self.p1 * x * y + self.p2 * (square + 2.0 * x * x),
                          y * radial + self.p1 * (square + 2.0 * y * y) + 2.0 * self.p2 * x * y], axis=1)
 
-    def rays(self, arrivals):
+    def rays(self, arrivals: npt.ArrayLike) -> np.ndarray:
         """The rays (n, 2) that arrive at ``arrivals`` (n, 2); ``ValueError`` if there is none, or if the picture folds
         over on the way there from its middle."""
         arrivals = np.asarray(arrivals, dtype=float)
@@ -66,7 +69,7 @@ class Distortion(NamedTuple):
 class Lens:
     """A camera whose lens distorts: an ideal camera that sees enough, and the way from its picture to this one's."""
 
-    def __init__(self, pinhole, distortion):
+    def __init__(self, pinhole: Pinhole, distortion: Distortion) -> None:
         """``pinhole``: size, focal lengths and principal point of the picture; raises :class:`SensorError` if the
         distortion is of no use there."""
         rows, columns = np.mgrid[0:pinhole.height, 0:pinhole.width].astype(float)
@@ -94,13 +97,13 @@ class Lens:
         self._columns, self._rows = places[..., 0].astype(np.float32), places[..., 1].astype(np.float32)
         self._nearest = np.round(places[..., 1]).astype(int), np.round(places[..., 0]).astype(int)
 
-    def picture(self, ideal):
+    def picture(self, ideal: np.ndarray) -> np.ndarray:
         """The picture (height, width, 3), uint8, of the ideal camera's."""
         import cv2
 
         return cv2.remap(ideal, self._columns, self._rows, cv2.INTER_LINEAR)
 
-    def nearest(self, ideal):
+    def nearest(self, ideal: np.ndarray) -> np.ndarray:
         """Values (height, width) of the ideal camera's, as depth, that must not be mixed at edges."""
         return ideal[self._nearest]
 

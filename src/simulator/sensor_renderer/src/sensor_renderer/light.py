@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The light of the scene, from the world file's description. ROS-free."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,25 +32,25 @@ class Lamp(NamedTuple):
     angle, falloff; ``shadow``: the row of its shadow maps, None for none."""
 
     type: str
-    place: tuple
-    colour: tuple
-    shine: tuple
-    fade: tuple
-    beam: tuple
-    cone: tuple
+    place: tuple[float, ...]
+    colour: tuple[float, ...]
+    shine: tuple[float, ...]
+    fade: tuple[float, ...]
+    beam: tuple[float, ...]
+    cone: tuple[float, ...]
     shadow: int | None = None
 
     @property
-    def kind(self):
+    def kind(self) -> tuple[str, bool]:
         """The kind of shader that it needs."""
         return self.type, self.shadow is not None
 
     @property
-    def far_m(self):
+    def far_m(self) -> float:
         """How far its shadow map reaches [m]."""
         return min(max(self.fade[3], 2.0 * LAMP_NEAR_M), 50.0)
 
-    def uniforms(self):
+    def uniforms(self) -> dict[str, Any]:
         """{name of the uniform: value}."""
         near, far = LAMP_NEAR_M, self.far_m
         # Depth in the map of the distance m along the axis: the first minus the second through m.
@@ -63,20 +66,20 @@ class Light(NamedTuple):
     diffuse and specular colour, black for none; ``shadows``: whether it casts any; ``lamps``: all others,
     :class:`Lamp`."""
 
-    ambient: tuple
-    background: tuple
+    ambient: tuple[float, ...]
+    background: tuple[float, ...]
     sky: bool
-    to_sun: tuple
-    sun: tuple
-    sun_shine: tuple
+    to_sun: tuple[float, ...]
+    sun: tuple[float, ...]
+    sun_shine: tuple[float, ...]
     shadows: bool
-    lamps: tuple
+    lamps: tuple[Lamp, ...]
 
     horizon = property(lambda self: _HORIZON if self.sky else self.background, doc="The sky's colour at the horizon.")
     zenith = property(lambda self: _ZENITH if self.sky else self.background, doc="The sky's colour overhead.")
 
     @classmethod
-    def of_scene(cls, listed, more=()):
+    def of_scene(cls, listed: Mapping[str, Any], more: Iterable[Mapping[str, Any]] = ()) -> Light:
         """``listed`` as from :meth:`gazebo_ros.world_lights.WorldLights.listed`; missing values get the defaults.
         ``more``: lights beside those, in the same form."""
         lights = listed.get("lights")

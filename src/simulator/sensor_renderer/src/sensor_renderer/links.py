@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links as vertex arrays, in levels of detail, and which of them a camera sees. ROS-free."""
+from __future__ import annotations
+
 import bisect
 import weakref
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,6 +15,14 @@ from sensor_renderer.mirror import MAX_UNUSED
 from sensor_renderer.sides import indexed
 from world_picture.reduction import reduced
 from world_picture.results import ResultCache
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from sensor_renderer.mirror import Material, Mirror, Part
+    from sensor_renderer.pinhole import Pinhole
+    from sensor_renderer.programs import Programs
+    from sensor_renderer.sides import Sides
 
 # How far the drawn surface of a link may be from its original, in pixels of the picture: a whole one in a live picture
 # of colour, where the half of it would cost a tenth more. In pictures of depth, whose values are compared with
@@ -24,6 +35,7 @@ _CASTER_SHARE, _CASTER_MIN = 0.2, 60
 _CASTER_M = 0.003
 # Part of the names of cached results: increase it when other triangles cast shadows or show their backs.
 _VERSION = 1
+Entry = TypeVar("Entry")
 
 
 @dataclass
@@ -37,14 +49,14 @@ class Link:
     half: np.ndarray
     radius: float
     is_floor: bool
-    parts: tuple = ()
+    parts: tuple[Part, ...] = ()
     is_mesh: bool = False
-    caster: object = None
-    by_level: dict = field(default_factory=dict)
-    by_step: dict = field(default_factory=dict)
+    caster: VertexArray | None = None
+    by_level: dict[tuple[int, ...], Arrays] = field(default_factory=dict)
+    by_step: dict[int, Arrays] = field(default_factory=dict)
 
     @cached_property
-    def steps(self):
+    def steps(self) -> list[float]:
         """The distances from the original [m] of all parts' levels, in order: between two of them the levels to draw
         are the same."""
         return sorted({level.error_m for part in self.parts for level in part.levels})
@@ -55,20 +67,20 @@ class Arrays(NamedTuple):
     without the backs that follow. ``textured``: (:class:`sensor_renderer.mirror.Material`, vertex array) for each
     material; ``colour`` is of the parts without one, or None."""
 
-    colour: object
-    depth: object
+    colour: VertexArray | None
+    depth: VertexArray
     corners: int = -1
-    textured: tuple = ()
+    textured: tuple[tuple[Material, VertexArray], ...] = ()
 
 
 class VertexArray:
     """A vertex array with its buffers, which it does not release by itself; ``vertices``: the number of corners."""
 
-    def __init__(self, array, buffers):
+    def __init__(self, array: moderngl.VertexArray, buffers: Iterable[moderngl.Buffer]) -> None:
         self.render, self.vertices = array.render, array.vertices
         self._held = array, *buffers
 
-    def release(self):
+    def release(self) -> None:
         """Give back their memory."""
         for held in self._held:
             held.release()
@@ -77,7 +89,7 @@ class VertexArray:
 class Links:
     """The vertex arrays of one context, one set for each different link."""
 
-    def __init__(self, context, programs, live, sides=None):
+    def __init__(self, context: moderngl.Context, programs: Programs, live: bool, sides: Sides | None = None) -> None:
         """``programs``: :class:`sensor_renderer.programs.Programs`; ``live``: for pictures at a camera's rate, whose
         meshes are coarser and cast the shadows of even fewer triangles; ``sides``:
         :class:`sensor_renderer.sides.Sides` if meshes are to be drawn from the front, None if from both sides."""
@@ -89,14 +101,14 @@ class Links:
         self._links = {}
         self._links_of = weakref.WeakKeyDictionary()
 
-    def clear(self):
+    def clear(self) -> None:
         """Release all arrays."""
         for link in self._links.values():
             _release(link)
         self._links = {}
         self._links_of.clear()
 
-    def everything(self, mirror):
+    def everything(self, mirror: Mirror) -> list[tuple[Link, np.ndarray, np.ndarray]]:
         """The links to draw: (:class:`Link`, matrix, the same as OpenGL reads it), one for each link that has
         shapes."""
         found = []
@@ -104,7 +116,7 @@ class Links:
             found += [entry for entry in self._of(body) if entry[0] is not None]
         return found
 
-    def named(self, mirror):
+    def named(self, mirror: Mirror) -> list[tuple[Link, np.ndarray, tuple[tuple[str, int], np.ndarray]]]:
         """The same, with ((model's name, link's number), the packed matrix) in place of the packed matrix."""
         return [(link, matrix, ((name, number), packed)) for name, body in mirror.bodies.items()
                 for number, (link, matrix, packed) in enumerate(self._of(body)) if link is not None]
@@ -127,13 +139,13 @@ class Links:
         for key in unused[:max(len(unused) - MAX_UNUSED, 0)]:
             _release(self._links.pop(key))
 
-    def prepare(self, mirror):
+    def prepare(self, mirror: Mirror) -> None:
         """Make all levels of detail of all links."""
         for link, _, _ in self.everything(mirror):
             for error_m in (0.0, *link.steps):
                 self._level(link, error_m)
 
-    def arrays(self, link, distance, pinhole, depth=False):
+    def arrays(self, link: Link, distance: float, pinhole: Pinhole, depth: bool = False) -> Arrays:
         """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
         for a picture of ``depth``."""
         error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, pinhole.near) / pinhole.fx
@@ -255,7 +267,8 @@ def _factor(part):
     return part.material.factor if part.material is not None else part.colour[:3]
 
 
-def visible(listed, pinhole, view):
+def visible(listed: Sequence[tuple[Link, np.ndarray, Entry]], pinhole: Pinhole,
+            view: np.ndarray) -> list[tuple[Link, np.ndarray, Entry, float]]:
     """The entries of ``listed``, (:class:`Link`, matrix, anything), whose boxes and spheres intersect the view frustum,
     near ones first; each with the distance of the sphere from the eye [m], negative inside."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world for the renderer: the bodies of the snapshot, posed by our own forward kinematics. ROS-free."""
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,10 @@ from world_picture.drawing import DrawingError, read_level, read_uv
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
 from world_picture.textures import find_texture
+
+if TYPE_CHECKING:
+    from urdf_model import Joint
+    from world_picture.drawing import DrawingCache
 
 DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
 _WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -37,8 +43,8 @@ class Level(NamedTuple):
     ``uv()`` -> the corners' places in a picture (3 m, 2), for parts with a material."""
 
     error_m: float
-    make: Callable
-    uv: Callable = None
+    make: Callable[[], np.ndarray]
+    uv: Callable[[], np.ndarray]
 
 
 class Material(NamedTuple):
@@ -48,9 +54,9 @@ class Material(NamedTuple):
     it is seen from behind; ``opacity``: how much of what is behind it is covered, 1 being all."""
 
     texture: str
-    factor: tuple
-    emission: tuple
-    repeats: tuple = (1.0, 1.0)
+    factor: tuple[float, ...]
+    emission: tuple[float, ...]
+    repeats: tuple[float, ...] = (1.0, 1.0)
     cut_out: bool = False
     two_sided: bool = True
     opacity: float = 1.0
@@ -62,25 +68,25 @@ class Part(NamedTuple):
     to 1. ``material``: None for a colour alone; else ``colour`` is about the mean. ``uv`` (3 m, 2): the corners' places
     in its picture, if there are no levels. ``is_mesh``: whether its triangles are of a mesh file."""
 
-    key: tuple
+    key: tuple[object, ...]
     triangles: np.ndarray
-    colour: tuple
+    colour: tuple[float, ...]
     is_floor: bool = False
-    levels: tuple = ()
+    levels: tuple[Level, ...] = ()
     gloss: float = GLOSS
-    material: Material = None
-    uv: np.ndarray = None
+    material: Material | None = None
+    uv: np.ndarray | None = None
     is_mesh: bool = False
 
-    def level(self, error_m):
+    def level(self, error_m: float) -> int:
         """The number of the coarsest level that is within ``error_m`` [m] of the original; 0, the finest, if none."""
         return max((number for number, level in enumerate(self.levels) if level.error_m <= error_m), default=0)
 
-    def triangles_of(self, number):
+    def triangles_of(self, number: int) -> np.ndarray:
         """The triangles of the level of that number."""
         return self.levels[number].make() if self.levels else self.triangles
 
-    def uv_of(self, number):
+    def uv_of(self, number: int) -> np.ndarray:
         """The places of the corners of the level of that number in the picture of its material (3 m, 2): to the right
         and down, in widths and heights of it."""
         uv = self.levels[number].uv() if self.levels else self.uv
@@ -96,7 +102,7 @@ class Screen(NamedTuple):
 
     link: str
     offset: np.ndarray
-    size: tuple
+    size: tuple[float, float]
     picture: PictureReader
     glows: bool = False
     radius: float = 0.0
@@ -105,7 +111,8 @@ class Screen(NamedTuple):
 class Body:
     """A model: its links as parts, its screens, and their poses."""
 
-    def __init__(self, links, joints, screens=(), static=False, lights=()):
+    def __init__(self, links: Sequence[tuple[str, list[Part]]], joints: Sequence[Joint], screens: Sequence[Screen] = (),
+                 static: bool = False, lights: Sequence[Mapping[str, Any]] = ()) -> None:
         """``links``: list of (name, parts), the roots first, then one for each ``urdf_model.Joint`` of ``joints``,
         parents first; ``static``: whether its first root is fixed in the world; ``lights``: as in the scene's entry, in
         the frames of their links.
@@ -128,32 +135,32 @@ class Body:
         self._shown = None
 
     @property
-    def has_lights(self):
+    def has_lights(self) -> bool:
         """Whether some of its links hold lights."""
         return bool(self._lights)
 
     @property
-    def sizes(self):
+    def sizes(self) -> list[int]:
         """Numbers of this body's values in a snapshot: of the first root's pose with the joints, then of the other
         roots' poses."""
         return [7 + len(self._joints)] + [7] * (self._roots - 1)
 
     @property
-    def size(self):
+    def size(self) -> int:
         """Number of this body's values in a snapshot."""
         return sum(self.sizes)
 
     @property
-    def link_names(self):
+    def link_names(self) -> list[str]:
         """The names of the links, parents first, as in ``parts`` and ``matrices``."""
         return list(self._index)
 
     @property
-    def joint_names(self):
+    def joint_names(self) -> list[str]:
         """The names of the joints, in the snapshot's order."""
         return [joint.name for joint in self._joints]
 
-    def set_state(self, values):
+    def set_state(self, values: np.ndarray) -> bool:
         """Set the poses of all links from ``values``, in the snapshot's order. Returns whether anything has moved."""
         if self._shown is not None and np.array_equal(values, self._shown):
             return False
@@ -177,7 +184,7 @@ class Body:
         motions[:, 3, 3] = 1.0
         return self._origins @ motions
 
-    def moved(self, positions):
+    def moved(self, positions: Mapping[str, float]) -> dict[int, np.ndarray]:
         """Poses in the world if the joints ``positions`` {name: [rad or m]} stood there, and the others as shown.
 
         Returns {link's number: pose (4, 4)} of the links that these joints move. Any thread may call it.
@@ -192,17 +199,17 @@ class Body:
                 found[number] = matrices[number] = matrices[parent] @ steps[number - self._roots]
         return found
 
-    def is_fixed(self, name):
+    def is_fixed(self, name: str) -> bool:
         """Whether a body link is fixed in the world; ``KeyError`` for an unknown one."""
         return self._static and self._index[name] == 0
 
-    def lights(self):
+    def lights(self) -> list[dict[str, Any]]:
         """The lights in its links, as the scene lists those of the world."""
         return [{**light, "place": (matrix[:3, :3] @ light["place"] + matrix[:3, 3]).tolist(),
                  "direction": (matrix[:3, :3] @ light["direction"]).tolist()}
                 for light in self._lights for matrix in [self.link_matrix(light["link"])]]
 
-    def link_matrix(self, name):
+    def link_matrix(self, name: str) -> np.ndarray:
         """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
         return self.matrices[self._index[name]]
 
@@ -211,16 +218,17 @@ class _Built(NamedTuple):
     """A body and the entry of the scene that it was made of; the same ``key`` means the same body. ``waits_for``: the
     keys of meshes that were not ready for it."""
 
-    key: tuple
-    entry: dict
+    key: tuple[object, ...]
+    entry: Mapping[str, Any]
     body: Body
-    waits_for: frozenset
+    waits_for: frozenset[str]
 
 
 class Mirror:
     """All bodies of the world."""
 
-    def __init__(self, drawings, find_mesh, warn):
+    def __init__(self, drawings: DrawingCache, find_mesh: Callable[[str], str | None],
+                 warn: Callable[[str], object]) -> None:
         """``drawings``: a ``world_picture.drawing.DrawingCache``, or a ``world_picture.background.BackgroundDrawings``,
         with which meshes may appear later, and collision shapes stand in for them; ``find_mesh(uri)`` -> path or None;
         ``warn(text)``."""
@@ -244,7 +252,7 @@ class Mirror:
         #: Counts visible changes, except pictures on screens.
         self.version = 0
 
-    def set_scene(self, listed, light=None):
+    def set_scene(self, listed: Iterable[Mapping[str, Any]], light: Mapping[str, Any] | None = None) -> None:
         """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; bodies that exist already stay."""
         self._world_light = light or {}
         known = self._bodies
@@ -259,7 +267,7 @@ class Mirror:
         self._show_bodies()
         self._forget_unused()
 
-    def complete(self):
+    def complete(self) -> None:
         """Show the models whose meshes have become ready. A state has to be set after it."""
         ready = [name for name in self.waiting if not self._drawings.is_making(self._bodies[name].waits_for)]
         if ready:
@@ -281,7 +289,7 @@ class Mirror:
             for key in unused[:max(len(unused) - MAX_UNUSED, 0)]:
                 del self._parts[key]
 
-    def set_state(self, values):
+    def set_state(self, values: np.ndarray) -> None:
         """Move all bodies to the poses in a snapshot's ``values``."""
         start, moved = 0, False
         for body in self.bodies.values():
@@ -296,7 +304,7 @@ class Mirror:
         self.light = Light.of_scene(self._world_light, lights)
 
     @property
-    def picture_versions(self):
+    def picture_versions(self) -> tuple[int, ...]:
         """The numbers of the pictures that the screens show; one of them changes with each new picture."""
         return tuple(screen.picture.version for body in self.bodies.values() for screen in body.screens)
 

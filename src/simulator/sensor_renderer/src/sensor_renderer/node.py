@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The /sensor_renderer node: follows the simulator's snapshot and draws the pictures of topics with subscribers."""
+from __future__ import annotations
+
 import contextlib
 import importlib
 import os
@@ -7,6 +9,8 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, NoReturn
 
 import rospkg
 import rospy
@@ -25,6 +29,10 @@ from sensor_renderer.priority import DRAWING
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError, SnapshotReader
+
+if TYPE_CHECKING:
+    from sensor_renderer.gl_renderer import GlRenderer
+    from sensor_renderer.tiny_renderer import TinyRenderer
 
 # Polling periods [s]: of the snapshot with subscribers, of the subscribers while there are none, of the snapshot
 # meanwhile, and of the search for a simulator.
@@ -49,7 +57,8 @@ CLASSES = "/sensor_renderer/semantic_classes"
 class SensorRenderer:
     """Sensors of the world by name, and the loop that serves them."""
 
-    def __init__(self, make_renderer, drivers, labels=None):
+    def __init__(self, make_renderer: Callable[[], GlRenderer | TinyRenderer], drivers: Mapping[str, str],
+                 labels: Labels | None = None) -> None:
         """``make_renderer()`` -> ``GlRenderer`` or ``TinyRenderer``, called before the first picture; ``drivers``:
         {file name: "module:Class"}; ``labels``: :class:`sensor_renderer.labels.Labels`."""
         self._drivers = drivers
@@ -64,7 +73,7 @@ class SensorRenderer:
         self._drawn_s = None
         self._left_told_at = 0.0
 
-    def run(self, stop):
+    def run(self, stop: Callable[[], bool]) -> None:
         """Serve until ``stop()``, across restarts of the simulator."""
         while not stop():
             reader = _find_snapshot(stop)
@@ -83,7 +92,7 @@ class SensorRenderer:
                         rospy.logwarn_throttle(10.0, str(error))
                 time.sleep(max(0.0005, (_LOOK_S if wanted else _IDLE_S) - (time.monotonic() - began)))
 
-    def close(self):
+    def close(self) -> None:
         """Close every sensor's topics."""
         self._set_sensors([])
 
@@ -223,7 +232,7 @@ def _labels():
         return Labels()
 
 
-def make_renderer():
+def make_renderer() -> GlRenderer | TinyRenderer:
     """Return the best renderer of this machine, and log which one it is."""
     renderer, problem = best_renderer()
     if problem:
@@ -239,7 +248,7 @@ def _wait_for_end_of_input(ending):
     ending.set()
 
 
-def leave_anyway(ending, after_s, leave):
+def leave_anyway(ending: threading.Event, after_s: float, leave: Callable[[], object]) -> None:
     """Call ``leave()`` so long after ``ending`` [s], in a separate thread: the shapes of a large world are being made
     for longer than roslaunch waits, on a busy machine, and it kills what stays.
     """
@@ -250,7 +259,7 @@ def leave_anyway(ending, after_s, leave):
     threading.Thread(target=wait, name="leave_anyway", daemon=True).start()
 
 
-def main():
+def main() -> NoReturn:
     """Draw until a signal or a shutdown request; returns the exit code."""
     # Physics comes first.
     give_way(DRAWING)

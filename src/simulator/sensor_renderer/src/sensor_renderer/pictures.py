@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Processing of pictures before they are published, and points from depth. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from sensor_renderer.pinhole import Pinhole
 
 # Size of the noise table, which is made once and shifted for each picture.
 _NOISE_LENGTH = 1 << 20
@@ -10,20 +17,20 @@ _BYTES = {"rgb8": 3, "bgr8": 3, "mono8": 1, "bgra8": 4}
 class Noise:
     """Normal noise on every value of a picture."""
 
-    def __init__(self, deviation, mean=0.0, seed=0):
+    def __init__(self, deviation: float, mean: float = 0.0, seed: int = 0) -> None:
         """``deviation``: standard deviation, and ``mean``, 1.0 being full brightness."""
         self._random = np.random.default_rng(seed)
         values = self._random.normal(255.0 * mean, 255.0 * deviation, _NOISE_LENGTH)
         self._values = np.round(values).astype(np.int16)
 
-    def add(self, picture):
+    def add(self, picture: np.ndarray) -> np.ndarray:
         """The picture (uint8) with noise."""
         start = int(self._random.integers(_NOISE_LENGTH))
         noise = np.resize(np.roll(self._values, start)[:picture.size], picture.size).reshape(picture.shape)
         return np.clip(picture + noise, 0, 255).astype(np.uint8)
 
 
-def encoded(picture, encoding):
+def encoded(picture: np.ndarray, encoding: str) -> tuple[bytes, int]:
     """The bytes of a picture (height, width, 3) of red, green, blue in ROS's ``encoding``, and the bytes of a row."""
     if encoding != "mono8" and not (encoding == "rgb8" and picture.flags.c_contiguous):
         ordered = np.full((*picture.shape[:2], _BYTES[encoding]), 255, dtype=np.uint8)
@@ -36,13 +43,13 @@ def encoded(picture, encoding):
     return np.ascontiguousarray(picture).tobytes(), picture.shape[1] * _BYTES[encoding]
 
 
-def within(depth, nearest, furthest):
+def within(depth: np.ndarray, nearest: float, furthest: float) -> np.ndarray:
     """``depth`` (height, width) with NaN for values nearer or further than these limits [m]."""
     with np.errstate(invalid="ignore"):
         return np.where((depth >= nearest) & (depth <= furthest), depth, np.float32(np.nan))
 
 
-def millimetres(depth):
+def millimetres(depth: np.ndarray) -> np.ndarray:
     """``depth`` [m] as uint16 [mm]; 0 where there is none, or where it is too large for uint16."""
     with np.errstate(invalid="ignore"):
         rounded = np.round(depth * 1000.0)
@@ -54,7 +61,7 @@ class Cloud:
 
     POINT_BYTES = 16
 
-    def __init__(self, pinhole, rays=None):
+    def __init__(self, pinhole: Pinhole, rays: tuple[np.ndarray, np.ndarray] | None = None) -> None:
         """``rays``: x / z and y / z (height, width) of the pixels of a lens that distorts; without, the pinhole's."""
         if rays is not None:
             self._columns, self._rows = rays
@@ -63,7 +70,7 @@ class Cloud:
         rows = (np.arange(pinhole.height, dtype=np.float32) - pinhole.cy) / pinhole.fy
         self._columns, self._rows = columns.astype(np.float32)[None, :], rows.astype(np.float32)[:, None]
 
-    def points(self, depth, picture):
+    def points(self, depth: np.ndarray, picture: np.ndarray) -> np.ndarray:
         """float32 (height, width, 4) of ``depth`` (height, width) and ``picture`` (height, width, 3) in red, green,
         blue; NaN where depth is."""
         found = np.empty((*depth.shape, 4), dtype=np.float32)

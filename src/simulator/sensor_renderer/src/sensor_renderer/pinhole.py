@@ -4,10 +4,13 @@
 Its frame is the optical one of REP-103: z ahead, x right, y down. The centre of the top left pixel is (0, 0), so the
 picture spans -0.5 to width - 0.5, as ``sensor_msgs/CameraInfo`` and OpenCV count.
 """
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sensor_renderer.errors import SensorError
 
@@ -32,7 +35,7 @@ class Pinhole(NamedTuple):
     far: float
 
     @classmethod
-    def from_field_of_view(cls, width, height, horizontal_rad, near, far):
+    def from_field_of_view(cls, width: int, height: int, horizontal_rad: float, near: float, far: float) -> Pinhole:
         """A camera with square pixels that looks through the middle of its picture.
 
         Raises :class:`SensorError` for impossible values.
@@ -50,20 +53,20 @@ class Pinhole(NamedTuple):
                    float(far))
 
     @property
-    def blind_m(self):
+    def blind_m(self) -> float:
         """How far from the eye something may be and yet be too near to be seen [m]: to the corners of the rectangle at
         the nearest depth."""
         x = max(self.cx + 0.5, self.width - 0.5 - self.cx) / self.fx
         y = max(self.cy + 0.5, self.height - 0.5 - self.cy) / self.fy
         return self.near * math.sqrt(1.0 + x * x + y * y)
 
-    def project(self, points):
+    def project(self, points: npt.ArrayLike) -> np.ndarray:
         """Pixel coordinates (n, 2) of points (n, 3) [m] in the optical frame."""
         points = np.asarray(points, dtype=float)
         return np.stack([self.fx * points[:, 0] / points[:, 2] + self.cx,
                          self.fy * points[:, 1] / points[:, 2] + self.cy], axis=1)
 
-    def clip_matrix(self):
+    def clip_matrix(self) -> np.ndarray:
         """The (4, 4) matrix from the optical frame to OpenGL's clip space, the picture's first row at the bottom.
 
         OpenGL fills memory from the bottom row, so the memory then holds the picture from its top row.
@@ -75,7 +78,7 @@ class Pinhole(NamedTuple):
             [0.0, 0.0, (far + near) / (far - near), -2.0 * far * near / (far - near)],
             [0.0, 0.0, 1.0, 0.0]])
 
-    def depth_from_buffer(self, values):
+    def depth_from_buffer(self, values: np.ndarray) -> np.ndarray:
         """Distance along z [m] of depth buffer ``values`` (float32, 0 to 1); NaN where nothing was drawn."""
         near, far = np.float32(self.near), np.float32(self.far)
         with np.errstate(divide="ignore"):

@@ -3,9 +3,12 @@
 
     python3 -m sensor_renderer.prepare ROBOT.urdf.xacro...
 """
+from __future__ import annotations
+
 import argparse
 import contextlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from model_files.resources import ResourceFinder
@@ -16,7 +19,7 @@ from urdf_model import description_text
 from world_picture.drawing import DrawingCache
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """Prepare the robots of files, and return the exit status: 1 if one of them cannot be read."""
     parser = argparse.ArgumentParser(
         prog="sensor_renderer.prepare", description="Make the drawings of robots, so that their first pictures do not "
@@ -32,7 +35,7 @@ def main(arguments=None):
     return int(failed)
 
 
-def prepare(urdf):
+def prepare(urdf: str) -> None:
     """Make all that pictures of the robot ``urdf``, a text, need of its shapes.
 
     Raises ``ValueError`` for a text that is no robot; a mesh that cannot be read is one line on stderr.

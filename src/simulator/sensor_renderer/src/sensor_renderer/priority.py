@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import time
+from typing import NoReturn
 
 from processes.family import with_parent
 from processes.priority import give_way
@@ -54,7 +55,7 @@ def run(command: list[str]) -> int:
     return code
 
 
-def main():
+def main() -> NoReturn:
     """Run a command at a low priority, and end as it does."""
     if len(sys.argv) < 3 or sys.argv[1] not in map(str, range(20)):
         sys.exit("usage: python3 -m sensor_renderer.priority NICENESS COMMAND..., with a niceness of 0 to 19")

@@ -1,8 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The programs of the shaders in ``shaders``, and their uniforms. ROS-free."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sensor_renderer import shaders
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from sensor_renderer.light import Light
+    from sensor_renderer.links import VertexArray
+    from sensor_renderer.mirror import Material
+    from sensor_renderer.shadows import Shadows
+    from sensor_renderer.textures import Textures
 
 # What is seen of a mesh and what casts its shadow differ by up to about this much [m].
 _THINNED_M = 0.015
@@ -14,7 +28,7 @@ class Programs:
     number for each link; ``screen`` a picture on a rectangle, ``sky`` the background. :meth:`textured` draws what has a
     picture or light of its own, per pixel."""
 
-    def __init__(self, context, shadow_taps, per_pixel):
+    def __init__(self, context: moderngl.Context, shadow_taps: int, per_pixel: bool) -> None:
         """Compiles those that do not depend on the light. ``shadow_taps``: comparisons along one side of the square
         over which the edges of shadows are filtered; ``per_pixel``: whether ``mesh`` computes light per pixel too."""
         self._context = context
@@ -27,11 +41,11 @@ class Programs:
         self._textured = None
         self._kinds = self._light = self._shadows = None
 
-    def fit(self, light):
+    def fit(self, light: Light) -> bool:
         """Whether the programs are the ones for ``light`` already."""
         return self._kinds == _kinds(light)
 
-    def compile(self, light):
+    def compile(self, light: Light) -> None:
         """Make the programs for ``light``; vertex arrays of the old ones must have been released."""
         for old in self._lit:
             old.release()
@@ -44,7 +58,7 @@ class Programs:
         self.bare_floor = self._program(shaders.floor_shaders(False, lamps, self._taps, sky))
         self._lit = self.mesh, self.solid, self.floor, self.bare_floor
 
-    def textured(self):
+    def textured(self) -> moderngl.Program:
         """The program for what has a picture or light of its own. It is made when it is first needed: most worlds do
         without it, and each program costs time in each picture."""
         if self._textured is None:
@@ -56,7 +70,7 @@ class Programs:
                 self._shadow_by(self._shadows, self._textured)
         return self._textured
 
-    def light_by(self, light):
+    def light_by(self, light: Light) -> None:
         """Set the uniforms of ``light``."""
         self._light = light
         for program in self._lit:
@@ -73,13 +87,13 @@ class Programs:
             for name, value in lamp.uniforms().items():
                 set_uniform(program, "%s_%d" % (name, number), value)
 
-    def look(self, to_clip, eye):
+    def look(self, to_clip: np.ndarray, eye: np.ndarray) -> None:
         """Set the camera: from the world to clip space (4, 4), its place (3)."""
         for program in self._lit:
             program["to_clip"].write(matrix_bytes(to_clip))
             set_uniform(program, "eye", tuple(eye))
 
-    def shadow_by(self, shadows):
+    def shadow_by(self, shadows: Shadows) -> None:
         """Set where the maps of :class:`sensor_renderer.shadows.Shadows` are."""
         self._shadows = shadows
         for program in self._lit:
@@ -99,7 +113,7 @@ class Programs:
         return self._context.program(vertex_shader=vertex, fragment_shader=fragment)
 
 
-def set_uniform(program, name, value):
+def set_uniform(program: moderngl.Program, name: str, value: float | tuple[float, ...]) -> None:
     """Set the uniform ``name`` of ``program``, if it has it."""
     # The compiler leaves out what a program does not use.
     if name in program:
@@ -110,12 +124,13 @@ def _kinds(light):
     return light.shadows and any(light.sun), light.sky, tuple(lamp.kind for lamp in light.lamps)
 
 
-def matrix_bytes(matrix):
+def matrix_bytes(matrix: np.ndarray) -> bytes:
     """A (4, 4) matrix column by column, as OpenGL reads it."""
     return np.asarray(matrix, dtype=np.float32).T.tobytes()
 
 
-def draw(program, listed):
+def draw(program: moderngl.Program,
+         listed: Iterable[tuple[VertexArray, np.ndarray] | tuple[VertexArray, np.ndarray, int]]) -> None:
     """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, how many corners if not all)."""
     body = program["body"]
     for array, packed, *corners in listed:
@@ -123,7 +138,8 @@ def draw(program, listed):
         array.render(vertices=corners[0] if corners else -1)
 
 
-def draw_textured(program, listed, textures):
+def draw_textured(program: moderngl.Program, listed: Sequence[tuple[VertexArray, np.ndarray, Material]],
+                  textures: Textures) -> None:
     """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, its
     :class:`sensor_renderer.mirror.Material`), whose materials are all opaque or all transparent; the latter are drawn
     over what is behind them, in their order. ``textures``: :class:`sensor_renderer.textures.Textures`.

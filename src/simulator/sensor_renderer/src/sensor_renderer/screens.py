@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rectangles that show pictures, such as the robot's face. ROS-free."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sensor_renderer.links import Link, visible
 from sensor_renderer.programs import matrix_bytes
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from sensor_renderer.mirror import Mirror, Screen
+    from sensor_renderer.pinhole import Pinhole
 
 # A bent screen is drawn as so many flat stripes.
 _STRIPES = 72
@@ -12,7 +23,7 @@ _STRIPES = 72
 class Screens:
     """The textures of one context."""
 
-    def __init__(self, context, program):
+    def __init__(self, context: moderngl.Context, program: moderngl.Program) -> None:
         """``program``: the one that draws a picture on a rectangle."""
         self._context = context
         self._program = program
@@ -26,7 +37,7 @@ class Screens:
         corners = np.array([(x, y) for x in edges for y in (0.5, -0.5)], dtype=np.float32)
         return self._context.vertex_array(self._program, [(self._context.buffer(corners.tobytes()), "2f", "corner")])
 
-    def draw(self, screens, to_clip):
+    def draw(self, screens: Sequence[tuple[moderngl.Texture, np.ndarray, Screen]], to_clip: np.ndarray) -> None:
         """Draw ``screens``, as :meth:`visible` lists them."""
         if screens:
             self._program["to_clip"].write(matrix_bytes(to_clip))
@@ -41,7 +52,8 @@ class Screens:
             if screen.glows:
                 self._context.disable(self._context.BLEND)
 
-    def visible(self, mirror, pinhole, view):
+    def visible(self, mirror: Mirror, pinhole: Pinhole,
+                view: np.ndarray) -> list[tuple[moderngl.Texture, np.ndarray, Screen]]:
         """The screens that show their faces, lights last: (texture, matrix of the screen's frame,
         :class:`sensor_renderer.mirror.Screen`)."""
         faces = []

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The camera of an SDF ``<sensor>`` element, and the topics of its ``<plugin>``. ROS-free."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from lxml import etree
@@ -9,6 +12,9 @@ from sensor_renderer.errors import SensorError
 from sensor_renderer.lens import Distortion, Lens
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model.transforms import pose_matrix
+
+if TYPE_CHECKING:
+    from sensor_renderer.moments import Moment
 
 # SDF's defaults.
 _WIDTH, _HEIGHT, _FIELD_RAD = 320, 240, 1.047
@@ -34,7 +40,7 @@ class CameraElement(NamedTuple):
     lens: Lens | None = None
     noise_mean: float = 0.0
 
-    def view(self, moment, colour, depth):
+    def view(self, moment: Moment, colour: bool, depth: bool) -> tuple[np.ndarray | None, np.ndarray | None]:
         """(picture, depth) as this camera sees them at a :class:`sensor_renderer.moments.Moment`; None if not
         requested."""
         if self.lens is None:
@@ -43,7 +49,7 @@ class CameraElement(NamedTuple):
         return (None if picture is None else self.lens.picture(picture),
                 None if distance is None else self.lens.nearest(distance))
 
-    def identified(self, moment):
+    def identified(self, moment: Moment) -> tuple[np.ndarray, list[tuple[str, int]], np.ndarray]:
         """(numbers, links, depth) as :meth:`GlRenderer.identify` returns them, of this camera."""
         if self.lens is None:
             return moment.identify(self.pinhole, self.offset)
@@ -51,7 +57,7 @@ class CameraElement(NamedTuple):
         return self.lens.nearest(numbers), links, self.lens.nearest(distance)
 
     @property
-    def rays(self):
+    def rays(self) -> tuple[np.ndarray, np.ndarray]:
         """x / z and y / z, (height, width) each, of the pixels."""
         if self.lens is not None:
             return self.lens.rays
@@ -59,7 +65,7 @@ class CameraElement(NamedTuple):
         columns, rows = np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height))
         return (columns - pinhole.cx) / pinhole.fx, (rows - pinhole.cy) / pinhole.fy
 
-    def project(self, points):
+    def project(self, points: np.ndarray) -> np.ndarray:
         """Pixels (n, 2) of points (n, 3) [m] in the optical frame, through the lens."""
         if self.lens is None:
             return self.pinhole.project(points)
@@ -70,7 +76,7 @@ class CameraElement(NamedTuple):
 class SensorEntry:
     """A ``<sensor>`` with its ``<plugin>``, as the simulator lists it in its scene."""
 
-    def __init__(self, model, listed):
+    def __init__(self, model: str, listed: Mapping[str, Any]) -> None:
         """``listed``: ``link`` (a body of the model), ``offset`` (16 numbers, link frame in the body's), ``frame``
         (of its messages), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
 
@@ -92,11 +98,11 @@ class SensorEntry:
     def __str__(self):
         return "sensor '%s' of model '%s'" % (self.name, self.model)
 
-    def text(self, tag, default):
+    def text(self, tag: str, default: str) -> str:
         """Stripped text of the plugin's child ``tag``, or ``default`` where it is missing or empty."""
         return (self.plugin.findtext(tag) or "").strip() or default
 
-    def number(self, element, path, default):
+    def number(self, element: etree._Element, path: str, default: float) -> float:
         """A number in a child; raises :class:`SensorError`."""
         text = (element.findtext(path) or "").strip()
         try:
@@ -107,19 +113,19 @@ class SensorEntry:
             raise SensorError("%s: <%s> is '%s', expected a number" % (self, path, text))
         return value
 
-    def baseline_m(self, camera):
+    def baseline_m(self, camera: CameraElement) -> float:
         """The distance to the left camera in the projection of ``camera`` (a CameraElement), ``hackBaseline``: of
         several cameras, those that are not the right one have none."""
         alone = len(self.element.findall("camera")) < 2
         return self.number(self.plugin, "hackBaseline", 0.0) if alone or "right" in camera.name else 0.0
 
-    def cameras(self):
+    def cameras(self) -> list[CameraElement]:
         """The list of :class:`CameraElement`, one with SDF's defaults where no <camera> is; raises :class:`SensorError`
         for impossible ones."""
         found = self.element.findall("camera") or [etree.Element("camera")]
         return [self._camera(camera, number) for number, camera in enumerate(found)]
 
-    def stated(self, pinhole):
+    def stated(self, pinhole: Pinhole) -> Pinhole:
         """The :class:`Pinhole` that ``camera_info`` states: with the plugin's ``focalLength``, ``Cx`` and ``Cy``
         [pixels] where they are not 0. As in Gazebo, the picture is that of ``pinhole`` all the same."""
         focal, cx, cy = (self.number(self.plugin, tag, 0.0) for tag in ("focalLength", "Cx", "Cy"))

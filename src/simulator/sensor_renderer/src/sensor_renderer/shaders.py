@@ -5,6 +5,9 @@ Without a graphics card, vertices cost more than pixels: light is computed per p
 shaded. Even an empty loop over lamps costs as much as the rest of a picture: lamps are written out, one by one, and
 what a world does not have is not in its shaders.
 """
+from __future__ import annotations
+
+from collections.abc import Sequence
 
 _HEAD = "#version 330\n"
 
@@ -350,25 +353,25 @@ void main() { seen = vec4(air, 1.0); }
 """
 
 
-def lit_shaders(sun_shadow, lamps, taps):
+def lit_shaders(sun_shadow: bool, lamps: Sequence[tuple[str, bool]], taps: int) -> tuple[str, str]:
     """(vertex, fragment) shader for light per vertex. ``sun_shadow``: whether the sun casts shadows; ``lamps``: the
     ``kind`` of each :class:`sensor_renderer.light.Lamp`; ``taps``: comparisons along one side of a filter's square."""
     vertex = _LIT_VERTEX.replace("TONE", _TONE_VERTEX)
     return _text(vertex, sun_shadow, lamps, taps), _text(_LIT_FRAGMENT, sun_shadow, (), taps)
 
 
-def placed_shaders(sun_shadow, lamps, taps):
+def placed_shaders(sun_shadow: bool, lamps: Sequence[tuple[str, bool]], taps: int) -> tuple[str, str]:
     """(vertex, fragment) shader for light per pixel, as :func:`lit_shaders`."""
     return _HEAD + _PLACED_VERTEX, _text(_PLACED_FRAGMENT, sun_shadow, lamps, taps)
 
 
-def textured_shaders(sun_shadow, lamps, taps):
+def textured_shaders(sun_shadow: bool, lamps: Sequence[tuple[str, bool]], taps: int) -> tuple[str, str]:
     """(vertex, fragment) shader for light per pixel on what has a picture or light of its own, as
     :func:`lit_shaders`."""
     return _HEAD + _TEXTURED_VERTEX, _text(_TEXTURED_FRAGMENT, sun_shadow, lamps, taps)
 
 
-def floor_shaders(sun_shadow, lamps, taps, haze):
+def floor_shaders(sun_shadow: bool, lamps: Sequence[tuple[str, bool]], taps: int, haze: bool) -> tuple[str, str]:
     """(vertex, fragment) shader of the floor, as :func:`lit_shaders`. ``haze``: whether it fades into the horizon. Its
     corners are far apart: lamps light it per pixel."""
     fragment = _FLOOR_FRAGMENT.replace("LAMPS", _FLOOR_LAMPS if lamps else "").replace("HAZE", _HAZE if haze else "")

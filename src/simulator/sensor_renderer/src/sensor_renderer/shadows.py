@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Shadow maps: the sun's, fitted to what a camera sees, and those of the strongest lamps. ROS-free."""
+from __future__ import annotations
+
 import math
 import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensor_renderer.light import LAMP_NEAR_M, MAX_SHADOWS
 from sensor_renderer.programs import draw, matrix_bytes
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from sensor_renderer.light import Light
+    from sensor_renderer.links import Link
+    from sensor_renderer.mirror import Mirror
+    from sensor_renderer.pinhole import Pinhole
 
 # Half of the map's side in the world [m] grows in steps of this factor, so that it seldom changes while a camera moves.
 _STEP = 2.0 ** 0.25
@@ -29,7 +41,8 @@ class Shadows:
     ``margin_m``: how far outside of a surface to compare; ``lamp_matrices``: {number of a spot light: (4, 4) from the
     world to texture coordinates of its map}."""
 
-    def __init__(self, context, program, pixels, taps, one_sided=False):
+    def __init__(self, context: moderngl.Context, program: moderngl.Program, pixels: int, taps: int,
+                 one_sided: bool = False) -> None:
         """``program``: the one that draws depth alone; ``pixels``: the side of the sun's map; ``taps``: comparisons
         along one side of a filter's square; ``one_sided``: whether casters throw shadows by their fronts alone."""
         self._one_sided = one_sided
@@ -44,7 +57,7 @@ class Shadows:
         self.to_map, self.margin_m, self.lamp_matrices = np.eye(4), 0.0, {}
         self.corners = np.zeros((4, 3)), np.array((0.0, 0.0, 1.0))
 
-    def light_by(self, light):
+    def light_by(self, light: Light) -> None:
         """Point the maps along the light of ``light``."""
         self._drawn = self._lamps_drawn = None
         self._away = away = np.array(light.to_sun)
@@ -55,7 +68,8 @@ class Shadows:
             side = self._pixels // 2
             self._lamp_map, self._lamp_buffer = self._depth_map(6 * side, MAX_SHADOWS * side)
 
-    def draw(self, mirror, casters, pinhole, pose):
+    def draw(self, mirror: Mirror, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]], pinhole: Pinhole,
+             pose: np.ndarray) -> bool:
         """Draw the maps for the view of a camera at ``pose`` (4, 4). ``casters``: (link, matrix, packed matrix) of all
         that casts shadows. Returns whether the matrices have changed."""
         light = mirror.light
@@ -71,7 +85,7 @@ class Shadows:
             changed = True
         return changed
 
-    def use(self):
+    def use(self) -> None:
         """Bind the maps to their texture units."""
         self._map.use(0)
         if self._lamp_map is not None:
@@ -167,11 +181,11 @@ class Shadows:
 class _Poses:
     """The poses that a map was drawn of."""
 
-    def __init__(self, casters):
+    def __init__(self, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]]) -> None:
         self._links = [link for link, _, _ in casters]
         self._matrices = np.array([matrix for _, matrix, _ in casters])
 
-    def moved(self, casters, tolerance_m):
+    def moved(self, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]], tolerance_m: float) -> bool:
         """Whether ``casters`` are others, or some point of them is more than ``tolerance_m`` away from where it was."""
         if len(casters) != len(self._links):
             return True

@@ -5,9 +5,15 @@ Without a graphics card, each triangle that need not be drawn counts. A closed s
 a robot are open where they meet others. So a link is looked at from all around, once, and its triangles that show
 their backs are drawn from both sides, all others from the front alone.
 """
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import moderngl
 
 # A link is looked at from so many directions, spread evenly, in pictures of this side [pixels].
 _DIRECTIONS, _PIXELS = 36, 192
@@ -34,7 +40,7 @@ void main() { seen = 2u * uint(gl_PrimitiveID) + (gl_FrontFacing ? 1u : 2u); }
 class Sides:
     """Looks at the links of one context."""
 
-    def __init__(self, context):
+    def __init__(self, context: moderngl.Context) -> None:
         """``context``: of moderngl, which compares depths, culls nothing and takes clockwise corners for fronts."""
         self._context = context
         self._program = context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
@@ -42,7 +48,7 @@ class Sides:
         self._buffer = context.framebuffer(context.renderbuffer(size, 1, dtype="u4"), context.depth_renderbuffer(size))
         self._size = size
 
-    def from_behind(self, points, centre, radius):
+    def from_behind(self, points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
         """Return which of the triangles with the corners ``points`` (3 m, 3) must be drawn from behind, too: bool (m,).
         ``centre`` (3,), ``radius``: of a sphere around them.
 
@@ -57,7 +63,7 @@ class Sides:
         touching = touched[corners].sum(axis=1)
         return back | (touching >= np.where(front, 2, 1))
 
-    def plainly_from_behind(self, points, centre, radius):
+    def plainly_from_behind(self, points: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
         """The same for what casts shadows: those whose backs are plainly seen, bool (m,).
 
         Of a mesh with few triangles nearly all touch one that shows its back; to draw them all twice costs more than
@@ -82,7 +88,7 @@ class Sides:
         return np.bincount(numbers, minlength=2 * (len(points) // 3) + 1)[1:].reshape(-1, 2).T
 
 
-def indexed(rows):
+def indexed(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the different ones of float32 ``rows`` (n, k) in the order of their first use, and the number of each row
     among them (n,). Neighbours have near numbers, which the vertices' cache needs."""
     rows = np.ascontiguousarray(rows + np.float32(0.0))

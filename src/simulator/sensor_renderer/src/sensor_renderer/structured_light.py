@@ -8,9 +8,16 @@ number, the shift of the pattern in eighths of a pixel, with a standard deviatio
 of either side follows Handa and others ("A benchmark for RGB-D visual odometry, 3D reconstruction and SLAM", ICRA
 2014): each takes it from a place half a pixel around it.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sensor_renderer.exposure import from_bank
+
+if TYPE_CHECKING:
+    from sensor_renderer.pinhole import Pinhole
 
 #: Shift of the pattern [steps] at a distance of 1 m, and the standard deviation of the shift [steps].
 STEPS_M, DEVIATION = 1.0 / 2.85e-3, 0.5
@@ -28,7 +35,7 @@ _BANK = 1 << 19
 class StructuredLight:
     """The depth sensor of one camera."""
 
-    def __init__(self, pinhole, seed=0):
+    def __init__(self, pinhole: Pinhole, seed: int = 0) -> None:
         """``pinhole``: of the depth picture; ``seed``: a whole number from 0. Noise depends on it and on the time."""
         self._pinhole, self._seed = pinhole, seed
         random = np.random.default_rng(seed)
@@ -36,7 +43,7 @@ class StructuredLight:
         places = np.round(_PLACE * pinhole.fx / _FOCAL * random.standard_normal((2, _BANK)))
         self._down, self._aside = places.astype(np.int32)
 
-    def measured(self, depth, time_s):
+    def measured(self, depth: np.ndarray, time_s: float) -> np.ndarray:
         """``depth`` (height, width) [m], NaN for nothing, as the sensor measures it at ``time_s`` [s]: float32, NaN
         also in the projector's shadow and out of :data:`RANGE_M`."""
         lit = np.where(shadowed(depth, self._pinhole.fx), np.float32(np.nan), depth)
@@ -51,7 +58,7 @@ class StructuredLight:
             return np.where((found >= RANGE_M[0]) & (found <= RANGE_M[1]), found, np.float32(np.nan))
 
 
-def shadowed(depth, focal_px):
+def shadowed(depth: np.ndarray, focal_px: float) -> np.ndarray:
     """Where something else is between the projector and what ``depth`` (height, width) [m] shows; bool.
 
     ``focal_px``: focal length [pixels]. Each row of the picture is drawn as the projector sees it, with the nearest

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures on surfaces, as textures of one context. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from PIL import Image
+
+if TYPE_CHECKING:
+    import moderngl
 
 #: Pixels of all pictures together, at most: 256 MB of memory. When they are used up, further ones are reduced.
 MAX_PIXELS = 48_000_000
@@ -11,14 +18,14 @@ _MIN_SIDE = 64
 class Textures:
     """Textures by the paths of their pictures, with smaller copies for distant surfaces."""
 
-    def __init__(self, context):
+    def __init__(self, context: moderngl.Context) -> None:
         #: The context.
         self.context = context
         self._textures = {}
         self._left = MAX_PIXELS
         self._white = None
 
-    def of(self, path):
+    def of(self, path: str) -> moderngl.Texture:
         """The texture of the picture at ``path``, as ``world_picture.textures.write_texture`` has made it; a white one
         for ""."""
         if not path:
@@ -30,7 +37,7 @@ class Textures:
             texture = self._textures[path] = self._read(path)
         return texture
 
-    def clear(self):
+    def clear(self) -> None:
         """Release all textures."""
         for texture in self._textures.values():
             texture.release()

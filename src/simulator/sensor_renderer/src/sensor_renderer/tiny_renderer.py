@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures with PyBullet's TinyRenderer, for machines without EGL: correct, and about ten times slower. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pybullet
 
 from sensor_renderer.errors import RenderingError
 from urdf_model.transforms import quaternion_from_matrix
+
+if TYPE_CHECKING:
+    from sensor_renderer.mirror import Mirror
+    from sensor_renderer.pinhole import Pinhole
 
 _SPECULAR = 0.05
 
@@ -14,7 +22,7 @@ class TinyRenderer:
 
     name = "PyBullet's TinyRenderer"
 
-    def __init__(self):
+    def __init__(self) -> None:
         """Raises :class:`RenderingError` when PyBullet gives no client."""
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
@@ -22,7 +30,8 @@ class TinyRenderer:
         self._shapes = {}
         self._bodies = {}
 
-    def render(self, mirror, pinhole, pose, colour=True, depth=False):
+    def render(self, mirror: Mirror, pinhole: Pinhole, pose: np.ndarray, colour: bool = True,
+               depth: bool = False) -> tuple[np.ndarray | None, np.ndarray | None]:
         """As :meth:`GlRenderer.render`."""
         rgba, values, _ = self._image(mirror, pinhole, pose, pybullet.ER_NO_SEGMENTATION_MASK)
         size = pinhole.height, pinhole.width
@@ -32,7 +41,8 @@ class TinyRenderer:
             distance = pinhole.depth_from_buffer(np.array(values, dtype=np.float32).reshape(size))
         return picture, distance
 
-    def identify(self, mirror, pinhole, pose):
+    def identify(self, mirror: Mirror, pinhole: Pinhole,
+                 pose: np.ndarray) -> tuple[np.ndarray, list[tuple[str, int]], np.ndarray]:
         """As :meth:`GlRenderer.identify`."""
         _, values, mask = self._image(mirror, pinhole, pose, 0)
         size = pinhole.height, pinhole.width
@@ -58,7 +68,7 @@ class TinyRenderer:
             lightSpecularCoeff=_SPECULAR, flags=flags,
             renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)[2:]
 
-    def close(self):
+    def close(self) -> None:
         """Disconnect the client."""
         pybullet.disconnect(physicsClientId=self._client)
 

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishers of pictures, and settings for clients of dynamic_reconfigure. Used from several threads."""
+from __future__ import annotations
+
 import json
 import threading
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -12,6 +16,12 @@ from loop_ros.reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
 from sensor_renderer.labels import Motion
 
+if TYPE_CHECKING:
+    from genpy import Message
+
+    from sensor_renderer.moments import Moment
+    from sensor_renderer.sensor_element import CameraElement
+
 # Pictures that can be asked for before the first of them is taken.
 _MAX_TRIGGERS = 1000
 
@@ -19,24 +29,24 @@ _MAX_TRIGGERS = 1000
 class Topic:
     """A publisher that knows whether it has subscribers. A service's thread may close it at any time."""
 
-    def __init__(self, name, message_class, latch=False):
+    def __init__(self, name: str, message_class: type[Message], latch: bool = False) -> None:
         # A queue of one: a subscriber that has stopped reading loses pictures and delays nobody.
         self._publisher = rospy.Publisher(name, message_class, latch=latch, queue_size=1)
         self._lock = threading.Lock()
 
     @property
-    def has_listeners(self):
+    def has_listeners(self) -> bool:
         """True while a subscriber is connected."""
         with self._lock:
             return self._publisher is not None and self._publisher.get_num_connections() > 0
 
-    def publish(self, message):
+    def publish(self, message: Message) -> None:
         """Send a message, unless the topic has been closed."""
         with self._lock:
             if self._publisher is not None:
                 self._publisher.publish(message)
 
-    def close(self):
+    def close(self) -> None:
         """Unregister the topic."""
         with self._lock:
             publisher, self._publisher = self._publisher, None
@@ -50,7 +60,7 @@ class Trigger:
     #: It needs no picture.
     has_listeners = False
 
-    def __init__(self, name):
+    def __init__(self, name: str) -> None:
         self.count = 0
         self._lock = threading.Lock()
         self._subscriber = rospy.Subscriber(name, Empty, self._add)
@@ -59,18 +69,18 @@ class Trigger:
         with self._lock:
             self.count = min(self.count + 1, _MAX_TRIGGERS)
 
-    def take(self):
+    def take(self) -> bool:
         """Whether there was a message that has not been taken; it is now."""
         with self._lock:
             self.count, had = max(self.count - 1, 0), self.count
         return had > 0
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget the messages that have not been taken."""
         with self._lock:
             self.count = 0
 
-    def close(self):
+    def close(self) -> None:
         """Unregister the topic."""
         self._subscriber.unregister()
 
@@ -81,19 +91,19 @@ class ReconfigureServer:
     #: These topics need no picture.
     has_listeners = False
 
-    def __init__(self, name, settings, apply):
+    def __init__(self, name: str, settings: Iterable[Setting], apply: Callable[[dict[str, Any]], object]) -> None:
         """As :class:`loop_ros.reconfigure.SettingsServer`; ``apply`` is called in a service's thread."""
         self._opened = []
         self._lock = threading.Lock()
         SettingsServer(self, name, settings, apply)
 
-    def publisher(self, topic, msg_class, latch):
+    def publisher(self, topic: str, msg_class: type[Message], latch: bool) -> rospy.Publisher:
         """For SettingsServer."""
         publisher = rospy.Publisher(topic, msg_class, latch=latch, queue_size=1)
         self._opened.append(publisher.unregister)
         return publisher
 
-    def service(self, name, srv_class, handler):
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> None:
         """For SettingsServer."""
         def one_at_a_time(request):
             with self._lock:
@@ -106,7 +116,7 @@ class ReconfigureServer:
             return
         self._opened.append(lambda: service.shutdown("the sensor is gone"))
 
-    def close(self):
+    def close(self) -> None:
         """Unregister topics and service."""
         while self._opened:
             self._opened.pop()()
@@ -115,7 +125,7 @@ class ReconfigureServer:
 class ColourTopics:
     """Image, compressed image and camera_info of one colour camera."""
 
-    def __init__(self, image_topic, info_topics):
+    def __init__(self, image_topic: str, info_topics: Iterable[str]) -> None:
         self.image = Topic(image_topic, Image)
         self.compressed = Topic(image_topic + "/compressed", CompressedImage)
         self.infos = [Topic(name, CameraInfo) for name in info_topics]
@@ -128,11 +138,11 @@ class ColourTopics:
         self._quality = values["jpeg_quality"]
 
     @property
-    def want_picture(self):
+    def want_picture(self) -> bool:
         """Whether a picture topic has subscribers."""
         return self.image.has_listeners or self.compressed.has_listeners
 
-    def publish(self, time_s, frame, picture, encoding, info):
+    def publish(self, time_s: float, frame: str, picture: np.ndarray | None, encoding: str, info: CameraInfo) -> None:
         """``picture`` may be None without subscribers."""
         for topic in self.infos:
             if topic.has_listeners:
@@ -147,14 +157,14 @@ class LearningTopics:
     """Labels of a camera's pixels, for programs that learn: masks of classes and of models with their tables,
     depth, optical flow. They exist while they are open."""
 
-    def __init__(self, folder):
+    def __init__(self, folder: str) -> None:
         """``folder``: the camera's name in ROS."""
         self._folder = folder
         self._topics = {}
         self._sent = {}
         self._motion = Motion()
 
-    def open(self, is_open):
+    def open(self, is_open: bool) -> None:
         """Open or close the topics; any thread may call it."""
         if is_open == bool(self._topics):
             return
@@ -168,18 +178,18 @@ class LearningTopics:
             **{name: Topic("%s/%s" % (self._folder, name), String, latch=True)
                for name in ("semantic/labels", "instance/labels")}}
 
-    def close(self):
+    def close(self) -> None:
         """Unregister the topics."""
         topics, self._topics = self._topics, {}
         for topic in topics.values():
             topic.close()
 
     @property
-    def has_listeners(self):
+    def has_listeners(self) -> bool:
         """Whether one of the topics has a subscriber."""
         return any(topic.has_listeners for topic in list(self._topics.values()))
 
-    def publish(self, moment, camera, frame, turned=(1, 1)):
+    def publish(self, moment: Moment, camera: CameraElement, frame: str, turned: tuple[int, int] = (1, 1)) -> None:
         """Publish the view of ``camera``, a CameraElement, at a Moment. ``turned``: -1 where rows or columns of the
         camera's pictures run the other way."""
         topics = dict(self._topics)

@@ -3,9 +3,12 @@
 
 Triangles are float32 arrays (3 m, 6): three rows for each triangle, a row is x y z [m] and the unit normal there.
 """
+from __future__ import annotations
+
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from urdf_model import Box, Cylinder, Sphere
 from world_picture.reduction import corner_normals
@@ -14,7 +17,7 @@ from world_picture.reduction import corner_normals
 CIRCLES = (128, 64, 32)
 
 
-def of_primitive(geometry, corners=CIRCLES[-1]):
+def of_primitive(geometry: Box | Cylinder | Sphere, corners: int = CIRCLES[-1]) -> np.ndarray:
     """Triangles of a ``urdf_model`` Box, Cylinder or Sphere about its own origin, with so many ``corners`` of a circle;
     ``TypeError`` for anything else."""
     if isinstance(geometry, Box):
@@ -31,7 +34,7 @@ def of_primitive(geometry, corners=CIRCLES[-1]):
     raise TypeError("no primitive: %r" % (geometry,))
 
 
-def flat(corners):
+def flat(corners: npt.ArrayLike) -> np.ndarray:
     """Triangles of the corners (3 m, 3), with the normals of their planes."""
     corners = np.asarray(corners, dtype=float).reshape(-1, 3, 3)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -39,13 +42,13 @@ def flat(corners):
     return np.concatenate([corners, np.repeat(across[:, None], 3, axis=1)], axis=2).reshape(-1, 6).astype(np.float32)
 
 
-def circle_error(radius, corners):
+def circle_error(radius: float, corners: int) -> float:
     """How far a polygon with so many ``corners`` is from its circle, in the unit of ``radius``: its corners are as far
     outside as the middles of its sides are inside."""
     return radius * math.tan(math.pi / (2.0 * corners)) ** 2
 
 
-def uv_on_primitive(geometry, rows):
+def uv_on_primitive(geometry: Box | Cylinder | Sphere, rows: np.ndarray) -> np.ndarray:
     """The places of the corners ``rows`` (3 m, 6) of a primitive in a picture, as Gazebo's MeshManager has them:
     (3 m, 2), to the right and down from its upper left corner, in widths and heights of it.
 
@@ -76,12 +79,12 @@ def uv_on_primitive(geometry, rows):
     return np.column_stack([np.where(on_axis, np.nanmean(around, axis=1, keepdims=True), around).ravel(), down])
 
 
-def indexed(vertices, normals, faces):
+def indexed(vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Triangles of vertices (n, 3) [m] with normals (n, 3), and faces (m, 3)."""
     return np.hstack([vertices, normals]).astype(np.float32)[faces.ravel()]
 
 
-def of_mesh(vertices, faces):
+def of_mesh(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Triangles of vertices (n, 3) [m] and faces (m, 3), smooth where faces meet at a small angle. Triangles without
     area are left out."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))

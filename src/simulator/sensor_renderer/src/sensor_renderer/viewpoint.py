@@ -1,9 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where to look at the world from: cameras outside of it. ROS-free."""
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from sensor_renderer.mirror import Mirror
 
 #: Where the eye is for an overview, relative to the centre of the scene: in front of a robot that looks along x, a
 #: little to its left and above.
@@ -12,7 +20,7 @@ DIRECTION = np.array([0.78, 0.48, 0.34])
 _MARGIN = 1.04
 
 
-def looking_at(eye, target):
+def looking_at(eye: Sequence[float] | np.ndarray, target: Sequence[float] | np.ndarray) -> np.ndarray:
     """Pose (4, 4) in the world of an optical frame (z ahead, x right, y down) at ``eye`` that looks at ``target`` [m].
 
     Raises ValueError if the camera would look straight up or down.
@@ -30,7 +38,7 @@ def looking_at(eye, target):
     return pose
 
 
-def extent(mirror):
+def extent(mirror: Mirror) -> tuple[np.ndarray, np.ndarray]:
     """(low, high): the box [m] around all bodies except floors. The unit box if there are none."""
     corners = []
     for body in mirror.bodies.values():
@@ -45,7 +53,8 @@ def extent(mirror):
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
-def overview(low, high, aspect, field_of_view_rad, target=None):
+def overview(low: np.ndarray, high: np.ndarray, aspect: float, field_of_view_rad: float,
+             target: npt.ArrayLike | None = None) -> tuple[np.ndarray, np.ndarray]:
     """(eye (3,), target (3,)): where a camera looks from and to, so that the box from ``low`` to ``high`` (3,) [m] is
     just in view. ``aspect``: width of the picture by its height; ``field_of_view_rad``: across its width; ``target``:
     by default the middle of the box."""
