@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 
 import rosgraph
 import rospy
 
 
-def list_under(name: str, service: rospy.Service) -> None:
-    """Make the master list ``service``, which this node serves, as one of the node ``name`` until this node ends.
+def serve_as(name: str, make: Callable[[], rospy.Service]) -> rospy.Service:
+    """Return the service that ``make`` returns; the master lists it as one of the node ``name`` until this one ends.
 
     The master gives this node's address for that name: it answers a ping, and ends when either name is shut down or
-    taken by another node. Raises ``rosgraph.MasterException`` and ``OSError`` where the master does not do so.
+    taken by another node. ``make`` must register nothing else.
     """
-    master = rosgraph.Master(name)
-    master.registerService(service.resolved_name, service.uri, rospy.get_node_uri())
+    own = rospy.get_name()
+    # From the first moment: a judge remembers who serves what as soon as everything is there.
+    rospy.names._set_caller_id(name)
+    try:
+        service = make()
+    finally:
+        rospy.names._set_caller_id(own)
 
     def withdraw() -> None:
-        # rospy itself withdraws it under this node's name alone, which the master then ignores.
+        # rospy itself withdraws it under this node's own name, which the master ignores.
         with contextlib.suppress(OSError, rosgraph.MasterException):  # it may have ended before
-            master.unregisterService(service.resolved_name, service.uri)
+            rosgraph.Master(name).unregisterService(service.resolved_name, service.uri)
 
-    rospy.on_shutdown(withdraw)
+    if name != own:
+        rospy.on_shutdown(withdraw)
+    return service
