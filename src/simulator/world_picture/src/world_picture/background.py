@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes and pictures that are simplified in threads, while their viewer goes on. ROS-free."""
+from __future__ import annotations
+
 import collections
 import os
 import threading
 import time
+from collections.abc import Callable, Iterable
 
 from bullet_sim.limited import LimitedProcess, LimitError
 from world_picture.drawing import LIMITS, DrawingCache
@@ -19,7 +22,7 @@ PATIENCE_S = 8.0
 class NotReady(Exception):
     """A mesh or picture is being simplified; ``key`` names it for :meth:`BackgroundDrawings.is_making`."""
 
-    def __init__(self, key):
+    def __init__(self, key: str) -> None:
         super().__init__("%s is being simplified" % key)
         self.key = key
 
@@ -29,7 +32,8 @@ class BackgroundDrawings(DrawingCache):
     large mesh, and for others when :data:`PATIENCE_S` are over. One that cannot be used is not tried again as long as
     its file stays the same."""
 
-    def __init__(self, folder=None, patience_s=PATIENCE_S, clock=time.monotonic):
+    def __init__(self, folder: str | os.PathLike[str] | None = None, patience_s: float = PATIENCE_S,
+                 clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(folder)
         self._patience_s, self._clock = patience_s, clock
         self._patient_until = clock() + patience_s
@@ -40,16 +44,16 @@ class BackgroundDrawings(DrawingCache):
         self._made = {}  # by key: the file, a LimitError, or None while it is being made
         self._working = set()
 
-    def begin_scene(self):
+    def begin_scene(self) -> None:
         """Be patient again."""
         self._patient_until = self._clock() + self._patience_s
 
-    def is_making(self, keys):
+    def is_making(self, keys: Iterable[str]) -> bool:
         """Whether one of ``keys`` is still being simplified."""
         with self._changed:
             return any(key in self._made and self._made[key] is None for key in keys)
 
-    def wait(self, timeout_s):
+    def wait(self, timeout_s: float) -> None:
         """Wait until nothing is being simplified, at most ``timeout_s`` [s]."""
         with self._changed:
             self._changed.wait_for(lambda: not self._working, timeout_s)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes simplified for software rendering: split by colour, in levels of detail, cached on disk. ROS-free."""
+from __future__ import annotations
+
 import hashlib
 import json
 import os
@@ -51,20 +53,20 @@ class MeshPart(NamedTuple):
     pictures inside of the mesh file: of these, ``texture`` is a path."""
 
     path: str
-    colour: tuple
-    levels: tuple
+    colour: tuple[float, ...] | None
+    levels: tuple[LevelFile, ...]
     plain: int
-    emission: tuple = (0.0, 0.0, 0.0)
+    emission: tuple[float, ...] = (0.0, 0.0, 0.0)
     texture: str = ""
 
 
-def read_level(path):
+def read_level(path: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(vertices (n, 3), unit normals (n, 3), faces (m, 3)) of the file of a :class:`LevelFile`."""
     with np.load(path) as stored:
         return stored["vertices"], stored["normals"], stored["faces"]
 
 
-def read_uv(path):
+def read_uv(path: str) -> np.ndarray | None:
     """The vertices' places (n, 2) in a picture, as :class:`world_picture.pieces.Piece` has them, of the file of a
     :class:`LevelFile`; None if it has none."""
     with np.load(path) as stored:
@@ -79,16 +81,17 @@ class DrawingCache:
     """Simplified meshes and reduced pictures on disk, under a hash of the original's content. Where the folder cannot
     be written, or its disk is full, in a folder for temporary files."""
 
-    def __init__(self, folder=None, process=None):
+    def __init__(self, folder: str | os.PathLike[str] | None = None, process: LimitedProcess | None = None) -> None:
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``; ``process``: a
         ``bullet_sim.limited.LimitedProcess``, by default one for all caches of this program."""
         self._process = process
         self._folder = Path(folder or cache_folder(_FOLDER))
 
-    def begin_scene(self):
+    def begin_scene(self) -> None:
         """A viewer begins to ask for the meshes of a scene."""
 
-    def parts(self, path, textured=False, part=WHOLE):
+    def parts(self, path: str | os.PathLike[str], textured: bool = False,
+              part: tuple[str, bool] = WHOLE) -> list[MeshPart]:
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`. ``textured``: for a
         picture that is not the file's own; all levels have ``uv``, if the file has. ``part``: as for
         ``bullet_sim.mesh_loading.load_scene``."""
@@ -102,7 +105,7 @@ class DrawingCache:
                          tuple(emission), str(index.parent / own_picture) if own_picture else texture)
                 for name, colour, levels, plain, emission, texture, own_picture in listed]
 
-    def texture(self, path):
+    def texture(self, path: str | os.PathLike[str]) -> Texture:
         """The :class:`world_picture.textures.Texture` of the picture file at ``path``; raises
         :class:`DrawingError`."""
         index = self._index("picture", path, "picture.json", "-picture", write_texture)
@@ -162,11 +165,11 @@ def _digest(path, content):
     return digest.hexdigest()[:32]
 
 
-def write_parts(path, folder, textured, part=WHOLE):
+def write_parts(path: str, folder: str, textured: bool, part: tuple[str, bool] = WHOLE) -> None:
     """Write the mesh at ``path`` into ``folder``, in levels of detail: ``parts.json`` and the files that it lists.
     ``textured``: whether all levels have ``uv``, if the file has, or only those with a picture; ``part``: as for
     ``load_scene``."""
-    pieces, folder = read_pieces(path, part, textured), Path(folder)
+    pieces, target = read_pieces(path, part, textured), Path(folder)
     size = float(np.ptp(np.concatenate([piece.vertices for piece in pieces]), axis=0).max())
     listed = []
     for number, piece in enumerate(pieces):
@@ -174,17 +177,18 @@ def write_parts(path, folder, textured, part=WHOLE):
         for step, level in enumerate(levels):
             files.append(("part%d_%d.npz" % (number, step), level.error))
             arrays = {} if level.uv is None else {"uv": level.uv}
-            np.savez(folder / files[-1][0], vertices=level.vertices, normals=level.normals,
+            np.savez(target / files[-1][0], vertices=level.vertices, normals=level.normals,
                      faces=level.faces.astype(np.int32), **arrays)
         if levels:
             plain = max(step for step, level in enumerate(levels) if level.error <= PLAIN * size or step == 0)
             name = "part%d.obj" % number
-            (folder / name).write_text(_wavefront(levels[plain]), encoding="ascii")
-            own_picture = "" if piece.picture is None else "picture%s.png" % piece.texture
-            if own_picture:
-                save_reduced(piece.picture, folder / own_picture)
+            (target / name).write_text(_wavefront(levels[plain]), encoding="ascii")
+            own_picture = ""
+            if piece.picture is not None:
+                own_picture = "picture%s.png" % piece.texture
+                save_reduced(piece.picture, target / own_picture)
             listed.append((name, piece.colour, files, plain, piece.emission, piece.texture, own_picture))
-    (folder / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
+    (target / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
 
 
 def _wavefront(level):

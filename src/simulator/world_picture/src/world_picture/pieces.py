@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The content of mesh files, split by what it looks like. ROS-free."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bullet_sim.mesh_loading import WHOLE, load_scene
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 # Brightness of Collada meshes that name no material: the one of assimp, by which rviz shows them.
 _PLAIN_COLOUR = (0.6, 0.6, 0.6, 1.0)
@@ -30,14 +35,14 @@ class Piece(NamedTuple):
 
     vertices: np.ndarray
     faces: np.ndarray
-    colour: tuple
-    emission: tuple = _DARK
+    colour: tuple[float, ...] | None
+    emission: tuple[float, ...] = _DARK
     texture: str = ""
-    uv: np.ndarray = None
-    picture: object = None
+    uv: np.ndarray | None = None
+    picture: Image | None = None
 
 
-def read_pieces(path, part=WHOLE, textured=False):
+def read_pieces(path: str, part: tuple[str, bool] = WHOLE, textured: bool = False) -> list[Piece]:
     """The list of :class:`Piece` of the mesh file at ``path``, one for each look; ``part``: as for ``load_scene``.
     ``textured``: whether all pieces have ``uv``, if the file has, or only those with a picture. Raises
     :class:`PieceError`, and what ``load_scene`` raises."""
@@ -45,7 +50,8 @@ def read_pieces(path, part=WHOLE, textured=False):
 
     plain = _PLAIN_COLOUR if str(path).lower().endswith(".dae") else None
     scene = load_scene(path, part, textures=True)
-    alike, inside = {}, {}
+    alike: dict[tuple[Any, Any, str, bool], list[tuple[np.ndarray, np.ndarray, np.ndarray | None]]] = {}
+    inside: dict[str, Any] = {}
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         mesh = scene.geometry[name]

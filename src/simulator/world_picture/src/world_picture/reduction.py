@@ -8,10 +8,13 @@ like it: smooth surfaces show no facets, and creases stay.
 A mesh with a picture is cut where the picture is: its seams are borders, and its levels have vertices of the original
 alone, each with its own place in the picture.
 """
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from bullet_sim.thinning import thin_out
 
@@ -61,7 +64,7 @@ class Level(NamedTuple):
     normals: np.ndarray
     faces: np.ndarray
     error: float
-    uv: np.ndarray = None
+    uv: np.ndarray | None = None
 
 
 class ReductionError(Exception):
@@ -76,10 +79,11 @@ class _Mesh(NamedTuple):
     faces: np.ndarray
     corner_normals: np.ndarray
     of: np.ndarray
-    uv: np.ndarray = None
+    uv: np.ndarray | None = None
 
 
-def levels(vertices, faces, size=None, uv=None):
+def levels(vertices: npt.ArrayLike, faces: np.ndarray, size: float | None = None,
+           uv: npt.ArrayLike | None = None) -> list[Level]:
     """Return the list of :class:`Level` of a mesh, the finest first: vertices (n, 3) and faces (m, 3).
 
     ``size``: the longest side of the object that the mesh belongs to; by default its own. Borders of open meshes stay
@@ -129,7 +133,7 @@ def _original(vertices, faces, size, uv):
     return _Mesh(cut, faces, corner_normals(uncut, at[faces]), np.arange(len(cut)), uv[first])
 
 
-def reduced(vertices, faces, target):
+def reduced(vertices: np.ndarray, faces: np.ndarray, target: float) -> tuple[np.ndarray, np.ndarray]:
     """(vertices, faces) with about the same surface as vertices (n, 3) and faces (m, 3) and about ``target`` triangles,
     whatever the distance. Borders may shrink.
 
@@ -142,8 +146,9 @@ def reduced(vertices, faces, target):
     welded, joined, _ = _welded(vertices, faces, size)
     if len(joined) <= target:
         return welded, joined
-    smooth = fast_simplification.simplify(welded.astype(np.float32), joined.astype(np.int32), target_count=int(target),
-                                          agg=_QUICK)
+    smooth = fast_simplification.simplify(
+        welded.astype(np.float32), joined.astype(np.int32),  # pyright: ignore[reportArgumentType]  (float32 counts, too)
+        target_count=int(target), agg=_QUICK)[:2]
     merged = thin_out(vertices, faces, target)
     whole = max(_twice_areas(vertices, faces).sum(), 1e-12)
     lost, lost_by_merging = (abs(1.0 - _twice_areas(*mesh).sum() / whole) for mesh in (smooth, merged))
@@ -152,7 +157,7 @@ def reduced(vertices, faces, target):
     return merged
 
 
-def corner_normals(vertices, faces):
+def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return the unit normals (m, 3, 3) at the corners of faces (m, 3) with area: of vertices (n, 3), smooth but for
     edges sharper than :data:`CREASE_RAD`. Each averages the faces at its vertex that look alike, by area."""
     across = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
@@ -189,7 +194,7 @@ def _next(mesh, tolerance):
     if len(all_faces) < _FEWEST:
         return mesh
     scale = _LAST_COST_M / tolerance
-    points, left, collapses = fast_simplification.simplify(
+    points, left, collapses = fast_simplification.simplify(  # pyright: ignore[reportAssignmentType]  (always three)
         everything * scale, all_faces.astype(np.int32), target_count=4, agg=_EXACT, return_collapses=True)
     replaced_by = _replacements(len(everything), collapses)
     corners = _whole(replaced_by[all_faces])
@@ -291,8 +296,8 @@ class _Samples(NamedTuple):
     points: np.ndarray
     beside: np.ndarray
     weights: np.ndarray
-    uv: np.ndarray = None
-    scales: np.ndarray = None
+    uv: np.ndarray | None = None
+    scales: np.ndarray | None = None
 
 
 def _samples(mesh):
@@ -351,7 +356,7 @@ def _pairs(ordered, wanted):
             np.arange(count.sum()) + np.repeat(start - np.cumsum(count) + count, count))
 
 
-def point_triangle_distances(points, triangles):
+def point_triangle_distances(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the distance (n,) of each of ``points`` (n, 3) from its triangle of ``triangles`` (n, 3, 3)."""
     a, b, c = (triangles[:, k] for k in range(3))
     across = np.cross(b - a, c - a)

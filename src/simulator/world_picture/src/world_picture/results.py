@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of long calculations, kept on disk. ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from disk_cache.files import cache_home, draft_of
 
@@ -16,12 +20,12 @@ MAX_KEPT = 5000
 _FOLDER = "results"
 
 
-def cache_folder(name):
+def cache_folder(name: str) -> Path:
     """The path of a folder below ``$XDG_CACHE_HOME/bullet_gazebo``, by default ``~/.cache/bullet_gazebo``."""
     return cache_home() / "bullet_gazebo" / name
 
 
-def existing(folder, name, cache):
+def existing(folder: Path, name: str | os.PathLike[str], cache: str) -> Path | None:
     """The path ``name`` in ``folder``, or else in the folder of ``cache`` that :data:`READY` has, if it is there; None
     if it is in neither. ``cache``: as for :func:`cache_folder`."""
     ready = os.environ.get(READY)
@@ -31,14 +35,14 @@ def existing(folder, name, cache):
     return None
 
 
-def ready_for(home):
+def ready_for(home: str) -> tuple[list[tuple[Path, str, bool]], dict[str, str]]:
     """This user's results for a sandbox in which ``home`` is the home: (binds for ``isolation.command``, variables of
     the environment there); without results none. They save ten seconds of a processor for a robot's meshes."""
     folder, place = cache_folder(""), os.path.join(home, ".cache", "bullet_gazebo_ready")
     return ([(folder, place, False)], {READY: place}) if folder.is_dir() else ([], {})
 
 
-def open_to_all(path):
+def open_to_all(path: str | os.PathLike[str]) -> None:
     """Let all users read a new file or folder, whatever the umask: it may be another user's :data:`READY`."""
     os.chmod(path, 0o755 if os.path.isdir(path) else 0o644)
 
@@ -48,11 +52,12 @@ class ResultCache:
     folder that cannot be written to keeps nothing. Of more than :data:`MAX_KEPT` results, those that were used last
     are kept."""
 
-    def __init__(self, folder=None):
+    def __init__(self, folder: str | os.PathLike[str] | None = None) -> None:
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/results``."""
         self._folder = Path(folder or cache_folder(_FOLDER))
 
-    def array(self, calculation, inputs, calculate):
+    def array(self, calculation: str, inputs: Iterable[npt.ArrayLike],
+              calculate: Callable[[], np.ndarray]) -> np.ndarray:
         """The array that ``calculate()`` returns, from the disk if it is there. ``calculation``: a name, with a number
         to be increased when the result for the same inputs changes; ``inputs``: arrays and numbers, on which alone it
         depends."""

@@ -4,8 +4,12 @@
 The file begins with width, height and a sequence number, odd while the picture is being written; then come the rows of
 red, green, blue. A reader that reads during a write notices it and gets the picture at its next call.
 """
+from __future__ import annotations
+
 import mmap
+import os
 import struct
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +23,7 @@ _SEQUENCE_AT = 16
 class PictureWriter:
     """The simulator's side; the picture is black at first."""
 
-    def __init__(self, path, width, height):
+    def __init__(self, path: Path, width: int, height: int) -> None:
         """``path``: a file that is not there yet; ``width``, ``height`` [pixels]. Raises ``SnapshotError`` if there is
         no space left."""
         self.path = path
@@ -39,14 +43,14 @@ class PictureWriter:
         _HEADER.pack_into(self._memory, 0, width, height, 0)
         self._pixels = np.frombuffer(self._memory, np.uint8, 3 * width * height, _HEADER.size).reshape(height, width, 3)
 
-    def show(self, pixels):
+    def show(self, pixels: np.ndarray) -> None:
         """Show ``pixels`` (height, width, 3), uint8, red first."""
         _SEQUENCE.pack_into(self._memory, _SEQUENCE_AT, self._sequence + 1)
         self._pixels[:] = pixels
         self._sequence += 2
         _SEQUENCE.pack_into(self._memory, _SEQUENCE_AT, self._sequence)
 
-    def close(self):
+    def close(self) -> None:
         """Remove the file. Readers that have it open keep the last picture."""
         self.path.unlink(missing_ok=True)
 
@@ -54,17 +58,17 @@ class PictureWriter:
 class NoPicture:
     """Replaces :class:`PictureWriter` where there is no shared memory: nobody sees the picture."""
 
-    def show(self, pixels):
+    def show(self, pixels: np.ndarray) -> None:
         """Does nothing."""
 
-    def close(self):
+    def close(self) -> None:
         """Does nothing."""
 
 
 class PictureReader:
     """A viewer's side. ``width``, ``height`` [pixels]."""
 
-    def __init__(self, path):
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         """Raises ``SnapshotError`` when there is no picture."""
         try:
             with open_shared(path) as file:
@@ -77,11 +81,11 @@ class PictureReader:
         self._seen = None
 
     @property
-    def version(self):
+    def version(self) -> int:
         """The number of the newest picture that is complete; 0 is the first, black one."""
         return _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)[0] // 2
 
-    def read(self):
+    def read(self) -> np.ndarray | None:
         """The picture (height, width, 3), a copy, if it has changed since the last call; else None."""
         sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)
         if sequence == self._seen or sequence % 2:

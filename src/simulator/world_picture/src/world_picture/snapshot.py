@@ -11,6 +11,8 @@ interrupted read and tries again. A slot is: number, scene revision, how many ti
 count of values, time [s], whether the world is paused, then the values. Of each body, in the scene's order: position x
 y z [m], quaternion x y z w, joint angles [rad or m].
 """
+from __future__ import annotations
+
 import contextlib
 import errno
 import fcntl
@@ -21,8 +23,9 @@ import shutil
 import stat
 import struct
 import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -44,7 +47,7 @@ def _shared_memory_folder():
     return Path("/dev/shm") if os.access("/dev/shm", os.W_OK) else Path(tempfile.gettempdir())
 
 
-def remove_stale(parent=None):
+def remove_stale(parent: str | os.PathLike[str] | None = None) -> list[Path]:
     """Delete this user's folders of simulators that are gone; returns their paths.
 
     A link, or a folder of another user, is neither followed nor touched: every user may write to the parent folder.
@@ -107,7 +110,7 @@ def _check_owner(status, path):
         raise PermissionError(errno.EPERM, text, str(path))
 
 
-def open_shared(path):
+def open_shared(path: str | os.PathLike[str]) -> BinaryIO:
     """Open a file in a simulator's folder for reading. File and folder must belong to this user and be no links. Raises
     ``OSError``."""
     path = Path(path)
@@ -115,7 +118,7 @@ def open_shared(path):
         return _open_in(descriptor, path.name)
 
 
-def reserve(file, size, path):
+def reserve(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> None:
     """Reserve ``size`` bytes for an open file; raises :class:`SnapshotError`.
 
     Without it, a write while the machine's memory is full would kill the process (SIGBUS).
@@ -126,7 +129,7 @@ def reserve(file, size, path):
         raise SnapshotError(no_room(path, error)) from error
 
 
-def no_room(path, error):
+def no_room(path: str | os.PathLike[str], error: OSError) -> str:
     """The message to the user when the data for viewers cannot be written."""
     return ("cannot write %s: %s; cameras and the window stand still (df -h %s says what is free)"
             % (path, error.strerror or error, Path(path).parent.parent))
@@ -152,31 +155,33 @@ class NoSnapshot:
     folder = None
     revision = resets = 0
 
-    def write_scene(self, bodies, light=None):
+    def write_scene(self, bodies: Sequence[Mapping[str, Any]], light: Mapping[str, Any] | None = None) -> None:
         """Does nothing, as the others here."""
 
-    def write(self, tick, time_s, parts, paused=False):
+    def write(self, tick: int, time_s: float, parts: Iterable[Sequence[float] | np.ndarray],
+              paused: bool = False) -> None:
         """Does nothing."""
 
-    def close(self):
+    def close(self) -> None:
         """Does nothing."""
 
 
 class SnapshotWriter:
     """The simulator's side."""
 
-    def __init__(self, parent=None):
+    def __init__(self, parent: str | os.PathLike[str] | None = None) -> None:
         """Makes the folder (private to the user) and locks it. Raises :class:`SnapshotError` if there is no space
         left."""
         parent = _shared_memory_folder() if parent is None else Path(parent)
-        self._file = None
-        while self._file is None:
+        file = None
+        while file is None:
             try:
                 prefix = "%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid())
                 self.folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
-                self._file = _locked(self.folder / "state")
+                file = _locked(self.folder / "state")
             except OSError as error:
                 raise SnapshotError(no_room(parent / _PREFIX / "state", error)) from error
+        self._file = file
         self.revision = 0
         #: How many times simulation time was reset: the same time then means another state.
         self.resets = 0
@@ -194,7 +199,7 @@ class SnapshotWriter:
         _HEADER.pack_into(self._memory, 0, MAGIC, 0)
         self.write_scene([])
 
-    def write_scene(self, bodies, light=None):
+    def write_scene(self, bodies: Sequence[Mapping[str, Any]], light: Mapping[str, Any] | None = None) -> None:
         """Write the list of bodies and the lights.
 
         ``bodies``: list of dictionaries with ``name``, ``joints`` (names) and whatever a viewer needs to draw it.
@@ -213,7 +218,8 @@ class SnapshotWriter:
                 draft.unlink(missing_ok=True)
             raise SnapshotError(no_room(path, error)) from error
 
-    def write(self, tick, time_s, parts, paused=False):
+    def write(self, tick: int, time_s: float, parts: Iterable[Sequence[float] | np.ndarray],
+              paused: bool = False) -> None:
         """Write the state: ``parts`` are arrays; concatenated, they are the slot's values. ``paused``: whether time
         stands still.
 
@@ -236,9 +242,9 @@ class SnapshotWriter:
         self._sequence = number
         _NUMBER.pack_into(self._memory, 8, number)
 
-    def close(self):
+    def close(self) -> None:
         """Remove the folder. Readers that have it open keep the last state."""
-        self._values = None
+        self._values = []
         with contextlib.suppress(BufferError):
             self._memory.close()
         with contextlib.suppress(OSError), _own_folder(self.folder) as descriptor:
@@ -250,8 +256,8 @@ class Scene(NamedTuple):
     """The arguments of :meth:`SnapshotWriter.write_scene`, and the count of its calls."""
 
     revision: int
-    bodies: list
-    light: dict
+    bodies: list[dict[str, Any]]
+    light: dict[str, Any]
 
 
 class Snapshot:
@@ -260,7 +266,8 @@ class Snapshot:
 
     __slots__ = ("paused", "resets", "revision", "tick", "time_s", "values")
 
-    def __init__(self, revision, resets, tick, time_s, values, paused=False):
+    def __init__(self, revision: int, resets: int, tick: int, time_s: float, values: np.ndarray,
+                 paused: bool = False) -> None:
         self.revision = revision
         self.resets = resets
         self.tick = tick
@@ -272,7 +279,7 @@ class Snapshot:
 class SnapshotReader:
     """A viewer's side."""
 
-    def __init__(self, folder):
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
         """``folder`` as the writer made it; :class:`SnapshotError` when there is none."""
         self._folder = Path(folder)
         try:
@@ -284,11 +291,11 @@ class SnapshotReader:
             raise SnapshotError("%s/state is not a snapshot of this version" % folder)
 
     @property
-    def is_alive(self):
+    def is_alive(self) -> bool:
         """False once the simulator has removed its folder."""
         return (self._folder / "state").exists()
 
-    def read(self):
+    def read(self) -> Snapshot | None:
         """The newest complete :class:`Snapshot`, or None before the first one."""
         while True:
             _, number = _HEADER.unpack_from(self._memory, 0)
@@ -302,7 +309,7 @@ class SnapshotReader:
             if _NUMBER.unpack_from(self._memory, offset)[0] == number:
                 return Snapshot(revision, resets, tick, time_s, values, bool(paused))
 
-    def scene(self):
+    def scene(self) -> Scene:
         """The :class:`Scene` as it is now."""
         try:
             with open_shared(self._folder / "scene.json") as file:

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures on surfaces: where their files are, and what is kept of them. ROS-free."""
+from __future__ import annotations
+
 import json
+import os
 from pathlib import Path, PureWindowsPath
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import unquote, urlparse
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 #: Pixels of the longer side of a picture, at most; larger ones are reduced.
 MAX_PIXELS = 1024
@@ -23,10 +29,10 @@ class Texture(NamedTuple):
     1)."""
 
     path: str
-    colour: tuple
+    colour: tuple[float, ...]
 
 
-def find_texture(name, folder):
+def find_texture(name: str, folder: str | os.PathLike[str]) -> str | None:
     """The path of the picture that a mesh in ``folder`` names, or None.
 
     As in Gazebo it is beside the mesh, or in ``../materials/textures``. Exporters often write the path that it had on
@@ -47,7 +53,7 @@ def find_texture(name, folder):
     return None
 
 
-def write_texture(path, folder):
+def write_texture(path: str | os.PathLike[str], folder: str | os.PathLike[str]) -> None:
     """Write the picture at ``path`` into ``folder``: ``picture.png``, reduced, and ``picture.json`` with its mean
     colour. Raises :class:`TextureError`."""
     from PIL import Image
@@ -67,7 +73,7 @@ def write_texture(path, folder):
     (Path(folder) / "picture.json").write_text(json.dumps(colour), encoding="utf-8")
 
 
-def save_reduced(picture, path):
+def save_reduced(picture: Image, path: str | os.PathLike[str]) -> Image:
     """Write ``picture``, of Pillow, to the PNG file at ``path`` with at most :data:`MAX_PIXELS` a side; return it."""
     has_holes = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
     reduced = picture.convert("RGBA" if has_holes else "RGB")
