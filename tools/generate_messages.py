@@ -84,7 +84,7 @@ def succeeds(command: Command) -> bool:
     return True
 
 
-def be_silent():
+def be_silent() -> None:
     """Write nothing, not even by the template engine, which replaces sys.stdout: make repeats what fails."""
     nothing = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh notebook [NAME]`: JupyterLab on loopback with the labs' notebooks, until Ctrl-C."""
-
 import argparse
 import secrets
 import signal
@@ -44,7 +43,7 @@ def find(name: str) -> Path:
     return found[0]
 
 
-def write_kernel():
+def write_kernel() -> None:
     """Register the kernel, which runs in the workspace's environment wherever Jupyter has started: for editors, too."""
     jupyter.write_kernel(STATE, [str(ROOT / "tools" / "notebook_kernel.bash")])
 
@@ -62,7 +61,7 @@ def command(port: int) -> list[str]:
     return jupyter.command(ROOT, {"ServerApp.ip": "127.0.0.1", "ServerApp.port": port, "ServerApp.port_retries": 0})
 
 
-def wait_for(url: str, server: subprocess.Popen):
+def wait_for(url: str, server: subprocess.Popen) -> None:
     """Wait until the server answers; raises NotebookError when it does not."""
     deadline = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < deadline and server.poll() is None:

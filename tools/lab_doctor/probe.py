@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gather the facts in parallel, each with a deadline: the doctor must not hang on a dead network."""
-
 import fcntl
 import http.client
 import json
@@ -50,7 +49,8 @@ DEBIAN_PYTHON = "/usr/lib/python3/dist-packages"
 MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 
 
-def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadline_s: float = DEADLINE_S) -> Facts:
+def gather(root: Path, variables: dict[str, str], say: Callable[[list[str]], object] = lambda names: None,
+           deadline_s: float = DEADLINE_S) -> Facts:
     """Facts about the workspace at root and the ROS that the variables point to; takes at most deadline_s.
 
     say: called with the open questions after PATIENCE_S.
@@ -94,7 +94,9 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
     )
 
 
-def answer_all(questions, timeout_s, say=lambda names: None, patience_s=PATIENCE_S) -> tuple[dict, set]:
+def answer_all(questions: dict[str, Callable[[], Any]], timeout_s: float,
+               say: Callable[[list[str]], object] = lambda names: None,
+               patience_s: float = PATIENCE_S) -> tuple[dict, set]:
     """(name -> answer, names of questions without an answer in time); a question that raises has no answer.
 
     say: called once with the open names after patience_s. Hanging threads are not stopped.
@@ -156,7 +158,7 @@ def find_masters(uri: str) -> list[OtherMaster]:
     return found
 
 
-def master_ports(text: str, command_line) -> set[int]:
+def master_ports(text: str, command_line: Callable[[int], str]) -> set[int]:
     """Lines of `ss -Hltnp` -> the ports that a rosmaster listens on. command_line: pid -> its command line."""
     ports = set()
     for line in text.splitlines():
@@ -387,7 +389,7 @@ def _command_line(pid: int) -> str:
         return ""
 
 
-def parse_listeners(text: str, command_line) -> list[Listener]:
+def parse_listeners(text: str, command_line: Callable[[int], str]) -> list[Listener]:
     """Lines of `ss -Hltnp` -> ROS processes open beyond loopback. command_line: pid -> its command line."""
     found = []
     for line in text.splitlines():

@@ -13,7 +13,7 @@ _LOOK_S, _SHARE = 0.2, 0.5
 _LOOKS = 15
 
 
-def is_busy():
+def is_busy() -> bool:
     """Whether this process computes, or would if it had a processor, while this thread waits, in each of some looks."""
     for _ in range(_LOOKS):
         begin, before = time.monotonic(), _wanted_s()

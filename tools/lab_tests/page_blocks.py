@@ -9,7 +9,6 @@ The words after the opening fence: the language, then any of
     run long     a bash block that takes long; runs with the long tests
     file=PATH    no command: the block is a file of this name, for the blocks after it
 """
-
 import os
 import re
 import subprocess
@@ -35,7 +34,7 @@ class Block:
     path: str = ""
 
 
-def marked_blocks(page, text):
+def marked_blocks(page: str, text: str) -> list[Block]:
     """The marked blocks of a page, in order; blocks without a mark are left out. Raises :class:`PageError`."""
     blocks = []
     for match in FENCE.finditer(text):
@@ -54,7 +53,7 @@ def marked_blocks(page, text):
     return blocks
 
 
-def make_workspace(folder, root):
+def make_workspace(folder: Path, root: Path) -> None:
     """Make in ``folder`` a copy of the workspace ``root`` by links, with its own ``src`` for files that pages write."""
     for entry in Path(root).iterdir():
         if entry.name not in ("src", ".git", ".baxter"):
@@ -62,7 +61,7 @@ def make_workspace(folder, root):
     (folder / "src").mkdir()
 
 
-def write_file(block, folder):
+def write_file(block: Block, folder: Path) -> None:
     """Write a file block to its path; a page must not write outside of the folder, nor overwrite files."""
     path = (Path(folder) / block.path).resolve()
     if Path(folder).resolve() not in path.parents:
@@ -72,7 +71,7 @@ def write_file(block, folder):
         file.write(block.text)
 
 
-def environment(folder, **variables):
+def environment(folder: Path, **variables: str) -> dict[str, str]:
     """The environment of commands in ``folder``: packages written there are found, as after ``catkin_make``."""
     sources = sorted(str(path) for path in (Path(folder) / "src").glob("*/src"))
     return {
@@ -83,12 +82,12 @@ def environment(folder, **variables):
     }
 
 
-def command(block):
+def command(block: Block) -> list[str]:
     """The command that runs a block."""
     return ["bash", "-euo", "pipefail", "-c", block.text]
 
 
-def run(block, folder, limit_s, **variables):
+def run(block: Block, folder: Path, limit_s: float, **variables: str) -> None:
     """Run a block in ``folder``; raises AssertionError with its page, line and output unless it succeeds in time."""
     place = f"{block.page}:{block.line}"
     try:

@@ -18,7 +18,9 @@ import random
 import resource
 import shutil
 import tempfile
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from xdist.scheduler import LoadScopeScheduling
@@ -27,6 +29,9 @@ from lab_tests import comma_locale, left_threads, rostests
 from lab_tests.discovery import WORKERS_BESIDE_CORES, is_long, is_whole_machine, mostly_waits, package_of
 from lab_tests.results import Tally, summary
 from lab_tests.shared_labs import lab_of
+
+if TYPE_CHECKING:
+    from xdist.workermanage import WorkerController
 
 LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
 # What files took in earlier runs, and what a fresh clone begins with: file below the root -> seconds.
@@ -37,7 +42,7 @@ MIN_DURATION_S = 2.0
 MAX_NAMED = 20
 
 
-def pytest_addoption(parser):
+def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("lab", "./baxter.sh test")
     group.addoption("--long", action="store_true", help="also run the tests that take minutes")
     group.addoption("--shuffle", type=int, metavar="SEED", help="run the files, and the tests in them, in random order")
@@ -45,14 +50,14 @@ def pytest_addoption(parser):
                     help="factor of all time limits, for a slow machine")
 
 
-def work_folder(config) -> Path:
+def work_folder(config: pytest.Config) -> Path:
     """Where logs and results of tests stay."""
     folder = config.rootpath / ".baxter" / "tests"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
-def pytest_configure(config):
+def pytest_configure(config: pytest.Config) -> None:
     is_worker = hasattr(config, "workerinput")
     if not is_worker:
         config.pluginmanager.register(Controller(config), "lab controller")
@@ -61,19 +66,19 @@ def pytest_configure(config):
         config.pluginmanager.register(Worker(config), "lab worker")
 
 
-def pytest_collect_file(file_path, parent):
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> RostestFile | None:
     if file_path.suffix == ".test" and file_path.parent.name == "rostest":
         return RostestFile.from_parent(parent, path=file_path)
     return None
 
 
-def pytest_make_parametrize_id(val, argname):
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     # Every worker must give a test the same name, and bytes may hold the time at which they were made.
     return argname if isinstance(val, bytes) else None
 
 
 class RostestFile(pytest.File):
-    def collect(self):
+    def collect(self) -> Iterator[Rostest]:
         test = Rostest.from_parent(self, name="rostest")
         if is_long(self.path):
             test.add_marker("long")
@@ -83,7 +88,7 @@ class RostestFile(pytest.File):
 class Rostest(pytest.Item):
     """One .test file, run by rostest; the tests in it are counted one by one."""
 
-    def runtest(self):
+    def runtest(self) -> None:
         tally = self.config.pluginmanager.get_plugin("lab worker").run_rostest(self)
         tally.refuse_bare_skips()
         self.user_properties += [("passed", tally.passed), ("failed", tally.failed), ("skips", tally.skips)]
@@ -92,12 +97,12 @@ class Rostest(pytest.Item):
         if not tally.passed:
             pytest.skip("; ".join(dict.fromkeys(reason for _, reason in tally.skips)))
 
-    def repr_failure(self, excinfo, style=None):
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, RostestFailure):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
-    def reportinfo(self):
+    def reportinfo(self) -> tuple[Path, None, str]:
         return self.path, None, self.path.name
 
 
@@ -126,7 +131,7 @@ def read_durations(folder: Path) -> dict[str, float]:
 
 
 @pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config, items):
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave long tests out, unless one was named; then the longest files first, or all in random order."""
     named = tuple(argument for argument in config.args if "::" in argument)
     if not (config.option.long or config.option.markexpr):
@@ -165,7 +170,7 @@ def _tell(config, name: str, value):
 class Worker:
     """In each worker: the locale, the lock on the machine, and what each test took."""
 
-    def __init__(self, config):
+    def __init__(self, config: pytest.Config) -> None:
         self._config = config
         self._begin_elsewhere()
         # For programs outside of this process: unit tests change variables, some of them when they are imported.
@@ -196,7 +201,7 @@ class Worker:
         arguments[:] = arguments[begin:] + arguments[:begin]
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item):
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
         fcntl.flock(self._machine, fcntl.LOCK_EX if is_whole_machine(item.path) else fcntl.LOCK_SH)
         self._before_s = _processor_s()
         try:
@@ -205,16 +210,16 @@ class Worker:
             fcntl.flock(self._machine, fcntl.LOCK_UN)
 
     @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_makereport(self, item, call):
+    def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> None:
         if call.when == "teardown":
             item.user_properties.append(("processor_s", _processor_s() - self._before_s))
 
     @pytest.hookimpl(tryfirst=True)
-    def pytest_sessionfinish(self, session):
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if session.testscollected and (names := left_threads.busy_ones()):
             _tell(self._config, "left_threads", names)
 
-    def pytest_unconfigure(self):
+    def pytest_unconfigure(self) -> None:
         os.environ.clear()
         os.environ.update(self.environment)
         locale.setlocale(locale.LC_ALL, "")
@@ -229,19 +234,19 @@ def _processor_s() -> float:
 class Controller:
     """In the process that the user started: which worker runs what, the counts, the last line."""
 
-    def __init__(self, config):
+    def __init__(self, config: pytest.Config) -> None:
         self._config, self._folder = config, work_folder(config)
         self._total = Tally()
         self._took: dict[str, list[float]] = {}
-        # What tests put into the folder for temporary files, they remove. pytest's own folders stay for who looks.
+        # What tests put into the folder for temporary files, they remove. pytest's own folders stay for the user.
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
         self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
         os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
 
-    def pytest_xdist_make_scheduler(self, config, log):
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: object) -> FileScheduling:
         return FileScheduling(config, log)
 
-    def pytest_runtest_logreport(self, report):
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         took = self._took.setdefault(file_of(report.nodeid), [0.0, 0.0])
         took[0] += report.duration
         properties = dict(report.user_properties)
@@ -265,15 +270,15 @@ class Controller:
         if report.when == "call":
             self._total.skips += [tuple(skip) for skip in properties.get("skips", [])]
 
-    def pytest_collectreport(self, report):
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.failed:
             self._fail(f"{report.nodeid}\n{report.longreprtext}")
 
     @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, node, error):
+    def pytest_testnodedown(self, node: WorkerController, error: object) -> None:
         self.take(getattr(node, "workeroutput", {}))
 
-    def take(self, told: dict):
+    def take(self, told: dict) -> None:
         """The last report of a worker."""
         self._total.long = told.get("long", self._total.long)
         if names := told.get("left_threads"):
@@ -284,7 +289,7 @@ class Controller:
         self._total.details.append(detail)
 
     @pytest.hookimpl(trylast=True)
-    def pytest_sessionfinish(self, session):
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
         self._total.refuse_bare_skips()
         if left := sorted(path.name for path in self._temporary.iterdir()):
             self._fail(f"tests left {len(left)} temporary files: {', '.join(left[:MAX_NAMED])}")
@@ -302,7 +307,7 @@ class Controller:
                 stream.write(f"{both[0]:.2f},{both[1]:.2f},{file}\n")
 
     @pytest.hookimpl(trylast=True)
-    def pytest_unconfigure(self):
+    def pytest_unconfigure(self) -> None:
         shutil.rmtree(self._temporary, ignore_errors=True)
         print(summary(self._total), flush=True)
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Processes that a test or a notebook started: known by a variable in their environment, which every child inherits."""
-
 import os
 import signal
 import time
@@ -44,7 +43,7 @@ def wait_until_gone(value: str, timeout_s: float, marker: str = MARKER) -> dict[
         time.sleep(0.05)
 
 
-def kill_all(value: str, marker: str = MARKER):
+def kill_all(value: str, marker: str = MARKER) -> None:
     """End every marked process, and those that it starts meanwhile."""
     for _ in range(5):
         alive = wait_until_gone(value, 0.0, marker)

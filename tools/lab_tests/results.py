@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Counts the results of JUnit files over all layers of tests, and the tests that did not run."""
-
 import collections
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,14 +27,14 @@ class Tally:
     skips: list[tuple[str, str]] = field(default_factory=list)
     long: list[str] = field(default_factory=list)
 
-    def add(self, other: "Tally"):
+    def add(self, other: "Tally") -> None:
         self.passed += other.passed
         self.failed += other.failed
         self.details += other.details
         self.skips += other.skips
         self.long += other.long
 
-    def refuse_bare_skips(self):
+    def refuse_bare_skips(self) -> None:
         """Count skips without a reason as failures."""
         for name, reason in self.skips:
             if reason in BARE:
