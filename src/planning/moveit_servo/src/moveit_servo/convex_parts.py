@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from bullet_sim.convex_parts import cut
+from bullet_sim.convex_parts import AXES, cut
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.shapes import TriangleMesh
 from motion_planning.spheres.pair_maps import pair_map
@@ -39,7 +40,10 @@ def cuts_named(name: str, model: PlanningModel) -> MeshCuts:
     if not isinstance(cuts, Mapping):
         raise SettingsError("mesh_cuts is '%s', a %s; expected a dictionary of a link's planes by its name"
                             % (name, type(cuts).__name__))
-    for link in cuts:
+    for link, planes in cuts.items():
+        if not (isinstance(planes, Sequence) and all(map(_is_plane, planes))):
+            raise SettingsError("mesh_cuts is '%s', with %r for '%s'; expected planes (axis, offset) or (axis, offset, low, "
+                                "high), the axis x, y or z" % (name, planes, link))
         if link in model.link_index and any(joint.movable for joint in model.robot.chain(model.root, link)):
             raise SettingsError("mesh_cuts is '%s' with link '%s', which moves; expected links that stand still"
                                 % (name, link))
@@ -74,6 +78,11 @@ class ConvexParts:
             allowed = allowed.with_entries({(name, other): True for other in self._model.links if other == link
                                             or other in self._near[link] or allowed.allowed(link, other)})
         return scene.with_allowed(allowed)
+
+
+def _is_plane(plane: object) -> bool:
+    return (isinstance(plane, tuple | list) and len(plane) in (2, 4) and plane[0] in tuple(AXES)
+            and all(isinstance(number, int | float) and math.isfinite(number) for number in plane[1:]))
 
 
 def _hulls(mesh: TriangleMesh, planes: Sequence[tuple]) -> Iterator[TriangleMesh]:

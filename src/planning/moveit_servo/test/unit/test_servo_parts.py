@@ -22,6 +22,7 @@ WALL = PLANAR_URDF.replace("</robot>", (
     '<joint name="at" type="fixed"><origin xyz="0.4 0 0"/><parent link="base"/><child link="wall"/></joint></robot>'))
 # Whole, its convex hull fills the corner; cut at x = 0, each half is flat.
 CUTS, HALVES, MOVING = {"wall": ()}, {"wall": (("x", 0.0),)}, {"link1": ()}
+NUMBER, AXIS, ENDLESS, SHORT = ({"wall": planes} for planes in (5, (("w", 0.1),), (("x", np.inf),), (("x",),)))
 
 
 def corner(_):
@@ -60,7 +61,8 @@ def test_links_that_the_robot_lacks_have_no_parts():
 
 @pytest.mark.parametrize(("name", "fact"), [
     ("no.such.PLACE", "no"), ("moveit_servo.settings.NOTHING", "NOTHING"), ("planes", "planes"),
-    ("moveit_servo.settings.BAXTER", "str"), (__name__ + ".MOVING", "link1")])
+    ("moveit_servo.settings.BAXTER", "str"), (__name__ + ".MOVING", "link1"),
+    *((__name__ + "." + planes, "wall") for planes in ("NUMBER", "AXIS", "ENDLESS", "SHORT"))])
 def test_what_names_no_cuts_is_refused(name, fact):
     with pytest.raises(SettingsError, match=fact):
         cuts_named(name, PlanningModel.from_xml(WALL, PLANAR_SRDF))
