@@ -42,8 +42,8 @@ def cuts_named(name: str, model: PlanningModel) -> MeshCuts:
                             % (name, type(cuts).__name__))
     for link, planes in cuts.items():
         if not (isinstance(planes, Sequence) and all(map(_is_plane, planes))):
-            raise SettingsError("mesh_cuts is '%s', with %r for '%s'; expected planes (axis, offset) or (axis, offset, low, "
-                                "high), the axis x, y or z" % (name, planes, link))
+            raise SettingsError("mesh_cuts is '%s', with %r for '%s'; expected planes (axis, offset) or (axis, offset, "
+                                "low, high), the axis x, y or z" % (name, planes, link))
         if link in model.link_index and any(joint.movable for joint in model.robot.chain(model.root, link)):
             raise SettingsError("mesh_cuts is '%s' with link '%s', which moves; expected links that stand still"
                                 % (name, link))
