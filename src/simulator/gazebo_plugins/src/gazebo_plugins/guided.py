@@ -6,6 +6,7 @@ import numpy as np
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
+from bullet_sim import BulletSimError
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.sensor_plugins import PacedSensor
@@ -90,8 +91,11 @@ class HandOfGod(ModelPlugin):
         axes = pose[:3, :3]
         (stiff, damping), (turn_stiff, turn_damping) = self._springs
         turn = axes @ _half_turn(axes.T @ wanted[:3, :3])
-        model.apply_wrench(self._link, stiff * (wanted[:3, 3] - pose[:3, 3]) - damping * linear,
-                           turn_stiff * turn - turn_damping * angular)
+        try:
+            model.apply_wrench(self._link, stiff * (wanted[:3, 3] - pose[:3, 3]) - damping * linear,
+                               turn_stiff * turn - turn_damping * angular)
+        except BulletSimError as error:  # as for a frame that is very far away
+            self.context.log.warn_throttle(5.0, "%s: %s; it is not pulled" % (self._what, error))
 
     def publish(self, time_s):
         if not self._waits and self._sent.has_listeners and self._pace.take(time_s):

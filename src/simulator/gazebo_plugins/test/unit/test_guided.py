@@ -56,6 +56,15 @@ def test_a_spring_that_would_be_unstable_is_bounded_and_named(make):
     assert yaw(lab.model) == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.parametrize("far", [1e12, math.inf])
+def test_a_frame_too_far_away_pulls_nothing_and_is_named(make, far):
+    lab = make(BALL % (0.1, 0.1, 0.1), HandOfGod, {"linkName": "hand"}, Pose((0, 0, 1)))
+    lab.ros.subscriptions["/tf"].put(desired(far))
+    lab.run(0.05)
+    np.testing.assert_allclose(lab.model.base_pose().position, (0, 0, 1), atol=1e-6)
+    assert "it is not pulled" in lab.log.of("warn")[-1]
+
+
 @pytest.mark.parametrize(("elements", "said"), [
     ({}, "<linkName> is '', expected one of the links hand"), ({"linkName": "foot"}, "<linkName> is 'foot'"),
     ({"linkName": "hand", "kl": "-1"}, "<kl> is '-1'"), ({"linkName": "hand", "ka": "nan"}, "<ka> is 'nan'")])
