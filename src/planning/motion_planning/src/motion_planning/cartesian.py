@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint paths along which a link moves in straight lines."""
+from __future__ import annotations
+
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from arm_kinematics import Budget, Chain, InvalidTarget, KinematicsError, NoSolution, Target, solve
 from motion_planning.errors import PlanningError
 from urdf_model.transforms import axis_rotation, inverse, rigid, rotation_angle
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.model import Group, PlanningModel, State
 
 # Allowed distance of the link from its line between two steps [m], [rad]; a step is halved if it is exceeded.
 LINE_TOLERANCE_M = 1e-3
@@ -42,8 +49,8 @@ class Steps(NamedTuple):
 
     max_step: float
     jump_threshold: float = 0.0
-    accept: Callable | None = None
-    stop: Callable | None = None
+    accept: Callable[[np.ndarray], str | None] | None = None
+    stop: Callable[[], bool] | None = None
 
 
 class CartesianPath(NamedTuple):
@@ -55,7 +62,8 @@ class CartesianPath(NamedTuple):
     reason: str | None
 
 
-def cartesian_path(model, group, start, link, waypoints, steps):
+def cartesian_path(model: PlanningModel, group: str, start: State, link: str, waypoints: Sequence[ArrayLike],
+                   steps: Steps) -> CartesianPath:
     """Return the :class:`CartesianPath` that moves ``link`` in straight lines through ``waypoints``.
 
     model: PlanningModel; group: name; start: State. waypoints: poses (4, 4) of the link in the planning frame.
@@ -99,7 +107,7 @@ def cartesian_path(model, group, start, link, waypoints, steps):
     return _without_jump(path, done, jump_threshold, model.groups[group].joints)
 
 
-def _without_jump(path, done, threshold, names):
+def _without_jump(path: CartesianPath, done: list[float], threshold: float, names: Sequence[str]) -> CartesianPath:
     """The path up to its first step above the threshold; ``done``: the fraction at each point; names: of the joints."""
     if threshold == 0.0 or len(path.joints) < _FEWEST_FOR_JUMPS:
         return path
@@ -118,20 +126,20 @@ def _without_jump(path, done, threshold, names):
 class Line:
     """Poses (4, 4) from one to another: the position on a line, the rotation about one axis."""
 
-    def __init__(self, begin, end):
+    def __init__(self, begin: np.ndarray, end: np.ndarray) -> None:
         """begin, end (4, 4). length [m], angle [rad]: of the whole line."""
         self._begin, self._shift = begin, end[:3, 3] - begin[:3, 3]
         turn = begin[:3, :3].T @ end[:3, :3]
         self.length, self.angle = float(np.linalg.norm(self._shift)), rotation_angle(turn)
         self._axis = _axis(turn, self.angle)
 
-    def at(self, fraction):
+    def at(self, fraction: float) -> np.ndarray:
         """Return the pose at ``fraction`` of the line, 0 to 1."""
         rotation = self._begin[:3, :3] @ axis_rotation(self._axis, fraction * self.angle)
         return rigid(rotation, self._begin[:3, 3] + fraction * self._shift)
 
 
-def _axis(rotation, angle):
+def _axis(rotation: np.ndarray, angle: float) -> np.ndarray:
     if angle < 1e-9:
         return np.array([0.0, 0.0, 1.0])
     if angle < math.pi - 1e-3:
@@ -147,25 +155,34 @@ def _axis(rotation, angle):
     return axis / np.linalg.norm(axis)
 
 
-def _pieces(begin, end):
+def _pieces(begin: np.ndarray, end: np.ndarray) -> float:
     """The length that is divided into steps [m]: of the line, or of the rotation in proportion if that is greater."""
     distance = float(np.linalg.norm(end[:3, 3] - begin[:3, 3]))
     angle = rotation_angle(begin[:3, :3].T @ end[:3, :3])
     return max(distance, angle / _RADIANS_PER_METRE)
 
 
-class Follower:
-    """Follows a line with the joints of one group that move the link.
+class Curve(Protocol):
+    """A way of a link."""
 
-    A line is an object with ``at(fraction)``, which returns the pose at a fraction of it. q (k,): the group's present
+    def at(self, fraction: float) -> np.ndarray:
+        """Return the pose (4, 4) at ``fraction``, 0 to 1."""
+        ...
+
+
+class Follower:
+    """Follows a line, which is a :class:`Curve`, with the joints of one group that move the link.
+
+    q (k,): the group's present
     values; fractions: of the line, at each appended point.
     """
 
-    def __init__(self, model, group, start, link, accept):
+    def __init__(self, model: PlanningModel, group: Group, start: State, link: str,
+                 accept: Callable[[np.ndarray], str | None] | None) -> None:
         """model: PlanningModel; group: Group; start: State; accept: as in :class:`Steps`. Raises CartesianError."""
         self._accept, self.link = accept, link
         self._names = group.joints
-        self.fractions = []
+        self.fractions: list[float] = []
         self.q = np.array(start.q, dtype=float)[list(group.indices)]
         base, joints = _moving(model, group, link)
         self._chain = Chain.from_robot(model.robot, base, link)
@@ -173,18 +190,18 @@ class Follower:
         self._base = model.frame_of(start.q, base, start.base)
         self._base_inverse = inverse(self._base)
 
-    def pose(self, number, waypoint):
+    def pose(self, number: int, waypoint: ArrayLike) -> np.ndarray:
         """The waypoint, checked and made orthonormal. Raises CartesianError."""
         try:
             return Target(waypoint).pose
         except InvalidTarget as error:
             raise CartesianError("waypoint %d is not a pose: %s" % (number + 1, error)) from None
 
-    def pose_of_link(self, q):
+    def pose_of_link(self, q: np.ndarray) -> np.ndarray:
         """Return the pose (4, 4) of the link in the planning frame with the group's joints at ``q`` (k,)."""
         return self._base @ self._chain.fk(q[self._columns])
 
-    def advance(self, line, begin, end, points):
+    def advance(self, line: Curve, begin: float, end: float, points: list[np.ndarray]) -> str | None:
         """Append the points from ``begin`` (excluded) to ``end`` on the line; return None, or the reason of a
         failure."""
         before = self.q
@@ -197,7 +214,7 @@ class Follower:
             self.q = before
         return reason
 
-    def _advance(self, line, begin, end, points, halvings):
+    def _advance(self, line: Curve, begin: float, end: float, points: list[np.ndarray], halvings: int) -> str | None:
         goal = line.at(end)
         try:
             q = self.solved(goal, self.q)
@@ -226,7 +243,7 @@ class Follower:
         self.fractions.append(end)
         return None
 
-    def solved(self, pose, near):
+    def solved(self, pose: np.ndarray, near: np.ndarray) -> np.ndarray:
         """Return the group's joints (k,) near ``near`` (k,) that put the link at ``pose``. Raises NoSolution."""
         target, seed = Target(self._base_inverse @ pose), near[self._columns]
         try:
@@ -238,7 +255,7 @@ class Follower:
         return q
 
 
-def _moving(model, group, link):
+def _moving(model: PlanningModel, group: Group, link: str) -> tuple[str, tuple[str, ...]]:
     """The first link of the chain in which the group's joints move ``link``, and these joints in order. Raises
     CartesianError."""
     if link not in model.robot.links:

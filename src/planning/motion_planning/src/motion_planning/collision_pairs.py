@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,12 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model.planning_model import pair_of
 from motion_planning.scene import AllowedCollisions, Scene
 from motion_planning.srdf import DisabledPair
+
+if TYPE_CHECKING:
+    from numpy.random import Generator as Random
+
+    from motion_planning.model import PlanningModel
+    from motion_planning.shapes import Meshes
 
 #: Number of random states for pairs that always touch, and the share of contacts that counts as always; as in MoveIt's
 #: setup assistant.
@@ -21,7 +29,8 @@ TRIALS = 10_000
 _REASONS = ("User", "Adjacent", "Default", "Always", "Never")
 
 
-def disabled_pairs(model, meshes, *, trials=TRIALS, share=ALWAYS_SHARE, seed=0):
+def disabled_pairs(model: PlanningModel, meshes: Meshes, *, trials: int = TRIALS, share: float = ALWAYS_SHARE,
+                   seed: int = 0) -> list[DisabledPair]:
     """Return [DisabledPair, ...] of ``model``, sorted by names; pairs that its SRDF disables for reason "User" are
     kept.
 
@@ -35,7 +44,7 @@ def disabled_pairs(model, meshes, *, trials=TRIALS, share=ALWAYS_SHARE, seed=0):
     reasons = {pair_of(pair.link1, pair.link2): "User" for pair in model.srdf.disabled if pair.reason == "User"}
     reasons.update({pair: "Adjacent" for pair in adjacent_pairs(model) if pair not in reasons})
 
-    def touching(q):
+    def touching(q: np.ndarray) -> list[tuple[str, str]]:
         scene = Scene(model, allowed=AllowedCollisions(dict.fromkeys(reasons, True)))
         return [pair_of(one.a, one.b) for one in exact.contacts(scene, scene.state.with_q(q), most=len(shaped) ** 2)]
 
@@ -57,7 +66,7 @@ def disabled_pairs(model, meshes, *, trials=TRIALS, share=ALWAYS_SHARE, seed=0):
     return [DisabledPair(*pair, reason) for pair, reason in sorted(reasons.items())]
 
 
-def adjacent_pairs(model):
+def adjacent_pairs(model: PlanningModel) -> set[tuple[str, str]]:
     """Return {sorted pair, ...} of links with shapes that are neighbours: over one joint, or over links without one."""
     near = {name: set() for name in model.links}
     for joint in model.robot.joints.values():
@@ -72,12 +81,12 @@ def adjacent_pairs(model):
     return {pair_of(a, b) for a, others in near.items() for b in others}
 
 
-def summary(pairs):
+def summary(pairs: Sequence[DisabledPair]) -> str:
     """Return the number of ``pairs`` (DisabledPair) for each reason, as one line."""
     counts = Counter(pair.reason for pair in pairs)
     return "%d pairs: %s" % (len(pairs), ", ".join("%d %s" % (counts[reason], reason) for reason in _REASONS
                                                    if counts[reason]))
 
 
-def _random(model, generator, count):
+def _random(model: PlanningModel, generator: Random, count: int) -> np.ndarray:
     return generator.uniform(model.bounds[:, 0], model.bounds[:, 1], (count, len(model.variables)))

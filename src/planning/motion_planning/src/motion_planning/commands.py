@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of this package. They need no master."""
+from __future__ import annotations
+
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -19,7 +22,7 @@ from urdf_model import description_text
 MAX_TRIALS = 10**8
 
 
-def collisions_updater(arguments=None):
+def collisions_updater(arguments: Sequence[str] | None = None) -> int:
     """``collisions_updater``: compute the disabled pairs of an SRDF. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="collisions_updater", description="Compute which pairs of links need not be checked against each other: "
@@ -58,7 +61,7 @@ def collisions_updater(arguments=None):
     return 0
 
 
-def prepare_robots(arguments=None):
+def prepare_robots(arguments: Sequence[str] | None = None) -> int:
     """``prepare_robots``: make the spheres of robots, which planning then loads from disk. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="prepare_robots", description="Make all that planning needs to know of a robot's shape, so that the "
@@ -72,7 +75,7 @@ def prepare_robots(arguments=None):
     return 1 if failures else 0
 
 
-def _prepare_one(path):
+def _prepare_one(path: Path) -> str | None:
     """Prepare the robot of a file; return None, or the reason of a failure."""
     try:
         model = PlanningModel.from_xml(description_text(path), "")

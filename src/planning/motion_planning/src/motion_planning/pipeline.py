@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From a planning request to a timed trajectory, or to the reason of a failure."""
+from __future__ import annotations
+
 import enum
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,16 @@ from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
 from motion_planning.planners.planning import MIN_FOR_SCENE_S, SHARE_OF_SEARCH
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
+
+if TYPE_CHECKING:
+    from motion_planning.constraints import ConstraintSet, Sampler
+    from motion_planning.exact import Contact, ExactChecker
+    from motion_planning.model import State
+    from motion_planning.planners import Path
+    from motion_planning.planners.trees import Planner
+
+    #: A sentence on an invalid state, and the contacts there.
+    Flaw = tuple[str, list[Contact]]
 
 # Allowed cutting of corners [rad or m], tried in this order: a curve in collision gets a smaller one.
 _CORNERS = (0.05, 0.01, 0.001)
@@ -59,7 +71,8 @@ class PlanningFailure(PlanningError):
     """Why there is no plan. code: a :class:`Code`; contacts: exact.Contacts of the failure; joints: {joint: value}
     beyond their limits."""
 
-    def __init__(self, code, text, contacts=(), joints=None):
+    def __init__(self, code: int, text: str, contacts: Iterable[Contact] = (),
+                 joints: Mapping[str, float] | None = None) -> None:
         super().__init__(text)
         self.code, self.contacts, self.joints = code, list(contacts), dict(joints or {})
 
@@ -79,9 +92,9 @@ class PlanQuery:
 
     scene: Scene
     group: str
-    goals: list
-    path_constraints: Any = None
-    planner: Callable = rrt_connect
+    goals: list[ConstraintSet]
+    path_constraints: ConstraintSet | None = None
+    planner: Planner = rrt_connect
     allowed_time: float = 5.0
     attempts: int = 1
     velocity_scaling: float = 1.0
@@ -97,26 +110,26 @@ class Tools:
     """The tools of planning: exact: ExactChecker; plan_path, sampler: as in planners and constraints; clock: function
     that returns the time [s]; seed: of the random numbers; stop(): true ends the planning."""
 
-    exact: Any
-    plan_path: Callable
-    sampler: Callable
-    clock: Callable
+    exact: ExactChecker
+    plan_path: Callable[[Scene, str, np.ndarray, np.ndarray, Search], Path]
+    sampler: Callable[..., Sampler]
+    clock: Callable[[], float]
     seed: int = 0
-    stop: Callable = field(default=lambda: False)
+    stop: Callable[[], bool] = field(default=lambda: False)
 
 
 class Plan(NamedTuple):
     """start: State of the whole robot; path (m, k) of the group's joints; timed: timing.Timed; planning_time [s];
     remarks: sentences on what was planned more coarsely than usual."""
 
-    start: Any
+    start: State
     path: np.ndarray
     timed: Timed
     planning_time: float
     remarks: tuple[str, ...] = ()
 
 
-def plan(query, tools):
+def plan(query: PlanQuery, tools: Tools) -> Plan:
     """Return a :class:`Plan` for a :class:`PlanQuery`. Raises PlanningFailure.
 
     The returned trajectory is not only checked by an approximation: its states, sampled as in a controller, are free of
@@ -125,7 +138,7 @@ def plan(query, tools):
     return _Planning(query, tools).run()
 
 
-def checked(query, tools, timed, until):
+def checked(query: PlanQuery, tools: Tools, timed: Timed, until: float) -> Flaw | None:
     """Return None, or (sentence, contacts) of the first state of a Timed up to its time ``until`` [s] that touches
     something in the query's scene, is beyond a limit or breaks a path constraint."""
     return _Planning(query, tools).first_hit(query.scene, timed, False, until)
@@ -134,7 +147,7 @@ def checked(query, tools, timed, until):
 class _Planning:
     """One request while it is planned."""
 
-    def __init__(self, query, tools):
+    def __init__(self, query: PlanQuery, tools: Tools) -> None:
         self.query, self.tools = query, tools
         self.model = query.scene.model
         self.begin = tools.clock()
@@ -147,7 +160,7 @@ class _Planning:
         if not self.names:
             raise PlanningFailure(Code.INVALID_GROUP_NAME, "group '%s' has no joint that moves" % query.group)
 
-    def run(self):
+    def run(self) -> Plan:
         query = self.query
         if not (math.isfinite(query.allowed_time) and query.allowed_time > 0.0):
             raise PlanningFailure(Code.FAILURE, "the allowed planning time is %r s; it must be above 0"
@@ -179,10 +192,11 @@ class _Planning:
                 if not paths:
                     self._look_up()
                     paths.append(self._path(scene, start, goals, attempt))
+        raise AssertionError("not reached")
 
     # -- start --------------------------------------------------------------------------------------------------
 
-    def _start(self):
+    def _start(self) -> tuple[Scene, np.ndarray]:
         """Return (scene with a valid start, the states (m, k) from the robot's state to it)."""
         scene = self._within_limits(self.query.scene)
         q = self.query.scene.state.q[self.indices]
@@ -202,7 +216,7 @@ class _Planning:
                                   "the start state violates the path constraints: %s" % violated)
         return scene, lead
 
-    def _within_limits(self, scene):
+    def _within_limits(self, scene: Scene) -> Scene:
         q = scene.state.q
         bad = self.model.beyond_limits(q, self.query.start_bounds_error, self.indices)
         if bad:
@@ -215,7 +229,7 @@ class _Planning:
             return scene
         return scene.with_state(scene.state.with_q(inside, self.indices))
 
-    def _free_near(self, scene):
+    def _free_near(self, scene: Scene) -> np.ndarray | None:
         """Return a free posture (k,) near the scene's, or None."""
         random = np.random.default_rng(self.tools.seed)
         low, high = self.model.bounds[self.indices].T
@@ -230,7 +244,7 @@ class _Planning:
 
     # -- goals --------------------------------------------------------------------------------------------------
 
-    def _goals(self, scene):
+    def _goals(self, scene: Scene) -> np.ndarray:
         """Return postures (g, k) that meet one of the goals and are free of collisions."""
         found, failures = [], []
         for goal in self.query.goals:
@@ -249,13 +263,13 @@ class _Planning:
             raise failures[0]
         raise self._why_no_goal(scene)
 
-    def _some(self, samples, goal, scene, sets):
+    def _some(self, samples: Iterable[np.ndarray], goal: ConstraintSet, scene: Scene, sets: int) -> list[np.ndarray]:
         found, begin = [], self._elapsed()
-        refused = ""
+        refused, path = "", self.query.path_constraints
         for q in samples:
             self._look_up()
-            violated = self._violated(self.query.path_constraints, scene.state.with_q(q, self.indices), scene)
-            q = self._brought_back(q, goal, scene) if violated else np.array(q)
+            violated = self._violated(path, scene.state.with_q(q, self.indices), scene)
+            q = self._brought_back(q, goal, path, scene) if path is not None and violated else np.array(q)
             if q is None:
                 refused = violated
             else:
@@ -269,9 +283,9 @@ class _Planning:
                                   "no posture of the goal keeps the path constraints: %s" % refused)
         return found
 
-    def _brought_back(self, q, goal, scene):
+    def _brought_back(self, q: np.ndarray, goal: ConstraintSet, path: ConstraintSet,
+                      scene: Scene) -> np.ndarray | None:
         """Return a free posture (k,) near ``q`` that meets a goal and the path constraints, None if none is found."""
-        path = self.query.path_constraints
         near = Manifold(scene, self.group, goal.merged(path), q).project(q)
         if near is None:
             return None
@@ -280,7 +294,7 @@ class _Planning:
             return None
         return near if self.tools.exact.free(scene, state, self.query.group) else None
 
-    def _why_no_goal(self, scene):
+    def _why_no_goal(self, scene: Scene) -> PlanningFailure:
         """Return the PlanningFailure of the goal that passed the most stages."""
         unreached = None
         for goal in self.query.goals:
@@ -307,14 +321,14 @@ class _Planning:
         return unreached or PlanningFailure(Code.TIMED_OUT, "no posture of the goal was found within %.2f s"
                                             % (_SHARE_FOR_GOALS * self.query.allowed_time))
 
-    def _samples(self, goal, scene, exact, share):
+    def _samples(self, goal: ConstraintSet, scene: Scene, exact: ExactChecker | None, share: float) -> Sampler:
         return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed,
                                   stop=lambda: self._is_over(share))
 
-    def _is_met(self, state, scene):
+    def _is_met(self, state: State, scene: Scene) -> bool:
         return any(not self._violated(goal, state, scene) for goal in self.query.goals)
 
-    def _violated(self, constraints, state, scene):
+    def _violated(self, constraints: ConstraintSet | None, state: State, scene: Scene) -> str:
         """Return the sentence on the first constraint that ``state`` violates, or an empty one."""
         if constraints is None:
             return ""
@@ -323,7 +337,7 @@ class _Planning:
 
     # -- path ---------------------------------------------------------------------------------------------------
 
-    def _path(self, scene, start, goals, attempt):
+    def _path(self, scene: Scene, start: np.ndarray, goals: np.ndarray, attempt: int) -> np.ndarray:
         left = self.query.allowed_time - self._used()
         search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
                         clock=self.tools.clock, stop=self.tools.stop, constraints=self.query.path_constraints,
@@ -337,11 +351,11 @@ class _Planning:
         self.remarks = getattr(path, "remarks", ())
         return np.asarray(getattr(path, "points", path), dtype=float)
 
-    def _timed(self, scene, lead, path):
+    def _timed(self, scene: Scene, lead: np.ndarray, path: np.ndarray) -> Plan:
         velocity = self.model.velocity[self.indices] * self.query.velocity_scaling
         acceleration = self.model.acceleration[self.indices] * self.query.acceleration_scaling
         whole = np.concatenate([lead, path])
-        hit = None
+        flaw: Flaw = "", []
         through = self.query.timing.startswith("iterative")  # the points are dense, so its splines stay near the lines
         ways = [(self.query.timing, tolerance) for tolerance in _CORNERS]
         if self.query.path_constraints is not None and not through:
@@ -354,10 +368,11 @@ class _Planning:
             hit = self.first_hit(scene, timed, len(lead) > 0)
             if hit is None:
                 return Plan(self.query.scene.state, whole, timed, self._elapsed(), self.remarks)
+            flaw = hit
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "a path was found, but the timed trajectory is not valid: %s"
-                              % hit[0], hit[1])
+                              % flaw[0], flaw[1])
 
-    def first_hit(self, scene, timed, from_collision, until=math.inf):
+    def first_hit(self, scene: Scene, timed: Timed, from_collision: bool, until: float = math.inf) -> Flaw | None:
         """Return None, or (sentence, contacts) of the first invalid state of a trajectory up to ``until`` [s]."""
         step = _RESOLUTION if self.query.path_constraints is None else _CONSTRAINED
         states = _states(timed, step, until)
@@ -374,7 +389,7 @@ class _Planning:
         return self._in_the_way(scene, states, from_collision) or self._in_between(
             scene, _states(timed, _BETWEEN, until), from_collision)
 
-    def _in_the_way(self, scene, states, from_collision):
+    def _in_the_way(self, scene: Scene, states: np.ndarray, from_collision: bool) -> Flaw | None:
         exact, group = self.tools.exact, self.query.group
         begin = 0
         if from_collision:  # the motion leads out of the start state's collision
@@ -393,7 +408,7 @@ class _Planning:
                     return violated, []
         return None
 
-    def _in_between(self, scene, states, from_collision):
+    def _in_between(self, scene: Scene, states: np.ndarray, from_collision: bool) -> Flaw | None:
         for begin in range(0, len(states), 512):
             self._look_up()
             some = states[begin:begin + 512]
@@ -406,36 +421,36 @@ class _Planning:
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    def _elapsed(self):
+    def _elapsed(self) -> float:
         return self.tools.clock() - self.begin
 
-    def _used(self):
+    def _used(self) -> float:
         """The used part of the allowed time [s]."""
         return self._elapsed() - self.spared
 
-    def _is_over(self, share=1.0):
+    def _is_over(self, share: float = 1.0) -> bool:
         """Whether to stop: requested, or this share of the time is over."""
         return self.tools.stop() or self._used() > share * self.query.allowed_time
 
-    def _look_up_shapes(self):
+    def _look_up_shapes(self) -> None:
         self._look_up()
         if self._elapsed() > max(self.query.allowed_time, MIN_FOR_SCENE_S):
             raise PlanningFailure(Code.TIMED_OUT, "time was over after %.2f s, while the shapes of %d objects were "
                                   "prepared; those that are done are kept, so that another request gets further"
                                   % (self._elapsed(), len(self.query.scene.objects)))
 
-    def _look_up(self):
+    def _look_up(self) -> None:
         if self.tools.stop():
             raise PlanningFailure(Code.PREEMPTED, "planning was stopped after %.2f s" % self._elapsed())
 
 
-def _states(timed, step, until):
+def _states(timed: Timed, step: float, until: float) -> np.ndarray:
     """Postures (m, k) of a Timed up to ``until`` [s], between which no joint moves by more than ``step``."""
     times = timed.spaced(step)
     return timed.sampled(times[times <= until])[0]
 
 
-def _dense(path, spacing):
+def _dense(path: np.ndarray, spacing: float) -> np.ndarray:
     """The path (m, k) with points added, so that no joint moves by more than ``spacing`` between two."""
     pieces = []
     for a, b in itertools.pairwise(path):
@@ -444,6 +459,6 @@ def _dense(path, spacing):
     return np.concatenate([*pieces, path[-1:]])
 
 
-def _named(contacts):
+def _named(contacts: Sequence[Contact]) -> str:
     named = "; ".join(map(str, contacts[:_NAMED]))
     return named + ("; and %d more" % (len(contacts) - _NAMED) if len(contacts) > _NAMED else "")

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Another way for joints that move already, found and timed before they reach what has come into their way."""
+from __future__ import annotations
+
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +12,10 @@ from motion_planning.pipeline import Code, Plan, PlanningFailure, checked, plan
 from motion_planning.planners import first_touching
 from motion_planning.timing import Timed
 from motion_planning.timing.joining import brakings, joinings
+
+if TYPE_CHECKING:
+    from motion_planning.pipeline import PlanQuery, Tools
+    from motion_planning.scene import Scene
 
 #: How far ahead of now the new trajectory begins [s], tried in this order: planning it, and its way to the controller,
 #: take most of that. Less where the obstacle is near.
@@ -43,7 +49,7 @@ class Redirection(NamedTuple):
     overlap: float
 
 
-def redirected(query, tools, running):
+def redirected(query: PlanQuery, tools: Tools, running: Running) -> Redirection:
     """Return a Redirection for a :class:`Running` trajectory, in the scene of a PlanQuery.
 
     The joints of ``query.scene`` count for what the group does not move. The goal is where the running trajectory ends
@@ -71,7 +77,7 @@ def redirected(query, tools, running):
     raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot leave their way: %s" % flaw[0], flaw[1])
 
 
-def _brake(query, tools, running):
+def _brake(query: PlanQuery, tools: Tools, running: Running) -> tuple[float, Timed, float]:
     """(time on the running trajectory, Timed that comes to rest from there without touching anything, time until then
     [s])."""
     group = query.scene.model.groups[query.group]
@@ -88,10 +94,10 @@ def _brake(query, tools, running):
                           "ahead" % (running.blocked_from - running.now))
 
 
-def _goals(query, tools, running, scene):
+def _goals(query: PlanQuery, tools: Tools, running: Running, scene: Scene) -> list[ConstraintSet]:
     group = query.scene.model.groups[query.group]
     end = running.timed.positions[-1]
     if not tools.exact.free(scene, scene.state.with_q(end, group.indices), query.group):
         return query.goals
-    return [ConstraintSet(joints=[JointTarget(name, value, _AT_GOAL, _AT_GOAL)
-                                  for name, value in zip(group.joints, end.tolist(), strict=True)])]
+    return [ConstraintSet(joints=tuple(JointTarget(name, value, _AT_GOAL, _AT_GOAL)
+                                       for name, value in zip(group.joints, end.tolist(), strict=True)))]

@@ -4,10 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from command_line.options import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
+    from numpy.typing import ArrayLike, DTypeLike
+
+    from urdf_model import Box, Cylinder, Plane, Sphere
+
+    #: The shapes that planning knows; one at its pose (4, 4); a function from a mesh's file name.
+    Geometry: TypeAlias = "Box | Cylinder | Sphere | Plane | Cone | TriangleMesh | Octree"
+    Placed: TypeAlias = tuple[Geometry, np.ndarray]
+    Meshes: TypeAlias = Callable[[str], "TriangleMesh"]
 
 #: Levels of an octomap, from the cube around everything to the smallest.
 OCTREE_DEPTH = 16
@@ -31,7 +45,7 @@ class TriangleMesh:
     vertices: np.ndarray
     triangles: np.ndarray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         vertices, triangles = read_only(self.vertices), read_only(self.triangles, np.int64)
         if vertices.ndim != 2 or vertices.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
             raise ValueError("a mesh needs vertices (n, 3) and triangles (m, 3), got %s and %s"
@@ -63,7 +77,7 @@ class Octree:
     resolution: float
     boxes: np.ndarray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         boxes = read_only(np.reshape(np.asarray(self.boxes, dtype=float), (-1, 4)))
         if not self.resolution > 0.0 or not np.isfinite(boxes).all():
             raise ValueError("an octree needs a positive resolution and finite boxes, got resolution %r"
@@ -85,7 +99,7 @@ class Octree:
         object.__setattr__(self, "boxes", boxes)
 
 
-def read_only(array, kind=np.float64):
+def read_only(array: ArrayLike, kind: DTypeLike = np.float64) -> np.ndarray:
     """Return a contiguous copy of ``array`` that cannot be written, or ``array`` itself if it is one already."""
     if isinstance(array, np.ndarray) and array.dtype == kind and array.flags.c_contiguous and not array.flags.writeable:
         return array

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Projection of postures onto constraints by Newton's method."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -8,6 +11,13 @@ from motion_planning.constraints import regions
 from motion_planning.kinematics import KinematicsFailure, limbs_of
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from arm_kinematics import Chain
+    from motion_planning.constraints import ConstraintSet
+    from motion_planning.constraints.regions import Volume
+    from motion_planning.model import Group, PlanningModel
+    from motion_planning.scene import Scene
 
 # Postures are projected to where they keep a margin for the motion between two of them: this share of a tolerance or
 # half size, at most so much [m; rad], so that a large region may be used up to its edge.
@@ -27,7 +37,7 @@ class Manifold:
     alone, and lines of sight, are not checked here.
     """
 
-    def __init__(self, scene, group, constraints, near):
+    def __init__(self, scene: Scene, group: Group, constraints: ConstraintSet, near: np.ndarray) -> None:
         """group: Group; constraints: ConstraintSet. near (k,): continuous joints stay within half a turn of it. Raises
         ConstraintError for unknown names."""
         model, constraints = scene.model, constraints.resolved(scene)
@@ -43,12 +53,12 @@ class Manifold:
                 columns = np.searchsorted(group.indices, limb.indices)
                 self._parts.append(kind(target, limb.chain, columns, frames[model.link_index[limb.base]]))
 
-    def keeps(self, q):
+    def keeps(self, q: np.ndarray) -> bool:
         """Whether the posture ``q`` (k,) satisfies the constraints, with their full tolerances."""
         return bool((q >= self.bounds[:, 0] - _NONE).all() and (q <= self.bounds[:, 1] + _NONE).all()
                     and not any(np.any(part.residual(q, margin=False)[0]) for part in self._parts))
 
-    def project(self, q):
+    def project(self, q: np.ndarray) -> np.ndarray | None:
         """Return a posture (k,) near ``q`` that satisfies the constraints with some margin, None if none is found."""
         q = np.clip(q, self.bounds[:, 0], self.bounds[:, 1])
         if not self._parts:
@@ -73,7 +83,7 @@ class Manifold:
                 return None
         return None
 
-    def _residual(self, q):
+    def _residual(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         parts = [part.residual(q, margin=True) for part in self._parts]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
@@ -81,10 +91,10 @@ class Manifold:
 class _Part:
     """One constraint on a link: the error beyond its tolerance, and its derivatives with respect to the joints."""
 
-    def __init__(self, target, chain, columns, root):
+    def __init__(self, target: Any, chain: Chain, columns: np.ndarray, root: np.ndarray) -> None:
         self._target, self._chain, self._columns, self._root = target, chain, columns, root
 
-    def residual(self, q, margin):
+    def residual(self, q: np.ndarray, margin: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return (residual (3,), its derivatives (3, k)); 0 within the tolerance, less a margin if ``margin``."""
         pose, jacobian = self._chain.fk_and_jacobian(q[self._columns])
         turn = self._root[:3, :3]
@@ -95,12 +105,12 @@ class _Part:
         derivatives[residual == 0.0] = 0.0
         return residual, derivatives
 
-    def _beyond(self, pose, jacobian, margin):
+    def _beyond(self, pose: np.ndarray, jacobian: np.ndarray, margin: bool) -> tuple[np.ndarray, np.ndarray]:
         raise NotImplementedError
 
 
 class _Turn(_Part):
-    def _beyond(self, pose, jacobian, margin):
+    def _beyond(self, pose: np.ndarray, jacobian: np.ndarray, margin: bool) -> tuple[np.ndarray, np.ndarray]:
         wanted = self._target.rotation
         angles = np.asarray(self._target.angles(wanted.T @ pose[:3, :3] @ self._target.axes))
         tolerances = np.array(self._target.tolerances)
@@ -110,7 +120,7 @@ class _Turn(_Part):
 
 
 class _Place(_Part):
-    def _beyond(self, pose, jacobian, margin):
+    def _beyond(self, pose: np.ndarray, jacobian: np.ndarray, margin: bool) -> tuple[np.ndarray, np.ndarray]:
         lever = pose[:3, :3] @ self._target.offset
         point = pose[:3, 3] + lever
         found = []
@@ -123,16 +133,16 @@ class _Place(_Part):
         return beyond, place[:3, :3].T @ (jacobian[:3] - cross @ jacobian[3:])
 
 
-def _inner(size, margin):
+def _inner(size: Any, margin: float) -> Any:
     """A half size or tolerance without its margin."""
     return size - _margin(size, margin)
 
 
-def _margin(size, most):
+def _margin(size: Any, most: float) -> Any:
     return np.minimum(_SHARE * size, most)
 
 
-def _beyond_shape(shape, point, margin):
+def _beyond_shape(shape: Volume, point: np.ndarray, margin: float) -> np.ndarray:
     """The vector (3,) from a shape, smaller by ``margin`` [m] all round, to a point (3,) in its frame; 0 within."""
     if isinstance(shape, Box):
         half = _inner(0.5 * np.asarray(shape.size), margin)
@@ -152,7 +162,7 @@ def _beyond_shape(shape, point, margin):
     return normals[worst] * max(0.0, float(beyond[worst]))
 
 
-def _of_angles(angles):
+def _of_angles(angles: np.ndarray) -> np.ndarray:
     """Return the matrix (3, 3) from an angular velocity in the fixed frame to the rates of angles about x, then the new
     y, then the new z."""
     sine_x, cosine_x = math.sin(angles[0]), math.cos(angles[0])
@@ -162,7 +172,7 @@ def _of_angles(angles):
     return np.array([np.array([1.0, 0.0, 0.0]) - sine_y * about_z, [0.0, cosine_x, sine_x], about_z])
 
 
-def _of_rotation_vector(vector):
+def _of_rotation_vector(vector: np.ndarray) -> np.ndarray:
     """Return the matrix (3, 3) from an angular velocity in the fixed frame to the rate of a rotation vector."""
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -175,7 +185,7 @@ def _of_rotation_vector(vector):
     return np.eye(3) - 0.5 * cross + factor * cross @ cross
 
 
-def _bounds(model, group, constraints, near):
+def _bounds(model: PlanningModel, group: Group, constraints: ConstraintSet, near: np.ndarray) -> np.ndarray:
     """Bounds (k, 2) of the joints, including joint constraints; continuous joints get one turn around ``near``."""
     bounds = np.array(model.bounds[group.indices])
     turns = model.continuous[group.indices]

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Regions of points and rotations: tests whether one is inside, and random samples."""
+from __future__ import annotations
+
 import math
 import weakref
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,18 +13,23 @@ from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import axis_rotation, rpy_matrix
 
+if TYPE_CHECKING:
+    from numpy.random import Generator as Random
+
+    Volume = Box | Sphere | Cylinder | Cone | TriangleMesh
+
 # Tolerance of comparisons with an edge [m], for rounding errors.
 _EDGE = 1e-9
 # The planes of meshes, made once for each.
 _planes = weakref.WeakKeyDictionary()
 
 
-def has_inside(shape):
+def has_inside(shape: object) -> bool:
     """Whether a point can be in a shape."""
     return isinstance(shape, Box | Sphere | Cylinder | Cone | TriangleMesh)
 
 
-def holds(shape, point):
+def holds(shape: Volume, point: np.ndarray) -> bool:
     """Whether ``point`` (3 or more,), in the shape's frame, lies in it or on its edge."""
     x, y, z = map(float, point[:3])
     if isinstance(shape, Sphere):
@@ -36,7 +45,7 @@ def holds(shape, point):
     return abs(z) <= 0.5 * shape.length + _EDGE and math.hypot(x, y) <= radius + _EDGE
 
 
-def planes_of(shape, point):
+def planes_of(shape: Cone | TriangleMesh, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (normals (n, 3) outwards, offsets (n,) along them, depths (n,) of the shape's middle behind them) of the
     planes that bound a mesh, or a cone next to ``point`` (3,)."""
     if isinstance(shape, TriangleMesh):
@@ -50,7 +59,7 @@ def planes_of(shape, point):
     return np.array(((0.0, 0.0, -1.0), side)), offsets, offsets
 
 
-def _planes_of_mesh(mesh):
+def _planes_of_mesh(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     corners, middle = mesh.vertices[mesh.triangles], mesh.vertices.mean(axis=0)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outwards = np.einsum("na,na->n", normals, corners[:, 0] - middle)
@@ -59,7 +68,7 @@ def _planes_of_mesh(mesh):
     return normals, offsets, offsets - normals @ middle
 
 
-def point_in(shape, generator):
+def point_in(shape: Volume, generator: Random) -> np.ndarray:
     """Return a random point (3,) of a shape, in its frame, uniformly distributed."""
     if isinstance(shape, Sphere):
         direction = generator.normal(size=3)
@@ -81,19 +90,19 @@ def point_in(shape, generator):
     return 0.5 * (low + high)
 
 
-def size_of(shape):
+def size_of(shape: Volume) -> float:
     """Return the approximate extent of a shape [m]."""
     if isinstance(shape, TriangleMesh):
         return float(np.ptp(shape.vertices, axis=0).max())
     return max(shape.size) if isinstance(shape, Box) else max(shape.radius, getattr(shape, "length", 0.0))
 
 
-def middle_of(shape):
+def middle_of(shape: Volume) -> np.ndarray:
     """Return the point (3,) of a shape to try first, in its frame."""
     return shape.vertices.mean(axis=0) if isinstance(shape, TriangleMesh) else np.zeros(3)
 
 
-def turn_within(tolerances, as_vector, generator):
+def turn_within(tolerances: Sequence[float], as_vector: bool, generator: Random) -> np.ndarray:
     """Return a random rotation (3, 3) within ``tolerances`` (3,) [rad], as in OrientationTarget."""
     angles = generator.uniform(-1.0, 1.0, 3) * np.minimum(tolerances, math.pi)
     if as_vector:
@@ -103,7 +112,7 @@ def turn_within(tolerances, as_vector, generator):
     return rpy_matrix(angles[0], 0, 0) @ rpy_matrix(0, angles[1], 0) @ rpy_matrix(0, 0, angles[2])
 
 
-def rotation_vector(turn):
+def rotation_vector(turn: np.ndarray) -> np.ndarray:
     """Return axis times angle (3,) [rad] of a rotation (3, 3)."""
     sine = 0.5 * np.array((turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]))
     length, cosine = float(np.linalg.norm(sine)), 0.5 * (np.trace(turn) - 1.0)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,14 @@ from motion_planning.constraints import regions
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.constraints.targets import ConstraintError
 from motion_planning.kinematics import KinematicsFailure, NoIkSolution, limbs_of
+
+if TYPE_CHECKING:
+    from motion_planning.constraints import ConstraintSet
+    from motion_planning.constraints.targets import OrientationTarget, PositionTarget
+    from motion_planning.exact import ExactChecker
+    from motion_planning.kinematics import Limb
+    from motion_planning.model import Group, PlanningModel
+    from motion_planning.scene import Scene
 
 #: Number of tried postures after which a sampler without a valid one gives up, and greatest number of postures that it
 #: yields.
@@ -27,7 +37,8 @@ _SAME = 1e-3
 _AT_LIMIT = 1e-6
 
 
-def sampler(model, group, constraints, scene, exact, seed, stop=None):
+def sampler(model: PlanningModel, group: str, constraints: ConstraintSet, scene: Scene, exact: ExactChecker | None,
+            seed: int, stop: Callable[[], bool] | None = None) -> Sampler:
     """Return a :class:`Sampler`. group: name. Raises ConstraintError and ModelError for unknown names."""
     return Sampler((model, model.group(group), constraints.resolved(scene)), scene, exact, seed, stop)
 
@@ -40,7 +51,8 @@ class Sampler:
     reason: why it ended without one, or early; else None.
     """
 
-    def __init__(self, problem, scene, exact, seed, stop=None):
+    def __init__(self, problem: tuple[PlanningModel, Group, ConstraintSet], scene: Scene, exact: ExactChecker | None,
+                 seed: int, stop: Callable[[], bool] | None = None) -> None:
         """``problem``: PlanningModel, Group and the resolved ConstraintSet. Raises ConstraintError."""
         self._model, self._group, self._constraints = problem
         self._scene, self._exact, self._stop = scene, exact, stop
@@ -53,10 +65,10 @@ class Sampler:
         self._postures = iter(()) if empty else self._checked()
         self.reason = empty
 
-    def __iter__(self):
+    def __iter__(self) -> Sampler:
         return self
 
-    def __next__(self):
+    def __next__(self) -> np.ndarray:
         q = next(self._postures, None)
         if q is None:
             if self.reason is None and not self._given:
@@ -67,7 +79,7 @@ class Sampler:
 
     # -- limits and checks --------------------------------------------------------------------------------------
 
-    def _ranges(self):
+    def _ranges(self) -> tuple[np.ndarray, np.ndarray, str | None]:
         """Least and greatest value (n,) of each joint within limits and joint constraints; the reason if there is
         none."""
         (low, high), named = self._model.bounds.T.copy(), set()
@@ -91,7 +103,7 @@ class Sampler:
             named.add(one.joint)
         return low, high, None
 
-    def _checked(self):
+    def _checked(self) -> Iterator[np.ndarray]:
         """Yield the valid candidates."""
         fruitless = 0
         for q in self._candidates():
@@ -110,7 +122,7 @@ class Sampler:
             if fruitless >= _FRUITLESS:
                 return
 
-    def _refusal(self, q):
+    def _refusal(self, q: np.ndarray) -> str | None:
         """Return why a posture ``q`` (n,) is not valid, as a kind and an example; None if it is valid."""
         index = self._group.indices
         beyond = self._model.beyond_limits(q, _AT_LIMIT, index)
@@ -126,7 +138,7 @@ class Sampler:
                 return "%s '%s' touches '%s'" % (contacts[0].a_kind, contacts[0].a, contacts[0].b)
         return None
 
-    def _why(self):
+    def _why(self) -> str:
         if not self._refused:
             return self._unreachable or "no posture of group '%s' was found" % self._group.name
         (text, times), tried = self._refused.most_common(1)[0], sum(self._refused.values())
@@ -134,13 +146,13 @@ class Sampler:
 
     # -- candidates ---------------------------------------------------------------------------------------------
 
-    def _candidates(self):
+    def _candidates(self) -> Iterator[np.ndarray]:
         """Postures q (n,), most of which satisfy the constraints."""
         if self._constraints.positions or self._constraints.orientations:
             return self._by_kinematics()
         return self._by_joints()
 
-    def _by_joints(self):
+    def _by_joints(self) -> Iterator[np.ndarray]:
         """Within the ranges of the joints: first the middle of constrained joints and the present value of the others;
         then random values."""
         index = self._group.indices
@@ -159,7 +171,7 @@ class Sampler:
         while True:
             yield self._outside_as_it_is(self._model.wrapped(self._random()))
 
-    def _by_kinematics(self):
+    def _by_kinematics(self) -> Iterator[np.ndarray]:
         """By inverse kinematics of poses within the tolerances, from the present posture and from random ones."""
         links = list(dict.fromkeys(one.link for one in constraints_with_links(self._constraints)))
         try:
@@ -188,10 +200,10 @@ class Sampler:
                 yield q
             first = False
 
-    def _independent(self, links):
+    def _independent(self, links: Sequence[str]) -> list[Limb]:
         """The limbs of those of ``links`` that share no joint, the most constrained ones first. Raises
         KinematicsFailure."""
-        def weight(link):
+        def weight(link: str) -> tuple[int, int]:
             many = sum(one.link == link for one in constraints_with_links(self._constraints))
             return -many, -len(limbs_of(self._model, self._group, [link])[0].indices)
 
@@ -204,7 +216,7 @@ class Sampler:
             chosen.append(link)
         return limbs_of(self._model, self._group, chosen)
 
-    def _brought(self, q, manifold):
+    def _brought(self, q: np.ndarray, manifold: Manifold) -> np.ndarray:
         """``q`` (n,), or a posture near it that satisfies the constraints on all links, if one is found."""
         own = q[self._group.indices]
         near = None if manifold.keeps(own) else manifold.project(own)
@@ -214,7 +226,7 @@ class Sampler:
         whole[self._group.indices] = near
         return self._model.wrapped(whole)
 
-    def _solutions(self, limbs, first):
+    def _solutions(self, limbs: Sequence[Limb], first: bool) -> list[np.ndarray]:
         """Postures [q (n,), ...] that put each link of ``limbs`` at a pose within its constraints.
 
         ``first``: one posture at the middle of them, near the scene's state.
@@ -238,7 +250,7 @@ class Sampler:
             together.append(self._model.wrapped(self._outside_as_it_is(q)))
         return together
 
-    def _goal(self, link, start, first):
+    def _goal(self, link: str, start: np.ndarray, first: bool) -> np.ndarray:
         """A pose (4, 4) of a link, or position (3,) if the orientation is free, within its constraints.
 
         ``first``: in the middle of them. Unconstrained parts come from the posture ``start`` (n,).
@@ -261,7 +273,7 @@ class Sampler:
         pose[:3, 3] = point - pose[:3, :3] @ position.offset
         return pose
 
-    def _is_wide(self):
+    def _is_wide(self) -> bool:
         """Whether the tolerances are wide, so that another pose may have a solution if one has none."""
         placed = {one.link for one in self._constraints.positions}
         turned = {one.link for one in self._constraints.orientations}
@@ -270,16 +282,16 @@ class Sampler:
                 or any(regions.size_of(shape) > _ONE for one in self._constraints.positions
                        for shape, _ in one.regions))
 
-    def _random(self):
+    def _random(self) -> np.ndarray:
         return self._generator.uniform(self._low, self._high)
 
-    def _outside_as_it_is(self, q):
+    def _outside_as_it_is(self, q: np.ndarray) -> np.ndarray:
         """``q`` (n,) in the group's joints, the scene's state in all others."""
         whole = np.array(self._scene.state.q)
         whole[self._group.indices] = q[self._group.indices]
         return whole
 
 
-def constraints_with_links(constraints):
+def constraints_with_links(constraints: ConstraintSet) -> tuple[PositionTarget | OrientationTarget, ...]:
     """Return the constraints of a set that are on links."""
     return constraints.positions + constraints.orientations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,13 @@ from motion_planning.errors import PlanningError
 from motion_planning.scene import Scene, TriangleMesh, WorldObject
 from motion_planning.shapes import read_only
 from urdf_model.transforms import inverse, matrix_from_quaternion
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.constraints.regions import Volume
+    from motion_planning.exact import Contact, ExactChecker
+    from motion_planning.model import PlanningModel, State
 
 #: Margin of comparisons with a tolerance, for rounding errors [rad, m].
 _ROUNDING = 1e-9
@@ -42,13 +49,13 @@ class JointTarget:
     below: float = 1e-4
     weight: float = 1.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _finite("joint '%s'" % self.joint, self.position, self.above, self.below, self.weight)
         if self.above < 0.0 or self.below < 0.0:
             raise ConstraintError("tolerances of joint '%s' are +%g and -%g; expected 0 or more"
                                   % (self.joint, self.above, self.below))
 
-    def evaluate(self, context):
+    def evaluate(self, context: Context) -> Evaluation:
         index = context.variable(self.joint)
         value = float(context.state.q[index])
         off = value - self.position
@@ -59,7 +66,7 @@ class JointTarget:
                           "joint '%s' is at %.4f; expected %.4f to %.4f"
                           % (self.joint, value, self.position - self.below, self.position + self.above))
 
-    def resolved(self, scene):
+    def resolved(self, scene: Scene) -> JointTarget:
         return self
 
 
@@ -72,12 +79,12 @@ class PositionTarget:
     """
 
     link: str
-    regions: tuple
-    offset: np.ndarray = (0.0, 0.0, 0.0)
+    regions: tuple[tuple[Volume, np.ndarray], ...]
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frame: str = ""
     weight: float = 1.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "offset", read_only(self.offset))
         object.__setattr__(self, "regions", tuple((shape, read_only(pose)) for shape, pose in self.regions))
         _finite("the position of link '%s'" % self.link, self.offset, self.weight, *(pose for _, pose in self.regions))
@@ -88,7 +95,7 @@ class PositionTarget:
                 raise ConstraintError("the position of link '%s' has a %s as region, which has no volume"
                                       % (self.link, type(shape).__name__))
 
-    def evaluate(self, context):
+    def evaluate(self, context: Context) -> Evaluation:
         link, frame = context.link_pose(self.link), context.frame(self.frame)
         point = link[:3, :3] @ self.offset + link[:3, 3]
         distances, inside = [], False
@@ -100,7 +107,7 @@ class PositionTarget:
                           "link '%s' is at %.4f %.4f %.4f, %.4f m from the middle of its region and outside of it"
                           % (self.link, *point, min(distances)))
 
-    def resolved(self, scene):
+    def resolved(self, scene: Scene) -> PositionTarget:
         frame = _frame(scene, self.frame)
         link, inside = holder(scene, self.link)
         placed = tuple((shape, frame @ pose) for shape, pose in self.regions)
@@ -124,7 +131,7 @@ class OrientationTarget:
     # The constraint's axes, in the link (3, 3): not the link's own if the constraint is on an attached object.
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         try:
             rotation = np.asarray(self.rotation, dtype=np.float64)
             rotation = matrix_from_quaternion(rotation) if rotation.shape == (4,) else rotation
@@ -138,7 +145,7 @@ class OrientationTarget:
                                   % (self.link, list(self.tolerances)))
         object.__setattr__(self, "rotation", read_only(rotation))
 
-    def evaluate(self, context):
+    def evaluate(self, context: Context) -> Evaluation:
         wanted = context.frame(self.frame)[:3, :3] @ self.rotation
         turn = wanted.T @ context.link_pose(self.link)[:3, :3] @ self.axes
         angles = self.angles(turn)
@@ -147,7 +154,7 @@ class OrientationTarget:
                           "link '%s' is turned by %.4f %.4f %.4f rad (x, y, z) from its target; allowed %g %g %g"
                           % (self.link, *angles, *self.tolerances))
 
-    def angles(self, turn):
+    def angles(self, turn: np.ndarray) -> np.ndarray:
         """Return the angles (3,) of a rotation (3, 3) that the tolerances bound; of equivalent ones, those that fit
         best."""
         if self.rotation_vector:
@@ -159,7 +166,7 @@ class OrientationTarget:
         return min((np.array((x, y, z)), np.array(flipped)), key=lambda angles: max(
             abs(angle) - allowed for angle, allowed in zip(angles, self.tolerances, strict=True)))
 
-    def resolved(self, scene):
+    def resolved(self, scene: Scene) -> OrientationTarget:
         link, inside = holder(scene, self.link)
         rotation = _frame(scene, self.frame)[:3, :3] @ self.rotation
         return replace(self, link=link, rotation=rotation, frame="", axes=inside[:3, :3] @ self.axes)
@@ -188,7 +195,7 @@ class VisibilityTarget:
     # Links that may be in the line of sight: of the sensor and of the target.
     may_touch: tuple[str, ...] = field(default=())
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("target_pose", "sensor_pose"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         _finite("a visibility", self.target_radius, self.target_pose, self.sensor_pose, self.max_view_angle,
@@ -198,7 +205,7 @@ class VisibilityTarget:
                                   "or more, got %s, %s and %s" % (self.view_axis, self.cone_sides, self.target_radius))
         object.__setattr__(self, "may_touch", (*self.may_touch, self.target_frame, self.sensor_frame))
 
-    def evaluate(self, context):
+    def evaluate(self, context: Context) -> Evaluation:
         target = context.frame(self.target_frame) @ self.target_pose
         sensor = context.frame(self.sensor_frame) @ self.sensor_pose
         axis, line = sensor[:3, 2 - self.view_axis], target[:3, 3] - sensor[:3, 3]
@@ -212,54 +219,55 @@ class VisibilityTarget:
                 return Evaluation(False, self.weight * (angle - limit), "%s by %.4f rad; at most %.4f are allowed"
                                   % (what, angle, limit))
         if self.target_radius > 0.0 and context.exact is not None:
-            for contact in self._in_the_way(context, sensor, target):
+            for contact in self._in_the_way(context, context.exact, sensor, target):
                 if contact.a not in self.may_touch:
                     return Evaluation(False, self.weight * contact.depth, "'%s' is between the sensor and the "
                                       "target" % contact.a)
         return Evaluation(True, 0.0, "")
 
-    def _in_the_way(self, context, sensor, target):
+    def _in_the_way(self, context: Context, exact: ExactChecker, sensor: np.ndarray,
+                    target: np.ndarray) -> list[Contact]:
         turns = np.linspace(0.0, 2.0 * math.pi, self.cone_sides, endpoint=False)
         rim = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=1) * self.target_radius
         rim = rim @ target[:3, :3].T + target[:3, 3]
         count = self.cone_sides
         sides = [(0, 1 + k, 1 + (k + 1) % count) for k in range(count)]
         disc = [(count + 1, 1 + (k + 1) % count, 1 + k) for k in range(count)]
-        cone = TriangleMesh(np.vstack([sensor[:3, 3], rim, target[:3, 3]]), sides + disc)
+        cone = TriangleMesh(np.vstack([sensor[:3, 3], rim, target[:3, 3]]), np.array(sides + disc))
         alone = Scene(context.model, context.state).with_object(
             WorldObject("line of sight", np.eye(4), ((cone, np.eye(4)),)))
-        return [one for one in context.exact.contacts(alone) if one.b == "line of sight"]
+        return [one for one in exact.contacts(alone) if one.b == "line of sight"]
 
-    def resolved(self, scene):
+    def resolved(self, scene: Scene) -> VisibilityTarget:
         return self  # one of the two moves with the robot, otherwise the constraint could not be influenced
 
 
 class Context:
     """A state of a robot in a scene, with the frames of both looked up once."""
 
-    def __init__(self, model, state, scene, exact=None):
+    def __init__(self, model: PlanningModel, state: State, scene: Scene, exact: ExactChecker | None = None) -> None:
         self.model, self.state, self.exact = model, state, exact
         self._scene = scene.with_state(state)
         self._frames = None
 
-    def variable(self, joint):
+    def variable(self, joint: str) -> int:
         if joint not in self.model.index:
             raise ConstraintError("a constraint names joint '%s', which is unknown or cannot be moved"
                                   % joint)
         return self.model.index[joint]
 
-    def link_pose(self, link):
+    def link_pose(self, link: str) -> np.ndarray:
         if link in self.model.link_index:
             if self._frames is None:
                 self._frames = self.model.frames(self.state.q, self.state.base)
             return self._frames[self.model.link_index[link]]
         return _frame(self._scene, link)
 
-    def frame(self, name):
+    def frame(self, name: str) -> np.ndarray:
         return _frame(self._scene, name)
 
 
-def _frame(scene, name):
+def _frame(scene: Scene, name: str) -> np.ndarray:
     if not name:
         return np.eye(4)
     try:
@@ -268,7 +276,7 @@ def _frame(scene, name):
         raise ConstraintError("a constraint names a frame: %s" % error) from None
 
 
-def holder(scene, name):
+def holder(scene: Scene, name: str) -> tuple[str, np.ndarray]:
     """Return (link, pose (4, 4) in it) of a link, of an attached object, or of an object's subframe. Raises
     ConstraintError for other names."""
     if name in scene.model.link_index:
@@ -280,6 +288,6 @@ def holder(scene, name):
     return link, inverse(scene.frame(link)) @ _frame(scene, name)
 
 
-def _finite(what, *numbers):
+def _finite(what: str, *numbers: ArrayLike) -> None:
     if not all(np.isfinite(number).all() for number in numbers):
         raise ConstraintError("%s has a number that is not finite" % what)

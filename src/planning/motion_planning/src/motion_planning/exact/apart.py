@@ -5,13 +5,22 @@ The ``forms`` of shapes: kinds (m,), BOX ... PLANE; firsts, counts (m,) of their
 of the shape's bounds, and half sides of a box along the shape's axes. A box, sphere, cylinder, cone or plane is one
 node. Other shapes are a tree of boxes around their parts, those of node k in nodes 2 k + 1 and 2 k + 2, leaves last.
 """
+from __future__ import annotations
+
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from disk_cache.compiled import compiler
 from motion_planning.model import kernels as model_kernels
+
+if TYPE_CHECKING:
+    Triple = tuple[float, float, float]
+    Where = tuple[int, np.ndarray, np.ndarray]
+    Convex = tuple[int, np.ndarray, Triple, np.ndarray]
+    Forms = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 BOX, SPHERE, CYLINDER, CONE, PLANE = range(5)
 # Shapes that are nearer than this are not apart [m].
@@ -24,13 +33,13 @@ compiled = compiler("motion_planning_exact", [Path(__file__), Path(__file__).wit
 
 
 @compiled
-def stack():
+def stack() -> np.ndarray:
     """Return what ``pair_apart`` works in."""
     return np.empty((_ROOM, 2), np.int64)
 
 
 @compiled
-def pair_apart(one, here, other, there, waiting):
+def pair_apart(one: Forms, here: Where, other: Forms, there: Where, waiting: np.ndarray) -> bool:
     """Whether a shape of the forms ``one`` is proven to be apart from one of ``other``. here, there: the shape's index,
     and the turn (3, 3) and place (3,) of its bounds' axes and centre. False only means that there is no proof.
     """
@@ -67,7 +76,7 @@ def pair_apart(one, here, other, there, waiting):
 
 
 @compiled
-def _moved(turn, place, box):
+def _moved(turn: np.ndarray, place: np.ndarray, box: np.ndarray) -> Triple:
     x, y, z = box[0], box[1], box[2]
     return (place[0] + turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
             place[1] + turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
@@ -75,12 +84,12 @@ def _moved(turn, place, box):
 
 
 @compiled
-def _size(box):
+def _size(box: np.ndarray) -> float:
     return max(box[3], box[4], box[5])
 
 
 @compiled
-def _convex_apart(one, other, steps):
+def _convex_apart(one: Convex, other: Convex, steps: int) -> bool:
     """Whether a plane between two convex shapes (kind, turn, centre, half sides) is found, in some ``steps`` beyond
     that of their boxes.
     """
@@ -119,7 +128,8 @@ def _convex_apart(one, other, steps):
 
 
 @compiled
-def _apart_from_plane(kind, turn, centre, half, plane_turn, plane):
+def _apart_from_plane(kind: int, turn: np.ndarray, centre: Triple, half: np.ndarray, plane_turn: np.ndarray,
+                      plane: Triple) -> bool:
     x, y, z = plane_turn[0, 2], plane_turn[1, 2], plane_turn[2, 2]
     height = x * (centre[0] - plane[0]) + y * (centre[1] - plane[1]) + z * (centre[2] - plane[2])
     u, v, w = _farthest(kind, turn, half, x, y, z)
@@ -129,7 +139,7 @@ def _apart_from_plane(kind, turn, centre, half, plane_turn, plane):
 
 
 @compiled
-def _farthest(kind, turn, half, x, y, z):
+def _farthest(kind: int, turn: np.ndarray, half: np.ndarray, x: float, y: float, z: float) -> Triple:
     """The point of a shape, about its centre, that is farthest in direction x, y, z."""
     if kind == SPHERE:
         share = half[0] / math.sqrt(x * x + y * y + z * z)
@@ -154,7 +164,8 @@ def _farthest(kind, turn, half, x, y, z):
 
 
 @compiled
-def boxes_meet(turn_a, centre_a, half_a, turn_b, centre_b, half_b):
+def boxes_meet(turn_a: np.ndarray, centre_a: np.ndarray | Triple, half_a: np.ndarray, turn_b: np.ndarray,
+               centre_b: np.ndarray | Triple, half_b: np.ndarray) -> bool:
     """Whether two boxes overlap or are nearer than a micrometre: no one of 15 axes separates them (Gottschalk 1996).
 
     All in scalars: an array made here would take longer than the rest.
@@ -191,7 +202,8 @@ def boxes_meet(turn_a, centre_a, half_a, turn_b, centre_b, half_b):
 
 
 @compiled
-def _along(turn_a, axis, x, y, z, turn_b):
+def _along(turn_a: np.ndarray, axis: int, x: float, y: float, z: float,
+           turn_b: np.ndarray) -> tuple[float, float, float, float]:
     """What (x, y, z) and the three axes of b are along an axis of a."""
     u, v, w = turn_a[0, axis], turn_a[1, axis], turn_a[2, axis]
     return (u * x + v * y + w * z, u * turn_b[0, 0] + v * turn_b[1, 0] + w * turn_b[2, 0],

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import fcl
 import numpy as np
@@ -16,8 +17,20 @@ from motion_planning.exact import kernels
 from motion_planning.exact.geometry import grown, plane_overlap
 from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, without_fixed_joints
 from motion_planning.model import ModelError
-from motion_planning.shapes import TriangleMesh
+from motion_planning.shapes import Octree, TriangleMesh
 from urdf_model import Mesh, Plane
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.exact.kernels import RobotAt
+    from motion_planning.model import PlanningModel, State
+    from motion_planning.scene import AllowedCollisions, Scene, WorldObject
+    from motion_planning.shapes import Geometry, Meshes
+
+T = TypeVar("T")
+#: Pairs of movers; links and movers that differ between postures; what has been found of pairs of names.
+_Pairing = tuple[np.ndarray, tuple[np.ndarray, np.ndarray], dict[tuple[str, str], bool]]
 
 #: Number of cached tables of scenes: a scene and its few successors are checked many times.
 _KEPT = 12
@@ -46,7 +59,7 @@ class Contact:
     normal: np.ndarray
     depth: float
 
-    def __str__(self):
+    def __str__(self) -> str:
         words = {ROBOT: "link", OBJECT: "object", ATTACHED: "attached object"}
         return "%s '%s' and %s '%s' overlap by %.4f m" % (words[self.a_kind], self.a, words[self.b_kind], self.b,
                                                           self.depth)
@@ -69,7 +82,7 @@ class ExactChecker:
     are left out.
     """
 
-    def __init__(self, model, meshes):
+    def __init__(self, model: PlanningModel, meshes: Meshes) -> None:
         """``meshes``: function from the file name of a mesh to its shapes.TriangleMesh, or raises PlanningError."""
         self.model, self.meshes = model, meshes
         self.warnings = []
@@ -83,7 +96,7 @@ class ExactChecker:
         self._still = frozenset(k for k, part in enumerate(self._robot) if not any(
             joint.movable for joint in model.robot.chain(model.root, part.name)))
 
-    def free(self, scene, state=None, group=None):
+    def free(self, scene: Scene, state: State | None = None, group: str | None = None) -> bool:
         """Whether ``state`` (None: the scene's) is free of collisions. ``group``: name of a group; then only pairs of
         which one moves with it are checked. Raises ModelError for an unknown group, and for joint values that do not
         fit the model or are not finite.
@@ -92,15 +105,15 @@ class ExactChecker:
             query = self._query(scene, state, group)
             return not any(self._touches(query, i, j) for i, j in self._near(query))
 
-    def first_blocked(self, scene, postures, group=None):
+    def first_blocked(self, scene: Scene, postures: ArrayLike, group: str | None = None) -> int | None:
         """Return the index of the first of ``postures`` that is in collision, None if all are free.
 
         postures: (m, n), or (m, k) values of the joints of ``group``, the others as in the scene's state; faster than
         :meth:`free` for each. Errors as in :meth:`free`.
         """
         indices = slice(None) if group is None else self.model.group(group).indices
-        whole = np.tile(scene.state.q, (len(postures), 1))
         rows = np.asarray(postures, dtype=np.float64)
+        whole = np.tile(scene.state.q, (len(rows), 1))
         # Whole postures are recognized by their length; for a group with all joints, in its own order, both are the
         # same.
         if len(rows) and rows.shape[1:] == (len(self.model.variables),) != whole[0, indices].shape:
@@ -126,7 +139,8 @@ class ExactChecker:
                 begin, count = begin + count, _POSTURES
         return None
 
-    def contacts(self, scene, state=None, group=None, most=100):
+    def contacts(self, scene: Scene, state: State | None = None, group: str | None = None,
+                 most: int = 100) -> list[Contact]:
         """Return a list of Contact, the deepest one of each pair of bodies in contact; at most ``most``.
 
         Arguments and errors are those of :meth:`free`.
@@ -145,7 +159,7 @@ class ExactChecker:
                     break
         return list(found.values())
 
-    def distance(self, scene, state=None, group=None):
+    def distance(self, scene: Scene, state: State | None = None, group: str | None = None) -> float:
         """Return the least distance [m] of two bodies that must not touch: 0 for contacts, inf if there are no such
         bodies.
 
@@ -154,7 +168,7 @@ class ExactChecker:
         nearest = self.nearest(scene, state, group)
         return math.inf if nearest is None else nearest.distance
 
-    def nearest(self, scene, state=None, group=None):
+    def nearest(self, scene: Scene, state: State | None = None, group: str | None = None) -> Nearest | None:
         """Return the Nearest of two bodies that must not touch, None if there are none.
 
         Arguments and errors are those of :meth:`free`.
@@ -177,7 +191,7 @@ class ExactChecker:
                         break
         return best
 
-    def prepare(self, scene, group=None, check=lambda: None):
+    def prepare(self, scene: Scene, group: str | None = None, check: Callable[[], None] = lambda: None) -> None:
         """Make what the first question about a scene would make. ``check()`` is called between shapes; what it raises
         ends the preparation, and what is made by then is kept. Raises PlanningError for objects in hand that cannot be
         checked against each other."""
@@ -196,7 +210,7 @@ class ExactChecker:
 
     # -- a question about a state -------------------------------------------------------------------------------
 
-    def _query(self, scene, state, group):
+    def _query(self, scene: Scene, state: State | None, group: str | None) -> _Query:
         state = scene.state if state is None else state
         q = np.array(state.q, dtype=np.float64)
         if q.shape != (len(self.model.variables),) or not math.isfinite(q.dot(q)):
@@ -211,11 +225,11 @@ class ExactChecker:
         return _Query((self._kinematics, q, base), movers, pairs, moving,
                       self._fixed(scene), scene.allowed, memory)
 
-    def _near(self, query):
+    def _near(self, query: _Query) -> list[list[int]]:
         """List of [i, j] that may touch, as from kernels.unproven, without allowed pairs."""
         return [[i, j] for _, i, j in self._unproven(query, query.robot[1][None])]
 
-    def _unproven(self, query, postures):
+    def _unproven(self, query: _Query, postures: np.ndarray) -> list[list[int]]:
         """List of [number of a posture (p, n), i, j], as from kernels.unproven, without allowed pairs."""
         kinematics, _, base = query.robot
         arguments = ((kinematics, base), postures, query.movers.arrays, (query.pairs, *query.moving),
@@ -226,13 +240,13 @@ class ExactChecker:
             count = kernels.unproven(*arguments, self._rows)
         return [row for row in self._rows[:count].tolist() if not query.may_touch(*row[1:])]
 
-    def _touches(self, query, i, j):
+    def _touches(self, query: _Query, i: int, j: int) -> bool:
         a, b = query.object(i), query.object(j)
         if a is None or b is None:
             return query.plane_depth(i, j) >= 0.0
         return fcl.collide(a, b, _ANY, fcl.CollisionResult()) > 0
 
-    def _contact(self, query, i, j):
+    def _contact(self, query: _Query, i: int, j: int) -> Contact | None:
         a, b = query.object(i), query.object(j)
         part, other = query.movers.parts[i], query.part(j)
         names = part.name, other.name, part.kind, other.kind
@@ -254,7 +268,7 @@ class ExactChecker:
         normal = -one.normal if turned else one.normal
         return Contact(*names, np.array(one.pos), np.array(normal), abs(one.penetration_depth))
 
-    def _gap(self, query, i, j):
+    def _gap(self, query: _Query, i: int, j: int) -> tuple[float, np.ndarray, np.ndarray]:
         a, b = query.object(i), query.object(j)
         if a is None or b is None:
             depth = query.plane_depth(i, j)
@@ -265,11 +279,12 @@ class ExactChecker:
             return 0.0, middle, middle
         result = fcl.DistanceResult()
         distance = fcl.distance(a, b, _DISTANCE, result)
-        return max(0.0, float(distance)), *map(np.array, result.nearest_points)
+        one, other = result.nearest_points
+        return max(0.0, float(distance)), np.array(one), np.array(other)
 
     # -- tables -------------------------------------------------------------------------------------------------
 
-    def _robot_parts(self, meshes):
+    def _robot_parts(self, meshes: Meshes) -> list[Part]:
         parts = []
         for index, name in enumerate(self.model.links):
             for collision in self.model.robot.links[name].collisions:
@@ -281,7 +296,7 @@ class ExactChecker:
                 parts.append(Part(name, ROBOT, index, shape, collision.origin))
         return parts
 
-    def _kept(self, key, held, make):
+    def _kept(self, key: Hashable, held: object, make: Callable[[], T]) -> T:
         """``make()``, or its cached result for the same key; ``held``: the objects whose identities form the key."""
         entry = self._tables.get(key)
         if entry is None:
@@ -293,14 +308,14 @@ class ExactChecker:
         return entry[1]
 
     @staticmethod
-    def _movers_key(scene, state):
+    def _movers_key(scene: Scene, state: State) -> tuple[Hashable, object]:
         held = tuple(table for table in (state.attached, scene.link_padding, scene.link_scale) if table)
         return ("movers", *map(id, held)), held
 
-    def _movers(self, scene, state):
+    def _movers(self, scene: Scene, state: State) -> Movers:
         return self._kept(*self._movers_key(scene, state), lambda: self._make_movers(scene, state))
 
-    def _make_movers(self, scene, state):
+    def _make_movers(self, scene: Scene, state: State) -> Movers:
         parts = self._robot
         if scene.link_padding or scene.link_scale:
             parts = [part._replace(shape=grown(part.shape, scene.link_padding.get(part.name, 0.0),
@@ -311,12 +326,12 @@ class ExactChecker:
         return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies},
                       self._carriers)
 
-    def _pairing(self, scene, movers, group):
+    def _pairing(self, scene: Scene, movers: Movers, group: str | None) -> _Pairing:
         held = movers, scene.allowed
         return self._kept(("pairs", *map(id, held), group), held,
                           lambda: self._make_pairing(scene.allowed, movers, group))
 
-    def _make_pairing(self, allowed, movers, group):
+    def _make_pairing(self, allowed: AllowedCollisions, movers: Movers, group: str | None) -> _Pairing:
         moving, carriers = None, np.arange(len(self._kinematics[0]))
         if group is not None:
             moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
@@ -324,22 +339,22 @@ class ExactChecker:
         return movers.pairs(allowed, moving), (carriers, np.flatnonzero(np.isin(movers.arrays[0], carriers))), {}
 
     @staticmethod
-    def _fixed_key(scene):
+    def _fixed_key(scene: Scene) -> tuple[Hashable, object]:
         held = scene.objects, scene.octomap
         return ("fixed", *map(id, held)), held
 
-    def _fixed(self, scene):
+    def _fixed(self, scene: Scene) -> Fixed:
         return self._kept(*self._fixed_key(scene), lambda: self._make_fixed(scene))
 
-    def _make_fixed(self, scene):
+    def _make_fixed(self, scene: Scene) -> Fixed:
         return Fixed([Part(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in _things(scene)
                       for shape, pose in thing.shapes], self._geometries)
 
 
-def _things(scene):
+def _things(scene: Scene) -> list[WorldObject]:
     """The objects of a scene and its octomap that have shapes to check."""
     octomap = scene.octomap
-    if octomap is not None and any(len(shape.boxes) for shape, _ in octomap.shapes):
+    if octomap is not None and any(isinstance(shape, Octree) and len(shape.boxes) for shape, _ in octomap.shapes):
         return [*scene.objects.values(), octomap]
     return list(scene.objects.values())
 
@@ -347,18 +362,19 @@ def _things(scene):
 class _Query:
     """One state in one scene: poses of all bodies, computed on demand."""
 
-    def __init__(self, robot, movers, pairs, moving, fixed, allowed, memory):
+    def __init__(self, robot: RobotAt, movers: Movers, pairs: np.ndarray, moving: tuple[np.ndarray, np.ndarray],
+                 fixed: Fixed, allowed: AllowedCollisions, memory: dict[tuple[str, str], bool]) -> None:
         self.robot, self.movers, self.pairs, self.moving, self.fixed = robot, movers, pairs, moving, fixed
         self.poses = np.empty((len(movers.parts), 4, 4))
         self._allowed, self._memory, self._placed = allowed, memory, set()
 
-    def move(self, q, still):
+    def move(self, q: np.ndarray, still: frozenset[int]) -> None:
         """Move the robot to ``q`` (n,); movers in ``still`` keep their poses."""
         self.robot = self.robot[0], q, self.robot[2]
         self._placed &= still
         kernels.fill_poses(self.robot, self.movers.arrays, self.poses)
 
-    def may_touch(self, i, j):
+    def may_touch(self, i: int, j: int) -> bool:
         """Whether mover ``i`` may touch the fixed shape ``j`` < 0; allowed pairs of two movers are excluded before."""
         if j >= 0:
             return False
@@ -367,16 +383,16 @@ class _Query:
             self._memory[key] = self._allowed.allowed(*key)
         return self._memory[key]
 
-    def part(self, j):
+    def part(self, j: int) -> Part:
         return self.movers.parts[j] if j >= 0 else self.fixed.parts[-1 - j]
 
-    def geometry(self, j):
+    def geometry(self, j: int) -> Any:
         return self.movers.geometries[j] if j >= 0 else self.fixed.geometry(-1 - j)
 
-    def pose(self, j):
+    def pose(self, j: int) -> np.ndarray:
         return self.poses[j] if j >= 0 else self.fixed.poses[-1 - j]
 
-    def object(self, j):
+    def object(self, j: int) -> Any:
         """The fcl.CollisionObject of a mover or fixed shape at its pose, None for a plane."""
         if j < 0:
             return self.fixed.object(-1 - j)
@@ -387,7 +403,7 @@ class _Query:
             self._placed.add(j)
         return one
 
-    def plane_depth(self, i, j):
+    def plane_depth(self, i: int, j: int) -> float:
         """The overlap of the two, one of them a plane; below 0 their distance."""
         if isinstance(self.part(i).shape, Plane):
             i, j = j, i
@@ -395,7 +411,7 @@ class _Query:
             return -math.inf
         return plane_overlap(self.pose(j), self.part(i).shape, self.pose(i))
 
-    def plane_point(self, i, j):
+    def plane_point(self, i: int, j: int) -> tuple[np.ndarray, np.ndarray]:
         """(point (3,) on the plane below or above the other's middle, normal (3,) from mover ``i`` to ``j``)."""
         is_plane = isinstance(self.part(i).shape, Plane)
         plane, other = (self.pose(i), self.pose(j)) if is_plane else (self.pose(j), self.pose(i))
@@ -404,7 +420,7 @@ class _Query:
         return other[:3, 3] - height * plane[:3, 2], away if is_plane else -away
 
 
-def _touch(names, pose, other):
+def _touch(names: tuple[str, str, str, str], pose: np.ndarray, other: np.ndarray) -> Contact:
     """The Contact of two shapes at ``pose`` and ``other`` (4, 4) for which FCL reports no contact point."""
     way = other[:3, 3] - pose[:3, 3]
     length = float(np.linalg.norm(way))
@@ -412,7 +428,7 @@ def _touch(names, pose, other):
     return Contact(*names, 0.5 * (pose[:3, 3] + other[:3, 3]), normal, 0.0)
 
 
-def _read(geometry, meshes):
+def _read(geometry: Geometry | Mesh, meshes: Meshes) -> Geometry:
     if not isinstance(geometry, Mesh):
         return geometry
     mesh = meshes(geometry.filename)

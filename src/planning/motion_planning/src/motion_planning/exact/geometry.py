@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """FCL geometry of shapes, their bounding boxes, and planes without thickness, which FCL does not have."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import fcl
 import numpy as np
@@ -10,6 +12,9 @@ from motion_planning.exact import apart
 from motion_planning.exact.octree import occupied_tree
 from motion_planning.shapes import Cone, Octree, TriangleMesh
 from urdf_model import Box, Cylinder, Plane, Sphere
+
+if TYPE_CHECKING:
+    from motion_planning.shapes import Geometry
 
 _KINDS = {Sphere: apart.SPHERE, Cylinder: apart.CYLINDER, Cone: apart.CONE, Plane: apart.PLANE}
 # The greatest number of triangles or cubes in a leaf of a shape's tree of boxes, and the most levels of such a tree.
@@ -30,7 +35,7 @@ class Bounds(NamedTuple):
     radius: float
 
 
-def bounds_of(shape):
+def bounds_of(shape: Geometry) -> Bounds:
     """Return the :class:`Bounds` of a shape. Raises TypeError for other objects."""
     zero = np.zeros(3)
     if isinstance(shape, Box):
@@ -55,7 +60,7 @@ def bounds_of(shape):
     raise TypeError("%r is not a shape that can collide" % (shape,))
 
 
-def form_of(shape, bounds):
+def form_of(shape: Geometry, bounds: Bounds) -> tuple[int, np.ndarray]:
     """Return (kind, nodes (n, 6)) of a shape with these Bounds, see ``apart``."""
     if not isinstance(shape, TriangleMesh | Octree):
         return _KINDS.get(type(shape), apart.BOX), np.array([[0.0, 0.0, 0.0, *bounds.half]])
@@ -84,7 +89,7 @@ def form_of(shape, bounds):
         low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
 
 
-def fcl_geometry(shape):
+def fcl_geometry(shape: Geometry) -> Any:
     """Return the FCL geometry of a shape; None for a plane; use :func:`plane_overlap` for that."""
     if isinstance(shape, Plane):
         return None
@@ -106,7 +111,7 @@ def fcl_geometry(shape):
     return fcl.OcTree(shape.resolution, occupied_tree(shape))
 
 
-def _with_areas(mesh):
+def _with_areas(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray]:
     """(vertices, triangles) of a mesh with slivers in place of triangles that have no area: FCL 0.7 misses some spheres
     that touch those, and sees others that do not."""
     corners = mesh.vertices[mesh.triangles]
@@ -132,12 +137,13 @@ def _with_areas(mesh):
     return np.vstack([mesh.vertices, slivers.reshape(-1, 3)]), triangles
 
 
-def grown(shape, padding, scale):
+def grown(shape: Geometry, padding: float, scale: float) -> Geometry:
     """Return a shape scaled about its middle and then grown by ``padding`` [m] to every side."""
     if padding == 0.0 and scale == 1.0:
         return shape
     if isinstance(shape, Box):
-        return Box(tuple(side * scale + 2.0 * padding for side in shape.size))
+        x, y, z = (side * scale + 2.0 * padding for side in shape.size)
+        return Box((x, y, z))
     if isinstance(shape, Sphere):
         return Sphere(shape.radius * scale + padding)
     if isinstance(shape, Cylinder | Cone):
@@ -150,7 +156,7 @@ def grown(shape, padding, scale):
     return shape
 
 
-def plane_overlap(plane_pose, shape, pose):
+def plane_overlap(plane_pose: np.ndarray, shape: Geometry, pose: np.ndarray) -> float:
     """Return the overlap of a shape with a plane [m]; below 0, its distance from the plane.
 
     ``plane_pose`` (4, 4): the plane is the x-y plane of this frame, infinite and without thickness; ``pose`` (4, 4):
@@ -162,7 +168,7 @@ def plane_overlap(plane_pose, shape, pose):
     return min(height + high, -(height + low))
 
 
-def _extent(shape, direction):
+def _extent(shape: Geometry, direction: np.ndarray) -> tuple[float, float]:
     """(lowest, highest) of a shape along the unit vector ``direction``, in the shape's frame, about its origin."""
     if isinstance(shape, Sphere):
         return -shape.radius, shape.radius

@@ -6,7 +6,10 @@ centres (m, 3), halves (m, 3) and radii (m,) of their bounds. Fixed shapes (f) h
 halves (f, 3), radii (f,) in the planning frame, sorted so that chunks of them lie together: starts (c + 1,), balls (c,
 4) centre and radius of each chunk. Both have forms, see ``apart``.
 """
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +17,18 @@ from motion_planning.exact import apart
 from motion_planning.exact.apart import boxes_meet, compiled, pair_apart
 from motion_planning.model.kernels import fill_frame
 
+if TYPE_CHECKING:
+    from motion_planning.exact.apart import Forms
+    from motion_planning.model.kernels import Kinematics
+
+    RobotAt = tuple[Kinematics, np.ndarray, np.ndarray]
+    MoverArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Forms]
+    FixedArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Forms]
+    Work = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
 
 @compiled
-def place(robot, movers, links, which, work):
+def place(robot: RobotAt, movers: MoverArrays, links: np.ndarray, which: np.ndarray, work: Work) -> None:
     """Write the ``frames`` (l, 4, 4) of ``links`` (indices, parents first) and the ``poses`` (m, 4, 4), ``rotations``
     (m, 3, 3) and ``places`` (m, 3) of the boxes of the movers ``which`` (indices). robot: kinematics, q, base; work:
     frames, poses, rotations, places."""
@@ -39,19 +51,21 @@ def place(robot, movers, links, which, work):
 
 
 @compiled
-def _work_arrays(kinematics, poses):
+def _work_arrays(kinematics: Kinematics, poses: np.ndarray) -> Work:
     count = poses.shape[0]
     return np.empty((kinematics[0].shape[0], 4, 4)), poses, np.empty((count, 3, 3)), np.empty((count, 3))
 
 
 @compiled
-def fill_poses(robot, movers, poses):
+def fill_poses(robot: RobotAt, movers: MoverArrays, poses: np.ndarray) -> None:
     """Fill ``poses`` (m, 4, 4) with those of all movers. robot: kinematics, q, base."""
     place(robot, movers, np.arange(robot[0][0].shape[0]), np.arange(poses.shape[0]), _work_arrays(robot[0], poses))
 
 
 @compiled
-def unproven(robot, postures, movers, checked, fixed, poses, out):
+def unproven(robot: tuple[Kinematics, np.ndarray], postures: np.ndarray, movers: MoverArrays,
+             checked: tuple[np.ndarray, np.ndarray, np.ndarray], fixed: FixedArrays, poses: np.ndarray,
+             out: np.ndarray) -> int:
     """Fill ``out`` (o, 3) with what may touch; return how many rows there are, which may be more than ``out`` has.
 
     robot: kinematics, base. postures (p, n). A row is the index of a posture and two movers, or a mover and -1 - the
@@ -99,7 +113,8 @@ def unproven(robot, postures, movers, checked, fixed, poses, out):
 
 
 @compiled
-def gaps(robot, movers, pairs, active, fixed, poses):
+def gaps(robot: RobotAt, movers: MoverArrays, pairs: np.ndarray, active: np.ndarray, fixed: FixedArrays,
+         poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return rows (o, 2) of two movers, or a mover and -1 - the fixed shape, of all that is checked, and (o,) [m] below
     which none of their distances is.
 
@@ -129,19 +144,19 @@ def gaps(robot, movers, pairs, active, fixed, poses):
 
 
 @compiled
-def _square(a, b):
+def _square(a: np.ndarray, b: np.ndarray) -> float:
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return x * x + y * y + z * z
 
 
 @compiled
-def _to_box(point, rotation, centre, half):
+def _to_box(point: np.ndarray, rotation: np.ndarray, centre: np.ndarray, half: np.ndarray) -> float:
     """Distance of a point from a box."""
     return math.sqrt(_square_to_box(point, rotation, centre, half))
 
 
 @compiled
-def _square_to_box(point, rotation, centre, half):
+def _square_to_box(point: np.ndarray, rotation: np.ndarray, centre: np.ndarray, half: np.ndarray) -> float:
     square = 0.0
     x, y, z = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
     for a in range(3):

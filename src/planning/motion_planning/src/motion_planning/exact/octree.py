@@ -4,19 +4,26 @@
 Each inner node is two bytes, two bits for each of its children (x the lowest bit of a child's number, then y, z): 0
 unknown, 1 free, 2 occupied, 3 an inner node itself, which follows in the order of a depth-first walk.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.shapes import OCTREE_DEPTH
 
+if TYPE_CHECKING:
+    from motion_planning.shapes import Octree
+
 _OCCUPIED, _INNER = 2, 3
 
 
-def occupied_tree(octree):
+def occupied_tree(octree: Octree) -> np.ndarray:
     """Return the stream (bytes as int8) of a ``shapes.Octree`` with at least one cube."""
     boxes = octree.boxes
     levels = np.rint(np.log2(boxes[:, 3] / octree.resolution)).astype(np.int64)
     keys = np.floor(boxes[:, :3] / octree.resolution).astype(np.int64) + 2 ** (OCTREE_DEPTH - 1)
-    codes = sum(_spread(keys[:, axis]) << axis for axis in range(3))
+    codes = _spread(keys[:, 0]) | _spread(keys[:, 1]) << 1 | _spread(keys[:, 2]) << 2
     for level in np.unique(levels):
         # A cube within a larger one adds nothing, and would take the larger one's place in the stream.
         covered = (levels < level) & np.isin(codes >> (3 * level), codes[levels == level] >> (3 * level))
@@ -34,7 +41,7 @@ def occupied_tree(octree):
     return masks[np.lexsort((depth, first))].astype("<u2").view(np.int8)
 
 
-def _spread(values):
+def _spread(values: np.ndarray) -> np.ndarray:
     """Numbers of 16 bits with two zero bits between each two."""
     spread = np.zeros(len(values), dtype=np.int64)
     for bit in range(OCTREE_DEPTH):

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The shapes of a robot, of what it holds and of the world, as the compiled code and FCL want them."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import fcl
@@ -8,6 +11,16 @@ import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of
+
+if TYPE_CHECKING:
+    from motion_planning.exact.apart import Forms
+    from motion_planning.exact.geometry import Bounds
+    from motion_planning.model.kernels import Kinematics
+    from motion_planning.scene import AllowedCollisions
+    from motion_planning.shapes import Geometry
+
+    #: Index of a link, and a pose (4, 4) in its frame.
+    Carrier = tuple[int, np.ndarray]
 
 ROBOT, OBJECT, ATTACHED = "robot", "object", "attached"
 #: Fixed shapes of one chunk: all of them are passed over when the chunk's ball is far away.
@@ -23,11 +36,11 @@ class Part(NamedTuple):
     name: str
     kind: str
     link: int
-    shape: object
+    shape: Geometry
     pose: np.ndarray
 
 
-def without_fixed_joints(kinematics):
+def without_fixed_joints(kinematics: Kinematics) -> tuple[Kinematics, list[Carrier]]:
     """Return (kinematics, carriers) without the fixed joints of ``kinematics``, see ``model.kernels``: of the root and
     the links behind the other joints alone; for each link the index of the one among them that it moves with, and its
     pose (4, 4) there."""
@@ -49,10 +62,10 @@ def without_fixed_joints(kinematics):
 class Geometries:
     """Bounds, forms and FCL geometries of shapes, each made once as long as the shape lives."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._known, self._geometries = WeakKeyDictionary(), WeakKeyDictionary()
 
-    def of(self, shape):
+    def of(self, shape: Geometry) -> tuple[Bounds, tuple[int, np.ndarray]]:
         """Return (Bounds, form, see ``form_of``)."""
         entry = self._known.get(shape)
         if entry is None:
@@ -60,14 +73,14 @@ class Geometries:
             entry = self._known[shape] = bounds, form_of(shape, bounds)
         return entry
 
-    def geometry(self, shape):
+    def geometry(self, shape: Geometry) -> Any:
         """Return the FCL geometry of a shape, None for a plane."""
         if shape not in self._geometries:
             self._geometries[shape] = fcl_geometry(shape)
         return self._geometries[shape]
 
 
-def _forms(found):
+def _forms(found: Sequence[tuple[Bounds, tuple[int, np.ndarray]]]) -> Forms:
     """The forms of ``apart`` for entries of Geometries."""
     counts = np.array([len(nodes) for _, (_, nodes) in found], dtype=np.int64)
     return (np.array([kind for _, (kind, _) in found], dtype=np.int64), np.cumsum(counts) - counts, counts,
@@ -77,7 +90,8 @@ def _forms(found):
 class Movers:
     """Shapes that move with the robot."""
 
-    def __init__(self, parts, geometries, touch, carriers):
+    def __init__(self, parts: Sequence[Part], geometries: Geometries, touch: Mapping[str, frozenset[str]],
+                 carriers: Sequence[Carrier]) -> None:
         """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; carriers: see
         ``without_fixed_joints``."""
         self.parts, self.touch = parts, touch
@@ -92,7 +106,7 @@ class Movers:
             np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3),
             np.array([bounds.radius for bounds, _ in found], dtype=float), _forms(found))
 
-    def pairs(self, allowed, moving):
+    def pairs(self, allowed: AllowedCollisions, moving: set[int] | None) -> np.ndarray:
         """Return (p, 2) indices of movers that are checked against each other, of two things each.
 
         ``moving``: set of link indices of which at least one is in each pair, None for all.
@@ -118,7 +132,7 @@ class Movers:
             return np.empty((0, 2), dtype=np.int64)
         return np.sort(np.concatenate(found), axis=1)
 
-    def _may_touch(self, allowed, ones):
+    def _may_touch(self, allowed: AllowedCollisions, ones: Sequence[Part]) -> np.ndarray:
         """(n, n) bool: whether two of ``ones`` (n Parts), one of each thing, may touch."""
         may = allowed.among([one.name for one in ones])
         links = np.array([one.link for one in ones])
@@ -136,7 +150,7 @@ class Movers:
 class Fixed:
     """Shapes that stand in the world."""
 
-    def __init__(self, parts, geometries):
+    def __init__(self, parts: Sequence[Part], geometries: Geometries) -> None:
         count = len(parts)
         poses = np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4)
         found = [geometries.of(part.shape) for part in parts]
@@ -158,19 +172,19 @@ class Fixed:
         self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves[order], radii, starts, balls,
                        _forms([found[k] for k in order]))
 
-    def object(self, k):
+    def object(self, k: int) -> Any:
         """Return the fcl.CollisionObject of shape ``k``, None for a plane; made when it is first needed."""
         if self._objects[k] is None and self.geometry(k) is not None:
             pose = self.poses[k]
             self._objects[k] = fcl.CollisionObject(self.geometry(k), fcl.Transform(pose[:3, :3], pose[:3, 3]))
         return self._objects[k]
 
-    def geometry(self, k):
+    def geometry(self, k: int) -> Any:
         """Return the FCL geometry of shape ``k``, None for a plane."""
         return self._geometries.geometry(self.parts[k].shape)
 
 
-def _neighbours_together(centres, radii):
+def _neighbours_together(centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Order in which what is near each other comes together: large things first, then along a curve through cells."""
     if len(centres) <= _CHUNK:
         return np.arange(len(centres))

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A rounded corner between two commands: the second begins while the first still slows down."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +11,12 @@ from motion_planning.industrial.curves import Spline
 from motion_planning.industrial.profile import WINDOW_S
 from motion_planning.timing import Timed
 from urdf_model.transforms import rigid
+
+if TYPE_CHECKING:
+    from motion_planning.cartesian import Follower, Line
+    from motion_planning.industrial.curves import Arc
+    from motion_planning.industrial.limits import CartesianLimits
+    from motion_planning.industrial.sequence import Piece
 
 # Points of a corner: greatest distance in time [s], and least number.
 _SPACING_S, _FEWEST = 0.25 * WINDOW_S, 16
@@ -21,7 +30,7 @@ class Blend:
     and the joints follow it; else the joints are summed.
     """
 
-    def __init__(self, one, other, overlap):
+    def __init__(self, one: Piece, other: Piece, overlap: float) -> None:
         """one, other: commands in time (way, timed, profile)."""
         self.overlap = overlap
         self._ways = one.way, other.way
@@ -31,10 +40,11 @@ class Blend:
         self.motion = [a + b for a, b in zip(one.timed.sampled(late), other.timed.sampled(self.times), strict=True)]
         self.motion[0] = self.motion[0] - corner
         self._poses = None
-        if one.way.path is not None and other.way.path is not None:
-            self._follow(one.profile.at(late)[0], other.profile.at(self.times)[0])
+        first, second, follower = one.way.path, other.way.path, one.way.follower
+        if first is not None and second is not None and follower is not None:
+            self._follow((first, second), follower, one.profile.at(late)[0], other.profile.at(self.times)[0])
 
-    def excess(self, limits):
+    def excess(self, limits: CartesianLimits) -> float:
         """The factor by which the corner must take longer to respect the limits of joints, and of the link on lines or
         arcs; 1 or less if it does. limits: CartesianLimits."""
         model, indices = self._ways[0].scene.model, self._ways[0].group.indices
@@ -51,16 +61,17 @@ class Blend:
                          math.sqrt(bend / (scaling[1] * max(limits.trans_acceleration, limits.trans_deceleration))))
         return excess / 0.999
 
-    def _follow(self, before, after):
+    def _follow(self, paths: tuple[Line | Arc, Line | Arc], follower: Follower, before: np.ndarray,
+                after: np.ndarray) -> None:
         """Move the joints' sum to where the link's sum is; before, after (m,): fractions of both ways."""
-        one, other = self._ways
-        corner = one.path.at(1.0)
+        one, other = paths
+        corner = one.at(1.0)
         positions, corrections = [], []
         for q, u, v in zip(self.motion[0], np.clip(before, 0.0, 1.0), np.clip(after, 0.0, 1.0), strict=True):
-            a, b = one.path.at(u), other.path.at(v)
+            a, b = one.at(u), other.at(v)
             pose = rigid(a[:3, :3] @ corner[:3, :3].T @ b[:3, :3], a[:3, 3] + b[:3, 3] - corner[:3, 3])
             positions.append(pose[:3, 3])
-            corrections.append(one.follower.solved(pose, q) - q)
+            corrections.append(follower.solved(pose, q) - q)
         corrections = np.array(corrections)
         corrections[[0, -1]] = 0.0
         value, slope, bend = Spline(self.times / self.overlap, corrections).at(self.times / self.overlap)

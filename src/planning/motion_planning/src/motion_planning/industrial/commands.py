@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Single commands: point to point, line, arc."""
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,19 @@ from motion_planning.industrial.profile import WINDOW_S, Profile
 from motion_planning.pipeline import Code, Plan, PlanningFailure, PlanQuery
 from motion_planning.timing import Timed, within_limits
 from urdf_model.transforms import rotation_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from motion_planning.industrial.curves import Arc
+    from motion_planning.industrial.goals import Goal
+    from motion_planning.industrial.limits import CartesianLimits
+    from motion_planning.model import Group
+    from motion_planning.pipeline import Tools
+    from motion_planning.scene import Scene
+
+    #: Velocity, acceleration and deceleration of the fraction.
+    Limits = tuple[float, float, float]
 
 PLANNERS = ("PTP", "LIN", "CIRC")
 
@@ -50,7 +66,7 @@ class Command:
 
     query: PlanQuery
     auxiliary: Auxiliary | None = None
-    start_velocities: Any = ()
+    start_velocities: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,30 +76,38 @@ class Motion:
     false if start and goal are the same; scene: Scene at the start."""
 
     command: Command
-    scene: Any
-    curve: Any
-    path: Any
-    follower: Any
-    limits: tuple
+    scene: Scene
+    curve: Straight | Spline
+    path: Line | Arc | None
+    follower: Follower | None
+    limits: Limits
     moves: bool = True
 
     @property
-    def group(self):
+    def link(self) -> str:
+        """The link that the follower moves, "" without one."""
+        return self.follower.link if self.follower is not None else ""
+
+    @property
+    def group(self) -> Group:
         return self.scene.model.groups[self.command.query.group]
 
-    def pose(self, fraction):
+    def pose(self, fraction: float) -> np.ndarray:
         """The link's pose (4, 4)."""
         if self.path is not None:
             return self.path.at(fraction)
+        if self.follower is None:
+            raise PlanningFailure(Code.NO_IK_SOLUTION, "group '%s' is not a chain; no link of it has a pose"
+                                  % self.group.name)
         return self.follower.pose_of_link(self.curve.at(np.array([fraction]))[0][0])
 
     @property
-    def end(self):
+    def end(self) -> np.ndarray:
         """The group's joints (k,) at the goal."""
         return self.curve.at(np.ones(1))[0][0]
 
 
-def plan(command, tools, limits):
+def plan(command: Command, tools: Tools, limits: CartesianLimits) -> Plan:
     """Return the pipeline.Plan of a :class:`Command`; tools: pipeline.Tools; limits: CartesianLimits.
 
     PTP: all joints start and arrive together, each with the same share of its motion at each time. LIN, CIRC: the link
@@ -98,7 +122,7 @@ def plan(command, tools, limits):
     return Plan(command.query.scene.state, timed.positions, timed, tools.clock() - begin)
 
 
-def motion(command, tools, limits):
+def motion(command: Command, tools: Tools, limits: CartesianLimits) -> Motion:
     """Return the :class:`Motion` of a command. Raises PlanningFailure."""
     query, model = command.query, command.query.scene.model
     _understand(command)
@@ -106,22 +130,22 @@ def motion(command, tools, limits):
     start = query.scene.state.q[group.indices]
     goal = goal_of(query, tools)
     scaling = (query.velocity_scaling, query.acceleration_scaling)
-    if query.planner_id == "PTP":
+    if goal.q is not None:
         reach = float(np.abs(goal.q - start).max())
         slowest = scaling[0] * model.velocity[group.indices].min(), scaling[1] * model.acceleration[group.indices].min()
         moves = reach > _NOTHING
         speeds = tuple(limit / max(reach, _NOTHING) for limit in (*slowest, slowest[1]))
         follower = Follower(model, group, query.scene.state, goal.link, None) if goal.link else None
         return Motion(command, query.scene, Straight(start, goal.q), None, follower, speeds, moves)
-    follower = _follower(query, group, goal.link)
-    path = _path(command, follower.pose_of_link(start), goal.pose)
+    follower, end = _follower(query, group, goal)
+    path = _path(command, follower.pose_of_link(start), end)
     if path.length < _NOTHING and path.angle < _NOTHING:
         return Motion(command, query.scene, Straight(start, start), path, follower, (1.0, 1.0, 1.0), False)
     curve = _followed(path, follower, start, (query.planner_id, tools.stop))
     return Motion(command, query.scene, curve, path, follower, limits.along(path.length, path.angle, scaling))
 
 
-def in_time(way, limits=None, stretch=1.0):
+def in_time(way: Motion, limits: Limits | None = None, stretch: float = 1.0) -> tuple[Timed, Profile, float]:
     """Return (Timed, Profile, factor by which it takes longer than by its own limits) of a Motion.
 
     limits: velocity, acceleration and deceleration of the fraction, None: the Motion's; stretch: least factor by which
@@ -140,7 +164,7 @@ def in_time(way, limits=None, stretch=1.0):
         intervals *= 2
     else:
         raise PlanningFailure(Code.PLANNING_FAILED, "the joints cannot follow the way of link '%s' within %g m; the "
-                              "arm is near a singular posture" % (way.follower.link, DEVIATION_M))
+                              "arm is near a singular posture" % (way.link, DEVIATION_M))
     if way.path is None:
         model, indices = way.scene.model, way.group.indices
         return within_limits(timed, model.velocity[indices], model.acceleration[indices]), profile, stretch
@@ -152,7 +176,7 @@ def in_time(way, limits=None, stretch=1.0):
     return in_time(way, limits, stretch * excess * _MORE)
 
 
-def check(scene, query, timed, tools):
+def check(scene: Scene, query: PlanQuery, timed: Timed, tools: Tools) -> None:
     """Raise PlanningFailure if a Timed of the query's group exceeds position limits, violates a path constraint, or
     collides in ``scene``."""
     model, group = scene.model, scene.model.groups[query.group]
@@ -184,7 +208,7 @@ def check(scene, query, timed, tools):
                 raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the way violates the path constraints: %s" % violated)
 
 
-def _understand(command):
+def _understand(command: Command) -> None:
     """Raise PlanningFailure for an incomplete or impossible command."""
     query, model = command.query, command.query.scene.model
     if query.planner_id not in PLANNERS:
@@ -210,17 +234,18 @@ def _understand(command):
                               "limits are %.4f and %.4f" % beyond[0], joints={beyond[0][0]: beyond[0][1]})
 
 
-def _follower(query, group, link):
-    if link is None:
+def _follower(query: PlanQuery, group: Group, goal: Goal) -> tuple[Follower, np.ndarray]:
+    """The Follower of the goal's link, and the link's pose at the goal."""
+    if goal.link is None or goal.pose is None:
         raise PlanningFailure(Code.NO_IK_SOLUTION, "group '%s' is not a chain; %s needs a link to move: give a pose as "
                               "goal, or another group" % (group.name, query.planner_id))
     try:
-        return Follower(query.scene.model, group, query.scene.state, link, None)
+        return Follower(query.scene.model, group, query.scene.state, goal.link, None), goal.pose
     except CartesianError as error:
         raise PlanningFailure(Code.NO_IK_SOLUTION, str(error)) from None
 
 
-def _path(command, begin, end):
+def _path(command: Command, begin: np.ndarray, end: np.ndarray) -> Line | Arc:
     if command.query.planner_id == "LIN":
         return Line(begin, end)
     auxiliary = command.auxiliary
@@ -236,7 +261,7 @@ def _path(command, begin, end):
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "no circle: %s" % error) from None
 
 
-def _followed(path, follower, start, doing):
+def _followed(path: Line | Arc, follower: Follower, start: np.ndarray, doing: tuple[str, Callable[[], bool]]) -> Spline:
     """The Spline of joints along ``path``; doing: (planner, stop())."""
     planner, stop = doing
     steps = max(_FEWEST_STEPS, math.ceil(path.length / _STEP_M), math.ceil(path.angle / _STEP_RAD))
@@ -254,16 +279,16 @@ def _followed(path, follower, start, doing):
     return Spline([0.0, *follower.fractions], points)
 
 
-def _points(way, profile, times):
+def _points(way: Motion, profile: Profile, times: np.ndarray) -> Timed:
     fraction, speed, rate = profile.at(times)
     value, slope, bend = way.curve.at(np.clip(fraction, 0.0, 1.0))
     speed, rate = speed[:, None], rate[:, None]
     return Timed(times, value, slope * speed, bend * speed**2 + slope * rate)
 
 
-def _deviation(way, profile, timed):
+def _deviation(way: Motion, profile: Profile, timed: Timed) -> float:
     """The link's distance from its path between the points of a trajectory, as a multiple of the allowed distance."""
-    if way.path is None:
+    if way.path is None or way.follower is None:
         return 0.0
     gaps = np.diff(timed.times)[:, None] * _BETWEEN
     times = (timed.times[:-1, None] + gaps).ravel()
@@ -272,32 +297,32 @@ def _deviation(way, profile, timed):
         wanted, met = way.path.at(min(max(fraction, 0.0), 1.0)), way.follower.pose_of_link(q)
         worst = max(worst, np.linalg.norm(wanted[:3, 3] - met[:3, 3]) / DEVIATION_M,
                     rotation_angle(wanted[:3, :3].T @ met[:3, :3]) / DEVIATION_RAD)
-    return worst
+    return float(worst)
 
 
-def _excess(way, timed):
+def _excess(way: Motion, timed: Timed) -> float:
     """The factor by which a trajectory must take longer to respect the joints' limits, 1 or less if it does."""
     model, indices = way.scene.model, way.group.indices
     speeds, accelerations = timed.peaks()
     return max((speeds / model.velocity[indices]).max(), math.sqrt((accelerations / model.acceleration[indices]).max()))
 
 
-def _too_slow(way, timed, slower):
+def _too_slow(way: Motion, timed: Timed, slower: float) -> PlanningFailure:
     """The PlanningFailure of a path that a joint can follow only ``slower`` times as slowly."""
     speeds = timed.peaks()[0] / way.scene.model.velocity[way.group.indices]
     at, joint = np.unravel_index(speeds.argmax(), speeds.shape)
     return PlanningFailure(
         Code.PLANNING_FAILED, "joint '%s' cannot keep up with link '%s' after %.0f %% of the way: the command would "
         "have to be %.0f times slower than asked for; lower its scaling factors, or keep away from singular postures"
-        % (way.group.joints[joint], way.follower.link, 100.0 * timed.times[at] / timed.duration, slower))
+        % (way.group.joints[joint], way.link, 100.0 * timed.times[at] / timed.duration, slower))
 
 
-def _stopped(tools):
+def _stopped(tools: Tools) -> None:
     if tools.stop():
         raise PlanningFailure(Code.PREEMPTED, "planning was stopped")
 
 
-def failing(error, number, count):
+def failing(error: PlanningError, number: int, count: int) -> PlanningError:
     """The PlanningFailure of a command of a sequence; ``number`` from 1 on."""
     text = "command %d of %d: %s" % (number, count, error)
     if isinstance(error, PlanningFailure):

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Arcs of a link, and curves of joints through points. Their parameter is the fraction of the path, 0 to 1."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motion_planning.cartesian import Line
 from motion_planning.errors import PlanningError
 from urdf_model.transforms import axis_rotation, rigid
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # The distances of start and goal from a given centre may differ by this much [m].
 _CENTRE_TOLERANCE_M = 1e-2
@@ -22,19 +28,19 @@ class Arc:
     """Poses (4, 4) on an arc of a circle; the rotation turns about one axis, in step with it. length [m], angle [rad]:
     of the arc, and of the link's rotation."""
 
-    def __init__(self, begin, end, centre, axis, sweep):
+    def __init__(self, begin: np.ndarray, end: np.ndarray, centre: np.ndarray, axis: np.ndarray, sweep: float) -> None:
         """begin, end (4, 4); centre, axis (3,): of the circle; sweep [rad], above 0: about the axis."""
         self._turn, self._centre, self._axis, self._sweep = Line(begin, end), centre, axis, sweep
         self._arm = begin[:3, 3] - centre
         self.length, self.angle = sweep * float(np.linalg.norm(self._arm)), self._turn.angle
 
-    def at(self, fraction):
+    def at(self, fraction: float) -> np.ndarray:
         """Return the pose at ``fraction`` of the path."""
         position = self._centre + axis_rotation(self._axis, fraction * self._sweep) @ self._arm
         return rigid(self._turn.at(fraction)[:3, :3], position)
 
 
-def arc_about(begin, end, centre):
+def arc_about(begin: np.ndarray, end: np.ndarray, centre: np.ndarray) -> Arc:
     """Return the shorter :class:`Arc` between two poses (4, 4) about ``centre`` (3,). Raises NoCircle."""
     a, b = begin[:3, 3] - centre, end[:3, 3] - centre
     radii = np.linalg.norm(a), np.linalg.norm(b)
@@ -54,7 +60,7 @@ def arc_about(begin, end, centre):
     return Arc(begin, end, centre, across / np.linalg.norm(across), math.atan2(np.linalg.norm(across), a @ b))
 
 
-def arc_through(begin, end, interim):
+def arc_through(begin: np.ndarray, end: np.ndarray, interim: np.ndarray) -> Arc:
     """Return the :class:`Arc` between two poses (4, 4) by way of ``interim`` (3,). Raises NoCircle."""
     a, b = begin[:3, 3] - interim, end[:3, 3] - interim
     across = np.cross(a, b)
@@ -75,10 +81,10 @@ def arc_through(begin, end, interim):
 class Straight:
     """Joints (k,) in a straight line."""
 
-    def __init__(self, begin, end):
+    def __init__(self, begin: np.ndarray, end: np.ndarray) -> None:
         self._begin, self._way = begin, end - begin
 
-    def at(self, fractions):
+    def at(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return values (n, k) and two derivatives by the fraction at ``fractions`` (n,)."""
         rest = np.zeros((len(fractions), len(self._way)))
         return self._begin + fractions[:, None] * self._way, rest + self._way, rest
@@ -87,14 +93,14 @@ class Straight:
 class Spline:
     """A curve of joints through points, with two continuous derivatives."""
 
-    def __init__(self, fractions, points):
+    def __init__(self, fractions: ArrayLike, points: ArrayLike) -> None:
         """fractions (m,) from 0 to 1, strictly increasing, m at least 4; points (m, k)."""
         self._knots, self._points = np.asarray(fractions, dtype=float), np.asarray(points, dtype=float)
         first = _slope(self._knots[:4], self._points[:4])
         last = _slope(self._knots[:-5:-1], self._points[:-5:-1])
         self._bends = _bends(self._knots, self._points, first, last)
 
-    def at(self, fractions):
+    def at(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return values (n, k) and two derivatives by the fraction at ``fractions`` (n,)."""
         i = np.clip(np.searchsorted(self._knots, fractions, side="right") - 1, 0, len(self._knots) - 2)
         h = np.diff(self._knots)[i][:, None]
@@ -106,13 +112,13 @@ class Spline:
         return value, slope, left * b0 + right * b1
 
 
-def _slope(knots, points):
+def _slope(knots: np.ndarray, points: np.ndarray) -> np.ndarray:
     """The slope (k,) at the first of four points, of the cubic through them."""
     x = knots - knots[0]
     return np.linalg.solve(np.vander(x, 4, increasing=True), points)[1]
 
 
-def _bends(knots, points, first, last):
+def _bends(knots: np.ndarray, points: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Second derivatives (m, k) of the cubic spline with slopes (k,) at both ends (C. de Boor, A Practical Guide to
     Splines, chapter IV)."""
     h = np.diff(knots)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Conversion of a command's goal constraints to one posture, or one pose of one link."""
+from __future__ import annotations
+
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,10 @@ from motion_planning.kinematics import ik
 from motion_planning.pipeline import Code, PlanningFailure
 from urdf_model.transforms import rigid
 
+if TYPE_CHECKING:
+    from motion_planning.constraints import ConstraintSet
+    from motion_planning.pipeline import PlanQuery, Tools
+
 # Time limit of the search for a free goal posture [s].
 _IK_TIMEOUT_S = 0.1
 
@@ -19,12 +25,12 @@ class Goal(NamedTuple):
     """q (k,): the group's joints, None for LIN and CIRC, whose joints follow from the path; link: the moved one, None
     if the group is not a chain; pose (4, 4): of the link in the planning frame, None for PTP."""
 
-    q: Any
-    link: Any
-    pose: Any
+    q: np.ndarray | None
+    link: str | None
+    pose: np.ndarray | None
 
 
-def goal_of(query, tools):
+def goal_of(query: PlanQuery, tools: Tools) -> Goal:
     """Return the :class:`Goal` of a PlanQuery. Raises PlanningFailure."""
     if len(query.goals) != 1:
         raise _bad("%s needs exactly one goal, got %d" % (query.planner_id, len(query.goals)))
@@ -46,7 +52,7 @@ def goal_of(query, tools):
     return Goal(_reached(query, tools, link, pose), link, None)
 
 
-def _posture(query, goal):
+def _posture(query: PlanQuery, goal: ConstraintSet) -> np.ndarray:
     model, group = query.scene.model, query.scene.model.groups[query.group]
     wanted = {one.joint: one.position for one in goal.joints}
     foreign = [joint for joint in wanted if joint not in group.joints]
@@ -62,7 +68,7 @@ def _posture(query, goal):
     return state.q[group.indices]
 
 
-def _pose(query, goal):
+def _pose(query: PlanQuery, goal: ConstraintSet) -> tuple[str, np.ndarray]:
     """(link, pose (4, 4) in the planning frame) of position and orientation."""
     if len(goal.positions) != 1 or len(goal.orientations) != 1:
         raise _bad("%s needs one position and one orientation of a link, got %d and %d"
@@ -81,13 +87,13 @@ def _pose(query, goal):
     return position.link, rigid(rotation, position.regions[0][1][:3, 3] - rotation @ position.offset)
 
 
-def _reached(query, tools, link, pose):
+def _reached(query: PlanQuery, tools: Tools, link: str, pose: np.ndarray) -> np.ndarray:
     """The group's joints (k,) nearest to the start that put the link there without collision; where none do, the
     nearest without a collision of the robot with itself, whose motion is then found invalid, as by Pilz's planner."""
     scene, group = query.scene, query.scene.model.groups[query.group]
     alone, fallback = replace(scene, objects={}, octomap=None), []
 
-    def accept(q):
+    def accept(q: np.ndarray) -> str | None:
         state = scene.state.with_q(q)
         if tools.exact.free(scene, state, query.group):
             return None
@@ -108,11 +114,11 @@ def _reached(query, tools, link, pose):
                               % (group.name, link, error)) from None
 
 
-def _frame(query, q, link):
+def _frame(query: PlanQuery, q: np.ndarray, link: str) -> np.ndarray:
     scene = query.scene
     state = scene.state.with_q(q, scene.model.groups[query.group].indices)
     return scene.model.frame_of(state.q, link, state.base)
 
 
-def _bad(text):
+def _bad(text: str) -> PlanningFailure:
     return PlanningFailure(Code.INVALID_GOAL_CONSTRAINTS, text)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Velocity and acceleration limits of a link on lines and arcs."""
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 
@@ -17,7 +19,7 @@ class CartesianLimits:
     rot_velocity: float = 1.57
 
     @classmethod
-    def from_mapping(cls, mapping):
+    def from_mapping(cls, mapping: object) -> tuple[CartesianLimits, list[str]]:
         """Return (limits of a cartesian_limits.yaml's mapping, list of complaints); its deceleration is negative."""
         found, complaints = {}, []
         mapping = mapping if isinstance(mapping, dict) else {}
@@ -32,7 +34,7 @@ class CartesianLimits:
                                   "planned with %g" % (key, value, getattr(cls, name)))
         return cls(**found), complaints
 
-    def along(self, length, angle, scaling):
+    def along(self, length: float, angle: float, scaling: tuple[float, float]) -> tuple[float, float, float]:
         """Return (velocity, acceleration, deceleration) of the fraction of a path of ``length`` [m] and ``angle``
         [rad].
 

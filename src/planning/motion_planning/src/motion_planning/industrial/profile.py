@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A motion from 0 to 1 in time: full acceleration, full speed, full deceleration."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -14,7 +16,7 @@ class Profile:
     duration [s]; speeding_up, slowing_down [s]: durations of acceleration and deceleration.
     """
 
-    def __init__(self, velocity, acceleration, deceleration):
+    def __init__(self, velocity: float, acceleration: float, deceleration: float) -> None:
         """The greatest values, above 0 [1/s, 1/s^2]."""
         top = min(velocity, math.sqrt(2.0 * acceleration * deceleration / (acceleration + deceleration)))
         up, down = top / acceleration, top / deceleration
@@ -30,14 +32,14 @@ class Profile:
         areas = lengths * (self._ways[:3] + lengths * (self._speeds[:3] / 2.0 + lengths * self._rates[:3] / 6.0))
         self._areas = np.concatenate([[0.0], np.cumsum(areas)])
 
-    def at(self, times):
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return position, speed and acceleration (n,) at ``times`` (n,) [s]; at rest before 0 and after the
         end."""
         area_a, way_a, speed_a = self._plain(times - WINDOW_S)
         area_b, way_b, speed_b = self._plain(times)
         return (area_b - area_a) / WINDOW_S, (way_b - way_a) / WINDOW_S, (speed_b - speed_a) / WINDOW_S
 
-    def time_at(self, way):
+    def time_at(self, way: float) -> float:
         """Return the time at which position ``way``, 0 to 1, is reached [s]."""
         low, high = 0.0, self.duration
         for _ in range(50):
@@ -45,7 +47,7 @@ class Profile:
             low, high = (middle, high) if self.at(np.array([middle]))[0][0] < way else (low, middle)
         return high
 
-    def _plain(self, times):
+    def _plain(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The trapezoid's position, its integral and its speed (n,)."""
         times = np.maximum(times, 0.0)
         i = np.searchsorted(self._begins, times, side="right") - 1

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sequences of commands, with rounded corners on request."""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +16,12 @@ from motion_planning.industrial.commands import check, failing, in_time, motion
 from motion_planning.pipeline import Code, Plan, PlanningFailure
 from motion_planning.timing import Timed
 
+if TYPE_CHECKING:
+    from motion_planning.industrial.commands import Command, Motion
+    from motion_planning.industrial.limits import CartesianLimits
+    from motion_planning.industrial.profile import Profile
+    from motion_planning.pipeline import Tools
+
 # Rounds of slowing down the commands on both sides of a corner until it respects the limits, and margin of each round.
 _ROUNDS, _MORE = 8, 1.005
 # Points of a trajectory closer than this in time [s] are merged.
@@ -20,17 +29,18 @@ _SAME_S = 5e-3
 
 
 @dataclass
-class _Piece:
+class Piece:
     """A Motion in time. begin [s]: in its trajectory; blend: the Blend that it begins with, or None."""
 
-    way: Any
+    way: Motion
     timed: Timed
-    profile: Any
+    profile: Profile
     begin: float = 0.0
-    blend: Any = None
+    blend: Blend | None = None
 
 
-def plan_sequence(commands, radii, tools, limits):
+def plan_sequence(commands: Sequence[Command], radii: Iterable[float], tools: Tools,
+                  limits: CartesianLimits) -> list[tuple[str, Plan]]:
     """Return [(group name, pipeline.Plan), ...] of :class:`Command`\\ s that follow each other. The first starts at its
     scene's state, each other at the end of the previous one; their start states are ignored. radii (n,) [m]: distance
     from a goal at which the link may leave its path for the next one; 0: it stops at the goal. Consecutive commands of
@@ -42,7 +52,9 @@ def plan_sequence(commands, radii, tools, limits):
     begin = tools.clock()
     radii = [float(radius) for radius in radii]
     _understand(commands, radii)
-    ways, state = [], commands[0].query.scene.state if commands else None
+    if not commands:
+        return []
+    ways, state = [], commands[0].query.scene.state
     for number, command in enumerate(commands):
         try:
             command = replace(command, query=replace(command.query, scene=command.query.scene.with_state(state)),
@@ -69,7 +81,7 @@ def plan_sequence(commands, radii, tools, limits):
     return plans
 
 
-def _understand(commands, radii):
+def _understand(commands: Sequence[Command], radii: list[float]) -> None:
     negative = [number for number, radius in enumerate(radii) if not 0.0 <= radius < np.inf]
     if negative:
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "blend_radius of command %d is %g; expected 0 or more"
@@ -82,7 +94,7 @@ def _understand(commands, radii):
 class _Run:
     """Commands of one group that make one trajectory. first: number of commands of the sequence before them."""
 
-    def __init__(self, ways, radii, first, total, limits):
+    def __init__(self, ways: list[Motion], radii: list[float], first: int, total: int, limits: CartesianLimits) -> None:
         self._ways, self._radii, self._first, self._total, self._limits = ways, radii, first, total, limits
         self._stretch = np.ones(len(ways))
         for number, radius in enumerate(radii):
@@ -97,7 +109,7 @@ class _Run:
         # (fraction of the incoming path at the corner's start, of the outgoing path at its end), None without a corner.
         self._cuts = [self._cut(number, radius) if radius > 0.0 else None for number, radius in enumerate(radii)]
 
-    def joined(self):
+    def joined(self) -> Timed:
         """Return the whole as Timed. Raises PlanningFailure, NoSolution."""
         for _ in range(_ROUNDS):
             pieces = self._pieces()
@@ -111,7 +123,7 @@ class _Run:
         raise self._failure(number - 1, "the corner exceeds limits %.2f times however slow; make the blend radius "
                             "larger" % max(excesses))
 
-    def _pieces(self):
+    def _pieces(self) -> list[Piece]:
         pieces = []
         for number, way in enumerate(self._ways):
             before = self._cuts[number - 1] if number else None
@@ -121,13 +133,13 @@ class _Run:
                 timed, profile, self._stretch[number] = in_time(way, limits, self._stretch[number])
             except PlanningFailure as error:
                 raise failing(error, self._first + number + 1, self._total) from None
-            piece = _Piece(way, timed, profile)
+            piece = Piece(way, timed, profile)
             if pieces:
                 self._append(number, pieces[-1], piece)
             pieces.append(piece)
         return pieces
 
-    def _append(self, number, last, piece):
+    def _append(self, number: int, last: Piece, piece: Piece) -> None:
         """Place ``piece`` in time after ``last``, with a Blend if the corner is rounded."""
         piece.begin = last.begin + last.timed.duration
         cut = self._cuts[number - 1]
@@ -140,7 +152,7 @@ class _Run:
             raise self._failure(number - 1, "the corners at both of its ends overlap; make the blend radii smaller")
         piece.blend = Blend(last, piece, overlap)
 
-    def _cut(self, number, radius):
+    def _cut(self, number: int, radius: float) -> tuple[float, float]:
         one, other = self._ways[number], self._ways[number + 1]
         corner = self._corner(number)
         for way, fraction, what in ((one, 0.0, "start"), (other, 1.0, "goal")):
@@ -150,14 +162,14 @@ class _Run:
                                     "radius of %g m" % (what, away, radius))
         return (1.0 - _crossing(lambda u: one.pose(1.0 - u), corner, radius), _crossing(other.pose, corner, radius))
 
-    def _corner(self, number):
+    def _corner(self, number: int) -> np.ndarray:
         return self._ways[number].pose(1.0)[:3, 3]
 
-    def _failure(self, number, text):
+    def _failure(self, number: int, text: str) -> PlanningError:
         return failing(PlanningFailure(Code.INVALID_MOTION_PLAN, text), self._first + number + 1, self._total)
 
 
-def _limits(limits, first, last):
+def _limits(limits: tuple[float, float, float], first: float, last: float) -> tuple[float, float, float]:
     """Velocity, acceleration and deceleration of the fraction of a path, of which the shares ``first`` and ``last`` are
     within the spheres around corners, 0 for no corner. The speed changes over these whole shares, so that the corner is
     as round as possible.
@@ -168,7 +180,7 @@ def _limits(limits, first, last):
             top / (2.0 * last) if last else deceleration)
 
 
-def _crossing(pose, corner, radius):
+def _crossing(pose: Callable[[float], np.ndarray], corner: np.ndarray, radius: float) -> float:
     """The first fraction at which ``pose(fraction)``, beginning in the corner, is ``radius`` away from it."""
     low, high = 0.0, 1.0
     for u in np.linspace(0.0, 1.0, 201)[1:]:
@@ -185,7 +197,7 @@ def _crossing(pose, corner, radius):
     return high
 
 
-def _points(pieces):
+def _points(pieces: list[Piece]) -> Timed:
     """One Timed of all pieces."""
     rows = []
     for piece, following in zip(pieces, [*pieces[1:], None], strict=True):

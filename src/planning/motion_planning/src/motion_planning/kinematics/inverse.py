@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inverse kinematics of groups."""
+from __future__ import annotations
+
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,11 +13,19 @@ from command_line.options import counted
 from motion_planning.kinematics.limb import KinematicsFailure, NoIkSolution, limbs_of
 from motion_planning.model import Group, ModelError, State
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from arm_kinematics import Target
+    from motion_planning.kinematics import Limb
+    from motion_planning.model import PlanningModel
+
 #: Number of solutions of each limb to combine before the search restarts from another seed.
 _SEVERAL = 12
 
 
-def fk(model, q, links, base=None):
+def fk(model: PlanningModel, q: ArrayLike, links: Iterable[str],
+       base: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """Return {link: pose (4, 4) in the planning frame} of ``links`` at ``q`` (n,).
 
     ``base`` (4, 4): the root in the planning frame, None: identity. Raises ModelError for an unknown link.
@@ -25,7 +37,9 @@ def fk(model, q, links, base=None):
     return {link: frames[model.link_index[link]] for link in links}
 
 
-def ik(model, group, poses, seed, timeout_s=0.05, accept=None, clock=time.monotonic):
+def ik(model: PlanningModel, group: Group | str, poses: Mapping[str, np.ndarray], seed: State | ArrayLike,
+       timeout_s: float = 0.05, accept: Callable[[np.ndarray], str | None] | None = None,
+       clock: Callable[[], float] = time.monotonic) -> np.ndarray:
     """Return ``q`` (n,) that puts links at the given poses; only the joints of ``group`` differ from the seed.
 
     group: a Group or its name. poses: {link: pose (4, 4), or position (3,) for any orientation}, in the planning frame;
@@ -52,7 +66,8 @@ def ik(model, group, poses, seed, timeout_s=0.05, accept=None, clock=time.monoto
     return _search(model, state.q, (limbs, targets), accept, (refusal, deadline, clock))
 
 
-def _search(model, start, problem, accept, progress):
+def _search(model: PlanningModel, start: np.ndarray, problem: tuple[list[Limb], list[Target]],
+            accept: Callable[[np.ndarray], str | None], progress: tuple[str, float, Callable[[], float]]) -> np.ndarray:
     """Return the first other solution that ``accept`` accepts: near ones first, then from random postures until the
     deadline."""
     limbs, targets = problem
@@ -77,11 +92,11 @@ def _search(model, start, problem, accept, progress):
         around = generator.uniform(model.bounds[:, 0], model.bounds[:, 1])
 
 
-def _seed_of(limb, q):
+def _seed_of(limb: Limb, q: np.ndarray) -> np.ndarray:
     return np.clip(q[limb.indices], limb.chain.lower, limb.chain.upper)
 
 
-def _put(model, q, limbs, parts):
+def _put(model: PlanningModel, q: np.ndarray, limbs: Sequence[Limb], parts: Sequence[np.ndarray]) -> np.ndarray:
     """Return ``q`` (n,) with each limb's part (k,) inserted; continuous joints are wrapped to -pi to pi."""
     whole = np.array(q)
     for limb, part in zip(limbs, parts, strict=True):

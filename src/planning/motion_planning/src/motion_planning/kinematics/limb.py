@@ -2,8 +2,9 @@
 """The part of a group that moves one link."""
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,11 @@ from arm_kinematics import Chain, ChainError, KinematicsError, Several, Target, 
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import read_only
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.model import Group, PlanningModel
 
 
 class KinematicsFailure(PlanningError):
@@ -20,7 +26,7 @@ class KinematicsFailure(PlanningError):
 class NoIkSolution(KinematicsFailure):
     """There is no solution, or no acceptable one. rejected: True if solutions were found and all refused."""
 
-    def __init__(self, text, rejected=False):
+    def __init__(self, text: str, rejected: bool = False) -> None:
         super().__init__(text)
         self.rejected = rejected
 
@@ -36,7 +42,7 @@ class Limb(NamedTuple):
     chain: Chain
     indices: np.ndarray
 
-    def target(self, goal, root):
+    def target(self, goal: ArrayLike, root: np.ndarray) -> Target:
         """Return the Target in the limb's base of ``goal``, a pose (4, 4) or a position (3,) with free orientation,
         both in the frame of ``root`` (4, 4), the base's pose. Raises KinematicsFailure."""
         goal = np.asarray(goal, dtype=np.float64)
@@ -51,14 +57,14 @@ class Limb(NamedTuple):
         except (KinematicsError, ValueError) as error:
             raise KinematicsFailure("the pose of link '%s' cannot be used: %s" % (self.link, error)) from None
 
-    def nearest(self, target, seed):
+    def nearest(self, target: Target, seed: np.ndarray) -> np.ndarray:
         """Return the joint values (k,) nearest to ``seed`` (k,). Raises NoIkSolution with the reason."""
         try:
             return solve(self.chain, target, seed).q
         except KinematicsError as error:
             raise NoIkSolution("link '%s' cannot be put there: %s" % (self.link, error)) from None
 
-    def several(self, target, seed, number):
+    def several(self, target: Target, seed: np.ndarray, number: int) -> list[np.ndarray]:
         """Return up to ``number`` different joint values (k,), those near ``seed`` (k,) first; an empty list if there
         are none."""
         try:
@@ -67,7 +73,7 @@ class Limb(NamedTuple):
             return []
 
 
-def limbs_of(model, group, links):
+def limbs_of(model: PlanningModel, group: Group, links: Iterable[str]) -> list[Limb]:
     """Return a list of Limb, one for each of ``links`` (names), of the Group ``group``.
 
     Raises KinematicsFailure if a link is unknown, is not moved by the group, depends on a joint of another group in
@@ -85,7 +91,7 @@ def limbs_of(model, group, links):
 
 
 @lru_cache(maxsize=128)
-def _limb(model, group_name, link):
+def _limb(model: PlanningModel, group_name: str, link: str) -> Limb:
     group = model.group(group_name)
     if link not in model.link_index:
         raise KinematicsFailure("robot '%s' has no link '%s'" % (model.name, link))

@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tries candidates until one of them passes all stages."""
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from motion_planning.cartesian import CartesianError, Steps, cartesian_path
 from motion_planning.errors import PlanningError
 from motion_planning.kinematics import KinematicsFailure, NoIkSolution, ik
-from motion_planning.manipulation.tasks import Stage, by_quality, moved
+from motion_planning.manipulation.tasks import PickTask, Stage, by_quality, moved
 from motion_planning.pipeline import Code, PlanningFailure
 from motion_planning.timing import time_path
+
+if TYPE_CHECKING:
+    from motion_planning.cartesian import CartesianPath
+    from motion_planning.exact import Contact, ExactChecker
+    from motion_planning.manipulation.tasks import Candidate, PlaceTask, Translation
+    from motion_planning.model import State
+    from motion_planning.pipeline import Plan
+    from motion_planning.scene import Scene
+    from motion_planning.timing import Timed
 
 # Steps of straight motions [m]; greatest cut of a corner [rad or m]; distance of checked states.
 _STEP_M, _CORNER, _RESOLUTION = 0.02, 0.001, 0.02
@@ -39,14 +50,14 @@ class Fall(NamedTuple):
     reason: str
     code: int
 
-    def __str__(self):
+    def __str__(self) -> str:
         return "'%s' fails at '%s': %s" % (self.candidate, self.stage, self.reason)
 
 
 class ManipulationFailure(PlanningFailure):
     """No candidate is valid. falls: a :class:`Fall` for each tried one, in their order."""
 
-    def __init__(self, code, text, falls=(), contacts=()):
+    def __init__(self, code: int, text: str, falls: Iterable[Fall] = (), contacts: Iterable[Contact] = ()) -> None:
         super().__init__(code, text, contacts)
         self.falls = list(falls)
 
@@ -57,29 +68,30 @@ class Tools:
     from the scene's state to ``q`` or raises PlanningError; clock: function that returns the time [s]; stop(): true
     ends the search; scaling: (velocity, acceleration) 0 < f <= 1 of the straight motions."""
 
-    exact: Any
-    plan: Callable
-    clock: Callable
-    stop: Callable = field(default=lambda: False)
-    scaling: tuple = (1.0, 1.0)
+    exact: ExactChecker
+    plan: Callable[[Scene, np.ndarray, float], Plan]
+    clock: Callable[[], float]
+    stop: Callable[[], bool] = field(default=lambda: False)
+    scaling: tuple[float, float] = (1.0, 1.0)
 
 
 class Manipulation(NamedTuple):
     """candidate: the valid Candidate; stages: [Stage, ...] in their order; falls: of those tried before it."""
 
-    candidate: Any
-    stages: list
-    falls: list
+    candidate: Candidate
+    stages: list[Stage]
+    falls: list[Fall]
 
 
 class _Fallen(Exception):
-    def __init__(self, stage, reason, code=None):
+    def __init__(self, stage: str, reason: str, code: int | None = None) -> None:
         super().__init__(reason)
         self.stage, self.reason = stage, reason
         self.code = _CODES[stage] if code is None else code
 
 
-def plan_manipulation(task, candidates, allowed_time, tools):
+def plan_manipulation(task: PickTask | PlaceTask, candidates: Sequence[Candidate], allowed_time: float,
+                      tools: Tools) -> Manipulation:
     """Return a :class:`Manipulation` of the best valid Candidate.
 
     task: PickTask or PlaceTask; candidates: list; allowed_time [s]. For each candidate, in the order of quality: a
@@ -109,7 +121,7 @@ def plan_manipulation(task, candidates, allowed_time, tools):
     raise _failure(task, len(candidates), falls, late)
 
 
-def _failure(task, count, falls, late):
+def _failure(task: PickTask | PlaceTask, count: int, falls: list[Fall], late: bool) -> ManipulationFailure:
     told = "; ".join(map(str, falls[:_NAMED]))
     if len(falls) > _NAMED:
         told += "; and %d more" % (len(falls) - _NAMED)
@@ -125,18 +137,18 @@ def _failure(task, count, falls, late):
 class _Attempt:
     """One candidate while it is tried."""
 
-    def __init__(self, task, candidate, tools, seconds):
+    def __init__(self, task: PickTask | PlaceTask, candidate: Candidate, tools: Tools, seconds: float) -> None:
         self.task, self.candidate, self.tools, self.seconds = task, candidate, tools, seconds
         self.model = task.scene.model
         self.group = self.model.groups[task.group]
         self.begin = tools.clock()
         self.tried = self.free = 0
-        self.fallen = None
+        self.fallen: _Fallen | None = None
 
-    def run(self):
+    def run(self) -> list[Stage]:
         """Return the stages. Raises _Fallen."""
-        if self.task.minimize_distance:
-            self.candidate = moved(self.candidate, self._closest())
+        if isinstance(self.task, PickTask) and self.task.minimize_distance:
+            self.candidate = moved(self.candidate, self._closest(self.task))
         scene = self.task.approaching(self.candidate)
         approach, retreat, after = self._straight_ways(scene)
         begin = approach[0]
@@ -155,13 +167,13 @@ class _Attempt:
 
     # -- the grasp ----------------------------------------------------------------------------------
 
-    def _straight_ways(self, scene):
+    def _straight_ways(self, scene: Scene) -> tuple[np.ndarray, np.ndarray, Scene]:
         """(approach (m, k), retreat (m, k), scene of the retreat) of the first posture that has both."""
-        found = []
+        found: list[tuple[np.ndarray, np.ndarray, Scene]] = []
 
-        def accept(q):
+        def accept(q: np.ndarray) -> str | None:
             try:
-                found[:] = self._ways_through(scene, scene.state.with_q(q))
+                found[:] = [self._ways_through(scene, scene.state.with_q(q))]
             except _Fallen as fallen:
                 self._note(fallen)
                 return fallen.reason
@@ -172,9 +184,9 @@ class _Attempt:
                accept, self.tools.clock)
         except (NoIkSolution, KinematicsFailure) as error:
             raise self.fallen or _Fallen(REACH, str(error)) from None
-        return found
+        return found[0]
 
-    def _note(self, fallen):
+    def _note(self, fallen: _Fallen) -> None:
         """Keep the failure of the latest stage; give up after enough of them."""
         if self.fallen is None or _ORDER.index(fallen.stage) > _ORDER.index(self.fallen.stage):
             self.fallen = fallen
@@ -183,7 +195,7 @@ class _Attempt:
         if self.tried >= _MAX_POSTURES or self.free >= _MAX_FREE_POSTURES or self.tools.stop():
             raise self.fallen
 
-    def _ways_through(self, scene, state):
+    def _ways_through(self, scene: Scene, state: State) -> tuple[np.ndarray, np.ndarray, Scene]:
         touching = self._contact(scene, state)
         if touching:
             raise _Fallen(CONTACT, touching)
@@ -199,7 +211,7 @@ class _Attempt:
         away = self._straight(after, after.state, retreat.vector(pose), retreat, RETREAT)
         return back[::-1], away, after
 
-    def _straight(self, scene, state, direction, way, stage):
+    def _straight(self, scene: Scene, state: State, direction: np.ndarray, way: Translation, stage: str) -> np.ndarray:
         """Joints (m, k) of the straight motion from ``state``, as far as possible."""
         here = state.q[self.group.indices][None]
         if not way.desired > 0.0:
@@ -213,19 +225,19 @@ class _Attempt:
             raise _Fallen(stage, "%.3f of at least %.3f m: %s" % (gone, way.least, path.reason))
         return path.joints
 
-    def _line(self, scene, state, shift, step):
+    def _line(self, scene: Scene, state: State, shift: np.ndarray, step: float) -> CartesianPath:
         goal = np.array(self.model.frame_of(state.q, self.task.link, state.base))
         goal[:3, 3] += shift
 
-        def accept(q):
+        def accept(q: np.ndarray) -> str | None:
             return self._contact(scene, state.with_q(q, self.group.indices))
 
         return cartesian_path(self.model, self.task.group, state, self.task.link, [goal],
                               Steps(step, accept=accept, stop=self.tools.stop))
 
-    def _closest(self):
+    def _closest(self, task: PickTask) -> np.ndarray:
         """The pose (4, 4) that the hand can reach from the candidate's pose before it touches something."""
-        scene, pose = self.task.closing_in(self.candidate), self.candidate.pose
+        scene, pose = task.closing_in(self.candidate), self.candidate.pose
         try:
             q = ik(self.model, self.group, {self.task.link: pose}, scene.state, max(0.0, 0.2 * self._left()),
                    lambda q: self._contact(scene, scene.state.with_q(q)), self.tools.clock)
@@ -237,13 +249,13 @@ class _Attempt:
 
     # -- checks -------------------------------------------------------------------------------------------------
 
-    def _contact(self, scene, state):
+    def _contact(self, scene: Scene, state: State) -> str | None:
         """None, or the sentence about the contact."""
         if self.tools.exact.free(scene, state, self.task.group):
             return None
         return "; ".join(map(str, self.tools.exact.contacts(scene, state, self.task.group, 3)))
 
-    def _timed(self, path, scene, stage):
+    def _timed(self, path: np.ndarray, scene: Scene, stage: str) -> Timed:
         indices = self.group.indices
         velocity = self.tools.scaling[0] * self.model.velocity[indices]
         acceleration = self.tools.scaling[1] * self.model.acceleration[indices]
@@ -256,5 +268,5 @@ class _Attempt:
                 raise _Fallen(stage, "the timed way is not free: %s" % self._contact(scene, state))
         return timed
 
-    def _left(self):
+    def _left(self) -> float:
         return self.seconds - (self.tools.clock() - self.begin)

@@ -2,14 +2,19 @@
 """Tasks of picking up and putting down, and the scenes for their checks."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from motion_planning.scene import Scene, SceneError
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel, State
+    from motion_planning.srdf import EndEffector
+    from motion_planning.timing import Timed
 
 
 class Translation(NamedTuple):
@@ -21,7 +26,7 @@ class Translation(NamedTuple):
     desired: float = 0.0
     least: float = 0.0
 
-    def vector(self, pose):
+    def vector(self, pose: np.ndarray) -> np.ndarray:
         """The direction (3,) in the planning frame for a hand at ``pose`` (4, 4)."""
         return pose[:3, :3] @ self.direction if self.in_hand else np.asarray(self.direction, dtype=float)
 
@@ -40,9 +45,9 @@ class Candidate:
     approach: Translation
     retreat: Translation
     quality: float = 0.0
-    before: Mapping = field(default_factory=dict)
-    after: Mapping = field(default_factory=dict)
-    touch: frozenset = frozenset()
+    before: Mapping[str, float] = field(default_factory=dict)
+    after: Mapping[str, float] = field(default_factory=dict)
+    touch: frozenset[str] = frozenset()
 
 
 class Stage(NamedTuple):
@@ -51,8 +56,8 @@ class Stage(NamedTuple):
     with the robot at the start of the stage."""
 
     description: str
-    timed: Any
-    posture: Mapping
+    timed: Timed | None
+    posture: Mapping[str, float]
     scene: Scene
 
 
@@ -65,18 +70,18 @@ class _Task:
     scene: Scene
     group: str
     link: str
-    hand: frozenset
+    hand: frozenset[str]
     target: str
     support: str = ""
     hand_may_touch_support: bool = False
-    touch_links: frozenset = frozenset()
+    touch_links: frozenset[str] = frozenset()
 
-    def on_the_way(self):
+    def on_the_way(self) -> Scene:
         """The scene for the path to the approach."""
         entries = {(self.support, self.target): True} if self.support else {}
         return self._allowing(self.scene, entries)
 
-    def approaching(self, candidate):
+    def approaching(self, candidate: Candidate) -> Scene:
         """The scene for the approach."""
         entries = {(link, name): True for link in self.hand for name in (self.target, *candidate.touch)}
         if self.support and self.hand_may_touch_support:
@@ -84,12 +89,15 @@ class _Task:
         scene = self._allowing(self.on_the_way(), entries)
         return _with_hand(scene, candidate.before)
 
-    def retreating(self, candidate, state):
+    def retreating(self, candidate: Candidate, state: State) -> Scene:
         """The scene after the hand has closed or opened; ``state``: the robot's at that time."""
         scene = _with_hand(self.approaching(candidate).with_state(state), candidate.after)
         return self._handed_over(scene)
 
-    def _allowing(self, scene, entries):
+    def _handed_over(self, scene: Scene) -> Scene:
+        raise NotImplementedError
+
+    def _allowing(self, scene: Scene, entries: Mapping[tuple[str, str], bool]) -> Scene:
         return scene.with_allowed(scene.allowed.with_entries(entries)) if entries else scene
 
 
@@ -101,16 +109,16 @@ class PickTask(_Task):
     minimize_distance: bool = False
     verb = "picked up"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.target not in self.scene.objects:
             raise SceneError("the scene has no object '%s' to pick up%s" % (self.target, _known(self.scene.objects)))
 
-    def closing_in(self, candidate):
+    def closing_in(self, candidate: Candidate) -> Scene:
         """The scene in which the hand may not touch the object yet."""
         scene = self.approaching(candidate)
         return scene.with_allowed(scene.allowed.with_entries({(link, self.target): False for link in self.hand}))
 
-    def _handed_over(self, scene):
+    def _handed_over(self, scene: Scene) -> Scene:
         return scene.attach(self.target, self.link, self.touch_links or self.hand)
 
 
@@ -118,24 +126,23 @@ class PickTask(_Task):
 class PlaceTask(_Task):
     """Put the attached ``target`` into the world. Raises SceneError if the robot does not hold it."""
 
-    minimize_distance = False
     verb = "put down"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.target not in self.scene.state.attached:
             raise SceneError("the robot does not hold an object '%s'%s" % (
                 self.target, _known(self.scene.state.attached)))
 
-    def hand_pose(self, object_pose):
+    def hand_pose(self, object_pose: np.ndarray) -> np.ndarray:
         """The pose (4, 4) of the task's link at which the held object is at ``object_pose`` (4, 4)."""
         held = self.scene.attached_pose(self.scene.state.attached[self.target])
         return object_pose @ inverse(held) @ self.scene.frame(self.link)
 
-    def _handed_over(self, scene):
+    def _handed_over(self, scene: Scene) -> Scene:
         return scene.detach(self.target)
 
 
-def hand_links(model, effector):
+def hand_links(model: PlanningModel, effector: EndEffector) -> frozenset[str]:
     """Return the names of the links of an srdf.EndEffector: those of its group and all links below them."""
     found = set(model.groups[effector.group].links)
     grown = True
@@ -146,7 +153,7 @@ def hand_links(model, effector):
     return frozenset(found)
 
 
-def _with_hand(scene, posture):
+def _with_hand(scene: Scene, posture: Mapping[str, float]) -> Scene:
     """The scene with the hand's joints at ``posture``, clamped to their limits; joints that mimic others follow."""
     model = scene.model
     values = {name: float(np.clip(value, *model.bounds[model.index[name]]))
@@ -154,15 +161,15 @@ def _with_hand(scene, posture):
     return scene.with_state(scene.state.with_joints(values)) if values else scene
 
 
-def _known(names):
+def _known(names: Collection[str]) -> str:
     return "; it has %s" % ", ".join("'%s'" % name for name in list(names)[:10]) if names else "; it has none"
 
 
-def by_quality(candidates):
+def by_quality(candidates: Iterable[Candidate]) -> list[Candidate]:
     """The candidates, the best first, else in the order given."""
     return sorted(candidates, key=lambda candidate: -candidate.quality)
 
 
-def moved(candidate, pose):
+def moved(candidate: Candidate, pose: np.ndarray) -> Candidate:
     """The candidate at another pose (4, 4)."""
     return replace(candidate, pose=pose)

@@ -2,6 +2,7 @@
 """Groups of joints for planning."""
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,9 @@ from arm_kinematics import Chain, ChainError
 from motion_planning.shapes import read_only
 
 if TYPE_CHECKING:
-    from motion_planning.srdf import EndEffector
+    from motion_planning.model import PlanningModel
+    from motion_planning.srdf import EndEffector, Srdf
+    from urdf_model import Joint, Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,11 @@ class Group:
     all_joints: tuple[str, ...]
     valued_joints: tuple[str, ...]
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.joints)
 
 
-def build_groups(robot, srdf, model, warnings):
+def build_groups(robot: Robot, srdf: Srdf, model: PlanningModel, warnings: list[str]) -> dict[str, Group]:
     """Return {name: Group} of ``srdf``'s groups, in its order, for ``robot`` (with the limits to use).
 
     ``model``: has index {joint: where} and mimics. ``warnings`` (list of sentences) gets the reasons for unusable
@@ -57,7 +60,7 @@ def build_groups(robot, srdf, model, warnings):
     by_child = {joint.child: joint for joint in order}
     members = {}
 
-    def members_of(name):
+    def members_of(name: str) -> list[str]:
         if name not in members:
             entry = srdf.groups[name]
             own = set(entry.joints) | {by_child[link].name for link in entry.links if link in by_child}
@@ -88,7 +91,7 @@ def build_groups(robot, srdf, model, warnings):
     return groups
 
 
-def depth_first(robot):
+def depth_first(robot: Robot) -> list[Joint]:
     """Return the joints of ``robot`` (urdf_model.Robot), including fixed ones, parents first. Joints of one parent link
     are sorted by name, as in MoveIt: programs send joint values in this order.
     """
@@ -103,7 +106,7 @@ def depth_first(robot):
     return found
 
 
-def _ends(robot, joints, rank):
+def _ends(robot: Robot, joints: list[Joint], rank: Mapping[str, int]) -> tuple[str | None, str | None]:
     """Return (base link, tip link) of the chain of ``joints``, (None, None) if they are not a chain."""
     joints = sorted(joints, key=lambda joint: rank[joint.name])
     path = {joint.name for joint in robot.chain(joints[0].parent, joints[-1].child)} if _is_below(
@@ -114,7 +117,7 @@ def _ends(robot, joints, rank):
     return joints[0].parent, joints[-1].child
 
 
-def _is_below(robot, link, ancestor):
+def _is_below(robot: Robot, link: str, ancestor: str) -> bool:
     while link != ancestor:
         joint = robot.parent_joint(link)
         if joint is None:
@@ -123,8 +126,8 @@ def _is_below(robot, link, ancestor):
     return True
 
 
-def _chain(robot, base, tip, active):
-    if base is None or not active:
+def _chain(robot: Robot, base: str | None, tip: str | None, active: tuple[str, ...]) -> Chain | None:
+    if base is None or tip is None or not active:
         return None
     try:
         return Chain.from_robot(robot, base, tip)
@@ -132,7 +135,7 @@ def _chain(robot, base, tip, active):
         return None
 
 
-def _moving_links(robot, order, active):
+def _moving_links(robot: Robot, order: list[Joint], active: tuple[str, ...]) -> tuple[str, ...]:
     moving = set()
     for joint in order:
         mimicked = joint.mimic
@@ -141,7 +144,8 @@ def _moving_links(robot, order, active):
     return tuple(link for link in (joint.child for joint in order) if link in moving)
 
 
-def _states(srdf, group, active, valued, warnings):
+def _states(srdf: Srdf, group: str, active: tuple[str, ...], valued: tuple[str, ...],
+            warnings: list[str]) -> dict[str, dict[str, float]]:
     states = {}
     for state in srdf.states:
         if state.group != group:

@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled forward kinematics of a whole robot."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    Kinematics = tuple[np.ndarray, ...]
 
 compiled = compiler("motion_planning_model", [__file__], nogil=True, error_model="numpy")
 
 
 @compiled
-def fill_frames(kinematics, q, base, frames):
+def fill_frames(kinematics: Kinematics, q: np.ndarray, base: np.ndarray, frames: np.ndarray) -> None:
     """Fill ``frames`` (l, 4, 4) with the pose of every link in the frame of ``base`` (4, 4).
 
     kinematics, one entry per link, parents first: parents (l,) index of the parent link, -1 for the root;
@@ -20,7 +28,7 @@ def fill_frames(kinematics, q, base, frames):
 
 
 @compiled
-def fill_frame(kinematics, link, q, base, frames):
+def fill_frame(kinematics: Kinematics, link: int, q: np.ndarray, base: np.ndarray, frames: np.ndarray) -> None:
     """Fill one of ``frames``, after that of its parent, see ``fill_frames``."""
     parents, origins, axes, kinds, variables, factors = kinematics
     parent = parents[link]

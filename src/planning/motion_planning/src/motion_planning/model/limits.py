@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joint limits: the URDF's, narrowed and completed by a ``joint_limits.yaml``."""
+from __future__ import annotations
+
 import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from urdf_model import Joint, Robot
 
 #: Velocity and acceleration limits if neither file has them [rad/s, rad/s^2; m for a prismatic joint]: MoveIt's
 #: defaults.
 DEFAULT_VELOCITY, DEFAULT_ACCELERATION = 1.0, 1.0
 
 
-def narrow_limits(robot, joint_limits, warnings):
+def narrow_limits(robot: Robot, joint_limits: Mapping[str, Any] | None, warnings: list[str]) -> dict[str, float]:
     """Narrow the positions, and set the velocities, of ``robot``'s joints (in place) as in ``joint_limits``.
 
     ``joint_limits``: {joint: {min_position, max_position, has_velocity_limits, max_velocity, has_acceleration_limits,
@@ -35,7 +42,8 @@ def narrow_limits(robot, joint_limits, warnings):
     return accelerations
 
 
-def limit_arrays(joints, accelerations):
+def limit_arrays(joints: Sequence[Joint],
+                 accelerations: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return bounds (n, 2), velocity (n,), acceleration (n,), continuous (n,) bool of ``joints`` (urdf_model.Joint)."""
     continuous = np.array([joint.type == "continuous" for joint in joints], dtype=bool)
     bounds = np.array([(-math.pi, math.pi) if joint.type == "continuous" else (joint.limit.lower, joint.limit.upper)
@@ -45,11 +53,11 @@ def limit_arrays(joints, accelerations):
     return bounds, velocity, acceleration, continuous
 
 
-def _narrow_position(joint, entry, warnings):
+def _narrow_position(joint: Joint, entry: Mapping[str, Any], warnings: list[str]) -> None:
     low, high = (_number(joint.name, entry, key, warnings) for key in ("min_position", "max_position"))
     if not entry.get("has_position_limits", True) or low is high is None:
         return
-    if joint.type == "continuous" or joint.limit.lower is None:
+    if joint.type == "continuous" or joint.limit.lower is None or joint.limit.upper is None:
         warnings.append("joint '%s' is %s; its limits of position are ignored" % (joint.name, joint.type))
         return
     low = joint.limit.lower if low is None else max(low, joint.limit.lower)
@@ -61,7 +69,7 @@ def _narrow_position(joint, entry, warnings):
     joint.limit.lower, joint.limit.upper = low, high
 
 
-def _positive(name, entry, what, warnings):
+def _positive(name: str, entry: Mapping[str, Any], what: str, warnings: list[str]) -> float | None:
     """The limit of ``what``: None if there is no entry, 0 if the limit is disabled."""
     if entry.get("has_%s_limits" % what) is False:
         return 0.0
@@ -72,7 +80,7 @@ def _positive(name, entry, what, warnings):
     return value
 
 
-def _number(name, entry, key, warnings):
+def _number(name: str, entry: Mapping[str, Any], key: str, warnings: list[str]) -> float | None:
     value = entry.get(key)
     if value is None:
         return None

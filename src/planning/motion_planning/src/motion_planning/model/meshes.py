@@ -3,13 +3,17 @@
 
 Triangles are kept on disk. Who finds all of them there starts no process, and loads no libraries: 40 MB and a second.
 """
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import os
 import tempfile
 import threading
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,19 +33,19 @@ class MeshReader:
     find: function from a name in a description (package://, file://, path) to a path, or None.
     """
 
-    def __init__(self, find):
+    def __init__(self, find: Callable[[str], str | Path | None]) -> None:
         self._find = find
         self._lock = threading.Lock()
         self._known = {}
 
-    def __call__(self, filename):
+    def __call__(self, filename: str) -> TriangleMesh:
         """Return the TriangleMesh. Raises MeshUnreadable."""
         with self._lock:
             if filename not in self._known:
                 self._known[filename] = self._read(filename)
             return self._known[filename]
 
-    def _read(self, filename):
+    def _read(self, filename: str) -> TriangleMesh:
         path = self._find(filename)
         if path is None:
             raise MeshUnreadable("mesh %s is not there" % filename)
@@ -57,7 +61,7 @@ class MeshReader:
             raise MeshUnreadable("mesh %s cannot be used: %s" % (filename, error)) from None
 
 
-def _file(path):
+def _file(path: Path) -> Path:
     """The file that the triangles of the mesh at ``path`` are kept in: another one for other content."""
     digest = hashlib.sha256(path.suffix.lower().encode())
     # The corners of a glTF file may stand in others beside it.
@@ -67,12 +71,12 @@ def _file(path):
     return Path(folder("motion_planning_meshes", [__file__])) / (digest.hexdigest()[:32] + ".npz")
 
 
-def _triangles(file):
+def _triangles(file: str | Path) -> TriangleMesh:
     with np.load(file) as arrays:
         return TriangleMesh(arrays["vertices"], arrays["triangles"])
 
 
-def _made(path):
+def _made(path: str | Path) -> TriangleMesh:
     """The TriangleMesh of a file, read now. Raises ValueError, OSError."""
     from bullet_sim.limited import MESHES, LimitError  # loads PyBullet
 
@@ -87,20 +91,20 @@ def _made(path):
         os.unlink(target)
 
 
-def _keep(mesh, kept):
+def _keep(mesh: TriangleMesh, kept: Path) -> None:
     """Write a TriangleMesh into the file ``kept``, unless there is no room."""
     with contextlib.suppress(OSError), draft_of(kept) as draft:
         np.savez(draft, vertices=mesh.vertices, triangles=mesh.triangles)
 
 
-def write_triangles(path, target):
+def write_triangles(path: str, target: str) -> None:
     """Write the triangles of the mesh at ``path`` to the npz file ``target``: vertices (n, 3), triangles (m, 3).
 
     Raises MeshError, OSError, and the libraries' exceptions.
     """
     from bullet_sim.mesh_loading import MeshError, load_scene
 
-    scene = load_scene(path)
+    scene: Any = load_scene(path)
     mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
     triangles = np.asarray(getattr(mesh, "faces", ()))
     if not len(triangles):

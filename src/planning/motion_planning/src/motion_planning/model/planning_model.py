@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A robot from URDF, SRDF and joint limits."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +16,14 @@ from motion_planning.model.state import State
 from motion_planning.shapes import read_only
 from motion_planning.srdf import parse_srdf
 from urdf_model import UrdfError, parse_urdf
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.model import Group
+    from motion_planning.scene import AttachedBody
+    from motion_planning.srdf import Srdf
+    from urdf_model import Joint, Robot
 
 _KINDS = {"revolute": 1, "continuous": 1, "prismatic": 2}
 
@@ -31,7 +43,7 @@ class PlanningModel:
     of sorted pairs of links without collision check.
     """
 
-    def __init__(self, robot, srdf, joint_limits=None):
+    def __init__(self, robot: Robot, srdf: Srdf, joint_limits: Mapping[str, Any] | None = None) -> None:
         """``joint_limits``: the mapping of a joint_limits.yaml. Raises ModelError. ``robot`` is changed by it."""
         self.robot, self.srdf, self.name = robot, srdf, robot.name
         self.warnings = [*robot.warnings, *srdf.warnings]
@@ -45,8 +57,8 @@ class PlanningModel:
         self.continuous = read_only(arrays[3], bool)
         self.root = robot.root
         self.virtual_joint = srdf.virtual_joints[0] if srdf.virtual_joints else None
-        moves = self.virtual_joint is not None and self.virtual_joint.type != "fixed"
-        self.frame = self.virtual_joint.parent_frame if moves else self.root
+        fixed = self.virtual_joint is None or self.virtual_joint.type == "fixed"
+        self.frame = self.root if self.virtual_joint is None or fixed else self.virtual_joint.parent_frame
         self.mimics = {}
         self.links = (self.root, *(joint.child for joint in joints))
         self.link_index = {name: number for number, name in enumerate(self.links)}
@@ -59,7 +71,8 @@ class PlanningModel:
         self._no_default = frozenset(srdf.no_default)
 
     @classmethod
-    def from_xml(cls, urdf_xml, srdf_xml, joint_limits=None):
+    def from_xml(cls, urdf_xml: str | bytes, srdf_xml: str | bytes | None,
+                 joint_limits: Mapping[str, Any] | None = None) -> PlanningModel:
         """Return the model of two texts (str or bytes) and the mapping of a joint_limits.yaml.
 
         ``srdf_xml`` may be empty: no groups then. Raises ModelError for texts that are not URDF or SRDF.
@@ -68,14 +81,15 @@ class PlanningModel:
             robot = parse_urdf(urdf_xml)
         except UrdfError as error:
             raise ModelError(str(error)) from None
-        empty = "<robot name='%s'/>" % robot.name if srdf_xml is None or not srdf_xml.strip() else None
+        if srdf_xml is None or not srdf_xml.strip():
+            srdf_xml = "<robot name='%s'/>" % robot.name
         try:
-            srdf = parse_srdf(empty or srdf_xml, robot)
+            srdf = parse_srdf(srdf_xml, robot)
         except ValueError as error:
             raise ModelError(str(error)) from None
         return cls(robot, srdf, joint_limits)
 
-    def _set_kinematics(self, joints):
+    def _set_kinematics(self, joints: Sequence[Joint]) -> None:
         count = len(self.links)
         parents, variables = np.full(count, -1), np.full(count, -1)
         origins, axes, kinds = np.tile(np.eye(4), (count, 1, 1)), np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
@@ -91,7 +105,7 @@ class PlanningModel:
         self.kinematics = tuple(read_only(array, array.dtype) for array in (
             parents, origins, axes, kinds, variables, factors))
 
-    def _driver(self, joint):
+    def _driver(self, joint: Joint) -> tuple[str, tuple[float, float]]:
         """Return (name of the driving joint, (multiplier, offset)) of ``joint``, through a chain of mimic joints."""
         multiplier, offset, seen = 1.0, 0.0, {joint.name}
         while joint.mimic is not None:
@@ -105,7 +119,7 @@ class PlanningModel:
 
     # -- poses --------------------------------------------------------------------------------------------------
 
-    def frames(self, q, base=None):
+    def frames(self, q: ArrayLike, base: ArrayLike | None = None) -> np.ndarray:
         """Return the poses (l, 4, 4) of all ``links`` in the planning frame at ``q`` (n,).
 
         ``base`` (4, 4): the root in the planning frame, None: identity. Mimic joints follow. Raises ModelError
@@ -116,13 +130,13 @@ class PlanningModel:
         fill_frames(self.kinematics, self.checked(q), base, frames)
         return frames
 
-    def frame_of(self, q, link, base=None):
+    def frame_of(self, q: ArrayLike, link: str, base: ArrayLike | None = None) -> np.ndarray:
         """Return the pose (4, 4) of ``link`` in the planning frame. Raises ModelError for an unknown link."""
         if link not in self.link_index:
             raise ModelError("robot '%s' has no link '%s'" % (self.name, link))
         return self.frames(q, base)[self.link_index[link]]
 
-    def checked(self, q):
+    def checked(self, q: ArrayLike) -> np.ndarray:
         """Return ``q`` as an array (n,) of floats. Raises ModelError for a wrong count."""
         values = np.array(q, dtype=np.float64)  # one memory layout, writable: numba compiles for each layout
         if values.shape != (len(self.variables),):
@@ -132,42 +146,44 @@ class PlanningModel:
 
     # -- states -------------------------------------------------------------------------------------------------
 
-    def joint_values(self, q):
+    def joint_values(self, q: ArrayLike) -> dict[str, float]:
         """Return {joint: value} at ``q`` (n,): the variables in order, then the joints that mimic them."""
         values = dict(zip(self.variables, self.checked(q).tolist(), strict=True))
         values.update({name: multiplier * values[source] + offset
                        for name, (source, multiplier, offset) in self.mimics.items()})
         return values
 
-    def state(self, values=None, base=None, attached=None):
+    def state(self, values: dict[str, float] | ArrayLike | None = None, base: np.ndarray | None = None,
+              attached: Mapping[str, AttachedBody] | None = None) -> State:
         """Return a State: ``values`` {joint: value} or (n,), over :meth:`default_state`'s; ``base`` (4, 4)."""
         q = self._defaults() if values is None or isinstance(values, dict) else self.checked(values)
-        state = State(q, base, attached or {}, self.variables)
+        state = State(q, np.eye(4) if base is None else base, attached or {}, self.variables)
         return state.with_joints(values) if isinstance(values, dict) else state
 
-    def default_state(self):
+    def default_state(self) -> State:
         """Return the State with every joint at 0, or in the middle of its limits if 0 is beyond them."""
         return self.state()
 
-    def _defaults(self):
+    def _defaults(self) -> np.ndarray:
         low, high = self.bounds[:, 0], self.bounds[:, 1]
         return np.where((low <= 0.0) & (high >= 0.0), 0.0, 0.5 * (low + high))
 
-    def group(self, name):
+    def group(self, name: str) -> Group:
         """Return the Group ``name``. Raises ModelError with the existing names."""
         if name not in self.groups:
             raise ModelError("robot '%s' has no group '%s'; its groups are %s"
                              % (self.name, name, ", ".join(self.groups) or "none"))
         return self.groups[name]
 
-    def wrapped(self, q):
+    def wrapped(self, q: ArrayLike) -> np.ndarray:
         """Return ``q`` (n,) with continuous joints wrapped to -pi to pi."""
         q = self.checked(q).copy()
         turns = self.continuous
         q[turns] = np.remainder(q[turns] + math.pi, 2.0 * math.pi) - math.pi
         return q
 
-    def beyond_limits(self, q, margin=0.0, indices=None):
+    def beyond_limits(self, q: ArrayLike, margin: float = 0.0,
+                      indices: Iterable[int] | None = None) -> list[tuple[str, float, float, float]]:
         """Return [(joint, value, lower, upper)] of the values of ``q`` (n,) that exceed their limits by more than
         ``margin``.
 
@@ -177,11 +193,11 @@ class PlanningModel:
         out = ((q < self.bounds[:, 0] - margin) | (q > self.bounds[:, 1] + margin) | ~np.isfinite(q)) & ~self.continuous
         out |= ~np.isfinite(q)
         where = np.flatnonzero(out) if indices is None else [index for index in indices if out[index]]
-        return [(self.variables[k], float(q[k]), *map(float, self.bounds[k])) for k in where]
+        return [(self.variables[k], float(q[k]), float(self.bounds[k, 0]), float(self.bounds[k, 1])) for k in where]
 
     # -- collisions ---------------------------------------------------------------------------------------------
 
-    def default_collision(self, link_a, link_b):
+    def default_collision(self, link_a: str, link_b: str) -> bool:
         """Whether the SRDF has a collision check between two links of the robot."""
         pair = pair_of(link_a, link_b)
         if link_a == link_b or pair in self.disabled:
@@ -189,6 +205,6 @@ class PlanningModel:
         return pair in self._enabled or not (link_a in self._no_default or link_b in self._no_default)
 
 
-def pair_of(a, b):
+def pair_of(a: str, b: str) -> tuple[str, str]:
     """Return two names as a sorted pair, as used in sets of pairs."""
     return (a, b) if a <= b else (b, a)

@@ -5,12 +5,19 @@ A transform is (rotation (3, 3), translation (3,)). A mask is (balls (g, 4) cent
 + 1,) of its solids, solids (s, 16): centre 3, rotation 9 (rows: the solid's axes), half sizes 3, kind). A cell's code
 is x, y, z with 16 bits each, counted from the corner of the tree.
 """
+from __future__ import annotations
+
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    Transform = tuple[np.ndarray, np.ndarray]
+    MaskArrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 #: Kinds of solids.
 BOX, CYLINDER, BALL = 0, 1, 2
@@ -29,7 +36,8 @@ compiled = compiler("motion_planning_occupancy", [Path(__file__)], nogil=True, e
 
 
 @compiled
-def sees(points, transforms, mask, sizes, bins, codes, outside):
+def sees(points: np.ndarray, transforms: tuple[Transform, Transform], mask: MaskArrays, sizes: tuple[float, float],
+         bins: np.ndarray, codes: np.ndarray, outside: np.ndarray) -> int:
     """Sort ``points`` (n, 3), float32 in the sensor's frame, NaN where there is none.
 
     transforms: (sensor to the mask's frame, sensor to the map's); sizes: (side of a cell, greatest range) [m].
@@ -62,7 +70,8 @@ def sees(points, transforms, mask, sizes, bins, codes, outside):
 
 
 @compiled
-def fills(points, transforms, mask, sizes, table, codes, outside):
+def fills(points: np.ndarray, transforms: tuple[Transform, Transform], mask: MaskArrays, sizes: tuple[float, float],
+          table: np.ndarray, codes: np.ndarray, outside: np.ndarray) -> int:
     """Find the cells of ``points`` (n, 3), as ``sees`` does, but each once and without looking at rays.
 
     table (2**m,) of -1, for more codes than there are points near enough: where cells are looked up. outside (n,): as
@@ -98,7 +107,8 @@ def fills(points, transforms, mask, sizes, table, codes, outside):
 
 
 @compiled
-def misses(codes, transforms, mask, side, bins, missed, masked):
+def misses(codes: np.ndarray, transforms: tuple[Transform, Transform], mask: MaskArrays, side: float, bins: np.ndarray,
+           missed: np.ndarray, masked: np.ndarray) -> None:
     """Fill ``missed`` (n,): a ray passed through the cell, and ``masked`` (n,): its middle is in the mask.
 
     transforms: (map to the mask's frame, map to the sensor's).
@@ -120,7 +130,7 @@ def misses(codes, transforms, mask, side, bins, missed, masked):
 
 
 @compiled
-def inside(mask, x, y, z):
+def inside(mask: MaskArrays, x: float, y: float, z: float) -> bool:
     """Whether a point in the mask's frame is in one of its solids."""
     balls, starts, solids = mask
     for group in range(balls.shape[0]):
@@ -148,7 +158,7 @@ def inside(mask, x, y, z):
 
 
 @compiled
-def _passed(bins, middle, reach, distance):
+def _passed(bins: np.ndarray, middle: tuple[int, int], reach: float, distance: float) -> bool:
     """Whether a ray less than ``reach`` bins from the middle one is longer than ``distance`` [m]."""
     high, around = middle
     wide = int(reach / max(0.05, math.sin((high + 0.5) * BIN_RAD)))
@@ -162,7 +172,7 @@ def _passed(bins, middle, reach, distance):
 
 
 @compiled
-def _moved(transform, x, y, z):
+def _moved(transform: Transform, x: float, y: float, z: float) -> tuple[float, float, float]:
     rotation, translation = transform
     return (rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
             rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
@@ -170,12 +180,12 @@ def _moved(transform, x, y, z):
 
 
 @compiled
-def _bin(x, y, z, distance):
+def _bin(x: float, y: float, z: float, distance: float) -> tuple[int, int]:
     high = int(math.acos(max(-1.0, min(1.0, y / distance))) / BIN_RAD)
     return high, int((math.atan2(x, z) + math.pi) / BIN_RAD)
 
 
-def warm_up():
+def warm_up() -> None:
     """Compile everything, or load it from the cache."""
     mask = np.zeros((1, 4)), np.zeros(2, dtype=np.int64), np.zeros((1, 16))
     still = np.eye(3), np.zeros(3)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Bodies that are known already and must not enter the map: the robot, attached objects, objects of the scene."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.exact.geometry import bounds_of
@@ -9,6 +13,11 @@ from motion_planning.spheres.cover import CoverError
 from motion_planning.spheres.sphere_model import Boxes
 from urdf_model import Cylinder, Plane, Sphere
 
+if TYPE_CHECKING:
+    from motion_planning.scene import Scene
+    from motion_planning.shapes import Geometry
+    from motion_planning.spheres import SphereModel
+
 
 class Mask:
     """Points of a cloud that belong to a scene's robot or to its objects.
@@ -16,7 +25,7 @@ class Mask:
     arrays: the input of ``kernels``; in the planning frame.
     """
 
-    def __init__(self, scene, spheres, padding=0.0, scale=1.0):
+    def __init__(self, scene: Scene, spheres: SphereModel, padding: float = 0.0, scale: float = 1.0) -> None:
         """scene: Scene with the robot's state at the time of the cloud; spheres: SphereModel of the robot.
 
         padding [m], scale: by how much solids are larger than their bodies; the robot's are another centimetre larger
@@ -38,7 +47,7 @@ class Mask:
         self.arrays = np.ascontiguousarray(balls), starts, np.ascontiguousarray(solids)
 
 
-def _links_balls(spheres, link, frame):
+def _links_balls(spheres: SphereModel, link: str, frame: np.ndarray) -> np.ndarray:
     try:
         found = spheres.spheres(link)
     except CoverError:  # too large for spheres, such as a table that is part of the robot
@@ -49,14 +58,14 @@ def _links_balls(spheres, link, frame):
     return solids
 
 
-def _links_solids(spheres, link, frame):
+def _links_solids(spheres: SphereModel, link: str, frame: np.ndarray) -> np.ndarray:
     found = [np.empty((0, 16))]
     for geometry, pose in spheres.fixed(link):
         placed = frame @ pose
-        boxes = geometry.corners if isinstance(geometry, Boxes) else None
-        if boxes is None:
+        if not isinstance(geometry, Boxes):
             found.append(_solid(geometry, placed))
             continue
+        boxes = geometry.corners
         solids = np.zeros((len(boxes), 16))
         solids[:, :3] = boxes.mean(axis=1) @ placed[:3, :3].T + placed[:3, 3]
         solids[:, 3:12], solids[:, 12:15] = placed[:3, :3].T.ravel(), 0.5 * (boxes[:, 1] - boxes[:, 0])
@@ -64,7 +73,7 @@ def _links_solids(spheres, link, frame):
     return np.concatenate(found)
 
 
-def _solid(shape, pose):
+def _solid(shape: Geometry, pose: np.ndarray) -> np.ndarray:
     bounds = bounds_of(shape)
     kind, half = kernels.BOX, np.asarray(bounds.half, dtype=float)
     if isinstance(shape, Sphere):
@@ -75,7 +84,7 @@ def _solid(shape, pose):
     return np.concatenate([centre, pose[:3, :3].T.ravel(), half, [kind]])[None]
 
 
-def _around(solids):
+def _around(solids: np.ndarray) -> list[float]:
     """Centre and radius (4,) of a ball around solids (s, 16)."""
     reach = np.where(solids[:, 15] == kernels.BALL, solids[:, 12], np.linalg.norm(solids[:, 12:15], axis=1))
     low, high = (solids[:, :3] - reach[:, None]).min(axis=0), (solids[:, :3] + reach[:, None]).max(axis=0)

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A map of occupied cells."""
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from motion_planning.occupancy import kernels
 from motion_planning.shapes import Octree
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from motion_planning.occupancy.kernels import Transform
+    from motion_planning.occupancy.mask import Mask
 
 # Log odds of octomap's sensor model (A. Hornung et al., OctoMap, 2013): of a point in a cell, of a ray that passes
 # through it, and the greatest value of a cell. A cell at 0 is removed.
@@ -31,21 +37,21 @@ class OccupancyMap:
     A ray passes through a cell if a point behind the cell is seen.
     """
 
-    def __init__(self, resolution):
+    def __init__(self, resolution: float) -> None:
         """resolution [m]: side of the smallest cube, above 0. Raises ValueError."""
         if not 0.0 < resolution < np.inf:
             raise ValueError("the resolution must be above 0, got %r m" % resolution)
         self.resolution = float(resolution)
         self.clear()
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._codes)
 
-    def clear(self):
+    def clear(self) -> None:
         """Remove all cells."""
         self._codes, self._odds = np.empty(0, np.int64), np.empty(0)
 
-    def see(self, view, mask, source=""):
+    def see(self, view: View, mask: Mask, source: str = "") -> tuple[bool, np.ndarray]:
         """Enter a :class:`View` of any source; points in the :class:`Mask` clear cells as rays, but are not obstacles.
 
         Returns (whether the cells have changed, (n,) bool: points outside of the mask).
@@ -62,7 +68,7 @@ class OccupancyMap:
                        missed, masked)
         return self._enter(hit, missed, masked), outside
 
-    def octree(self):
+    def octree(self) -> Octree | None:
         """Return the cells as shapes.Octree in the map's frame, None if there are none."""
         if not len(self._codes):
             return None
@@ -71,7 +77,7 @@ class OccupancyMap:
         boxes[:, :3], boxes[:, 3] = (cells + 0.5) * self.resolution, self.resolution
         return Octree(self.resolution, boxes)
 
-    def take(self, octree):
+    def take(self, octree: Octree | None) -> None:
         """Forget everything but the cubes of a shapes.Octree in the map's frame, or None; larger ones fill all cells in
         them. What a camera sees empties them again.
 
@@ -92,7 +98,7 @@ class OccupancyMap:
         self._codes = np.unique(cells[:, 0] | cells[:, 1] << 16 | cells[:, 2] << 32)
         self._odds = np.full(len(self._codes), _MOST)
 
-    def _enter(self, hit, missed, masked):
+    def _enter(self, hit: np.ndarray, missed: np.ndarray, masked: np.ndarray) -> bool:
         where = np.searchsorted(self._codes, hit)
         known = np.zeros(len(hit), dtype=bool)
         inside = where < len(self._codes)
@@ -109,6 +115,6 @@ class OccupancyMap:
         return changed
 
 
-def parts(pose):
+def parts(pose: np.ndarray) -> Transform:
     """A pose (4, 4) as ``kernels`` take it: (rotation (3, 3), translation (3,))."""
     return np.ascontiguousarray(pose[:3, :3]), np.ascontiguousarray(pose[:3, 3])

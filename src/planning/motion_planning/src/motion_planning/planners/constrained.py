@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paths whose states all satisfy constraints: RRT-Connect whose steps are projected onto them
 (CBiRRT; Berenson, Srinivasa, Ferguson and Kuffner 2009)."""
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run
+
+if TYPE_CHECKING:
+    from motion_planning.constraints import ConstraintSet
+    from motion_planning.model import Group
+    from motion_planning.planners import Search
+    from motion_planning.scene import Scene
+    from motion_planning.spheres import SphereChecker
 
 # A step of a tree [rad, Euclidean]; a projected one may be longer by this factor.
 _STEP, _STRETCH = 0.12, 2.0
@@ -26,20 +37,22 @@ _WORTH = 1e-3
 class ConstrainedPlanning:
     """One search. checker: SphereChecker; if spheres touch, exact geometry decides."""
 
-    def __init__(self, scene, group, checker, search):
-        """group: Group; search: planning.Search with constraints."""
+    _manifold: Manifold
+
+    def __init__(self, scene: Scene, group: Group, checker: SphereChecker, search: Search,
+                 constraints: ConstraintSet) -> None:
         self._scene, self._group, self._checker, self._search = scene, group, checker, search
+        self._constraints = constraints
         self._random = np.random.default_rng(search.seed & (1 << 63) - 1)
         self._run = Run(search.seed, search.clock() + search.allowed_time, search.clock, search.stop)
         # Set after exact geometry has refused a path that is free by spheres.
         self._doubts_spheres = False
-        self._manifold = None
 
-    def path(self, start, goals):
+    def path(self, start: np.ndarray, goals: np.ndarray) -> Path:
         """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), which satisfy the constraints and are free. Its
         points are so dense that the lines between them satisfy the constraints, too. Raises NoPath.
         """
-        self._manifold = Manifold(self._scene, self._group, self._search.constraints, start)
+        self._manifold = Manifold(self._scene, self._group, self._constraints, start)
         kept = [goal for goal in goals if self._manifold.keeps(goal)]
         if not self._manifold.keeps(start) or not kept:
             raise NoPath("%s does not keep to the path constraints"
@@ -55,7 +68,7 @@ class ConstrainedPlanning:
 
     # -- trees --------------------------------------------------------------------------------------------------
 
-    def _connected(self, start, goals):
+    def _connected(self, start: np.ndarray, goals: np.ndarray) -> np.ndarray:
         """Points (m, k) from start to one of the goals."""
         trees = (_Tree(start[None]), _Tree(goals))
         for number in range(len(goals)):
@@ -75,15 +88,16 @@ class ConstrainedPlanning:
                 return np.concatenate([first, second[-2::-1]])
             self._run.check("a path that keeps to the constraints was looked for: the trees from start and goal have "
                             "%d and %d postures" % (trees[0].size, trees[1].size))
+        raise AssertionError("not reached")
 
-    def _grow(self, tree, node, target):
+    def _grow(self, tree: _Tree, node: int, target: np.ndarray) -> int:
         """Add nodes from ``node`` towards ``target`` (k,) as far as possible; return the last one."""
         for step in self._steps(tree.points[node], target):
             for q in step:
                 node = tree.add(q, node)
         return node
 
-    def _steps(self, q, target):
+    def _steps(self, q: np.ndarray, target: np.ndarray) -> Iterator[list[np.ndarray]]:
         """Towards a target, step by step: each a list of points (k,) whose lines satisfy the constraints and are free;
         the last point is the target itself if it is reached."""
         while True:
@@ -102,7 +116,7 @@ class ConstrainedPlanning:
             yield points
             q = new
 
-    def _line(self, a, b, halvings):
+    def _line(self, a: np.ndarray, b: np.ndarray, halvings: int) -> list[np.ndarray] | None:
         """Points after ``a`` up to ``b`` whose lines satisfy the constraints; None if there are none."""
         if all(self._manifold.keeps(a + share * (b - a)) for share in _LOOKS):
             return [b]
@@ -110,15 +124,15 @@ class ConstrainedPlanning:
         if middle is None or max(np.linalg.norm(middle - a), np.linalg.norm(b - middle)) > np.linalg.norm(b - a):
             return None
         first = self._line(a, middle, halvings - 1)
-        second = self._line(middle, b, halvings - 1) if first is not None else None
-        return None if second is None else first + second
+        second = None if first is None else self._line(middle, b, halvings - 1)
+        return None if first is None or second is None else first + second
 
-    def _kept(self, q):
+    def _kept(self, q: np.ndarray) -> np.ndarray | None:
         """``q`` (k,) itself if it satisfies the constraints, else a posture near it that does, None if none is
         found."""
         return q if self._manifold.keeps(q) else self._manifold.project(q)
 
-    def _shortened(self, points):
+    def _shortened(self, points: np.ndarray) -> np.ndarray:
         run = self._run
         end = run.clock() + _SHARE_OF_REST * max(0.0, run.deadline - run.clock())
         missed = 0
@@ -141,7 +155,7 @@ class ConstrainedPlanning:
 
     # -- collisions ---------------------------------------------------------------------------------------------
 
-    def _is_free(self, a, points):
+    def _is_free(self, a: np.ndarray, points: Iterable[np.ndarray]) -> bool:
         for b in points:
             if (self._doubts_spheres or not self._checker.edge(a, b)) and \
                     self._first_blocked(np.array([a, b])) is not None:
@@ -149,7 +163,7 @@ class ConstrainedPlanning:
             a = b
         return True
 
-    def _first_blocked(self, points):
+    def _first_blocked(self, points: np.ndarray) -> np.ndarray | None:
         """The first state along ``points``, except the first point, that is in collision; None if all are free."""
         states = []
         for a, b in itertools.pairwise(points):
@@ -166,16 +180,16 @@ class ConstrainedPlanning:
 class _Tree:
     """Postures and the parent of each."""
 
-    def __init__(self, roots):
+    def __init__(self, roots: np.ndarray) -> None:
         self._room = np.array(roots, dtype=float)
         self._parents, self.size = [-1] * len(roots), len(roots)
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """(size, k)"""
         return self._room[:self.size]
 
-    def add(self, q, parent):
+    def add(self, q: np.ndarray, parent: int) -> int:
         if self.size == len(self._room):
             self._room = np.concatenate([self._room, np.empty((max(64, self.size), self._room.shape[1]))])
         self._room[self.size] = q
@@ -183,10 +197,10 @@ class _Tree:
         self.size += 1
         return self.size - 1
 
-    def nearest(self, q):
+    def nearest(self, q: np.ndarray) -> int:
         return int(np.square(self.points - q).sum(axis=1).argmin())
 
-    def way(self, node):
+    def way(self, node: int) -> np.ndarray:
         """Points (m, k) from a root to the node."""
         way = []
         while node >= 0:
@@ -195,5 +209,5 @@ class _Tree:
         return np.array(way[::-1])
 
 
-def _length(points):
+def _length(points: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -6,17 +6,25 @@ float32, room a multiple of 16; ``parents`` (2, room) int32, -1 for a root. ``nu
 calls: 0, 1 the trees' sizes; 2 the tree that grows; 3 the random state; 4, 5 the two nodes at which they met; 6 the
 number of drawn samples.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.kernel import free_edge, work_arrays
 from motion_planning.spheres.lanes import below, fill, load, store
 
+if TYPE_CHECKING:
+    from motion_planning.planners.trees import Trees
+    from motion_planning.spheres.kernel import Tables
+
 GOING_ON, MET, FULL = range(3)
 
 
 @compiled
-def random_bits(numbers):
+def random_bits(numbers: np.ndarray) -> np.uint64:
     """The next of a sequence of 64 random bits: xorshift* (Vigna 2016)."""
     x = np.uint64(numbers[3])
     x ^= x >> np.uint64(12)
@@ -27,13 +35,14 @@ def random_bits(numbers):
 
 
 @compiled
-def random_unit(numbers):
+def random_unit(numbers: np.ndarray) -> np.float32:
     """A random number from 0 up to 1."""
     return np.float32(random_bits(numbers) >> np.uint64(40)) * np.float32(2.0 ** -24)
 
 
 @compiled
-def nearest(nodes, tree, count, target, distances):
+def nearest(nodes: np.ndarray, tree: int, count: int, target: np.ndarray,
+            distances: np.ndarray) -> tuple[int, np.float32]:
     """Return (index, squared distance) of the node of a tree that is nearest to ``target`` (k,)."""
     k, room = nodes.shape[1], nodes.shape[2]
     flat = nodes.ravel()
@@ -53,7 +62,7 @@ def nearest(nodes, tree, count, target, distances):
 
 
 @compiled
-def _add(trees, tree, q, parent):
+def _add(trees: Trees, tree: int, q: np.ndarray, parent: int) -> int:
     nodes, parents, numbers = trees
     count = numbers[tree]
     for j in range(len(q)):
@@ -64,7 +73,8 @@ def _add(trees, tree, q, parent):
 
 
 @compiled
-def grow(tables, trees, bounds, reach, step, samples):
+def grow(tables: Tables, trees: Trees, bounds: tuple[np.ndarray, np.ndarray], reach: float, step: float,
+         samples: int) -> int:
     """Draw up to ``samples`` samples. Return MET, FULL (no room for more nodes) or GOING_ON.
 
     tables: of the checker. trees: (nodes, parents, numbers). bounds: (low, high), (k,) float32 each. ``reach``: the
@@ -118,7 +128,7 @@ def grow(tables, trees, bounds, reach, step, samples):
 
 
 @compiled
-def _point(path, lengths, along, out):
+def _point(path: np.ndarray, lengths: np.ndarray, along: float, out: np.ndarray) -> int:
     """Write the point ``along`` the path into ``out`` (k,) and return the index of the corner before it."""
     i = 0
     while i < len(lengths) - 2 and lengths[i + 1] <= along:
@@ -131,7 +141,7 @@ def _point(path, lengths, along, out):
 
 
 @compiled
-def _length(path, i, o):
+def _length(path: np.ndarray, i: int, o: int) -> float:
     total = np.float32(0.0)
     for j in range(path.shape[1]):
         total += (path[i, j] - path[o, j]) ** 2
@@ -139,7 +149,7 @@ def _length(path, i, o):
 
 
 @compiled
-def _without_idle(path, count):
+def _without_idle(path: np.ndarray, count: int) -> int:
     """Take points out that lie on the line between their neighbours. Returns the new count."""
     kept = 1
     for i in range(1, count - 1):
@@ -151,7 +161,8 @@ def _without_idle(path, count):
 
 
 @compiled
-def shortcut(tables, path, count, numbers, step, effort):
+def shortcut(tables: Tables, path: np.ndarray, count: int, numbers: np.ndarray, step: float,
+             effort: tuple[int, int, float]) -> int:
     """Shorten a path in place between two random points of it, if that is free and saves enough: all joints on a
     straight line, or one random joint while the others stay on their way (Geraerts and Overmars 2007).
 
@@ -219,7 +230,7 @@ def shortcut(tables, path, count, numbers, step, effort):
 
 
 @compiled
-def _shares(way):
+def _shares(way: np.ndarray) -> np.ndarray:
     """The share of the length of ``way`` (n, j) before each of its points; of their number if it has no length."""
     shares = np.zeros(len(way))
     for i in range(1, len(way)):
@@ -228,7 +239,7 @@ def _shares(way):
 
 
 @compiled
-def _write_point(way, shares, i, share, out):
+def _write_point(way: np.ndarray, shares: np.ndarray, i: int, share: float, out: np.ndarray) -> int:
     """Write the point at a share of the length into ``out``; i: of the last corner before it. Returns i."""
     while i < len(shares) - 2 and shares[i + 1] <= share:
         i += 1
@@ -240,7 +251,7 @@ def _write_point(way, shares, i, share, out):
 
 
 @compiled
-def at_once(one, other):
+def at_once(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return (m, j + k): the points of two paths (n, j) and (l, k), n, l > 1, that begin and end at the same time, with
     the corners of both."""
     first, second = _shares(one), _shares(other)
@@ -262,7 +273,7 @@ def at_once(one, other):
 
 
 @compiled
-def way_through(free, closed):
+def way_through(free: np.ndarray, closed: np.ndarray) -> np.ndarray:
     """Return cells (m, 2) of a shortest path from the first to the last cell of ``free`` (a, b) bool; (0, 2) if there
     is none.
 

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Planners by the names of ompl_planning.yaml files."""
+from __future__ import annotations
+
 import functools
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from motion_planning.planners import ompl_wheel
 from motion_planning.planners.trees import rrt_connect
+
+if TYPE_CHECKING:
+    from motion_planning.planners.trees import Planner
 
 #: The built-in planner.
 OWN = "RRTConnect"
@@ -20,7 +27,7 @@ INSTALL = "python3 -m pip install ompl==2.0.1"
 NAMES = (OWN, *ompl_wheel.CLASSES, *_ANYTIME, *sorted(_ANY_PATH))
 
 
-def kind_of(name, planners):
+def kind_of(name: str, planners: Mapping[str, Mapping[str, str]]) -> str:
     """Return the planner's type, such as "RRTstar", of a requested name: ``Name`` or ``group[Name]``.
 
     planners: {name: {key: text}}, the planner_configs. A name that is not in it may be a type itself; the old ending
@@ -31,12 +38,12 @@ def kind_of(name, planners):
     return kind.removesuffix("kConfigDefault")
 
 
-def config_name(name):
+def config_name(name: str) -> str:
     """Return ``Name`` of ``group[Name]``, and of ``Name``."""
     return name.rpartition("[")[2].removesuffix("]") if name.endswith("]") else name
 
 
-def planner_of(kind, settings):
+def planner_of(kind: str, settings: Mapping[str, str]) -> tuple[Planner, list[str]]:
     """Return (planner, sentences for the user) for a type of planner, such as "RRTstar".
 
     planner: a function with the signature of ``rrt_connect``, which finds a path. settings: {key: text}.
@@ -58,7 +65,7 @@ def planner_of(kind, settings):
     return planner, remarks + planner.remarks
 
 
-def _own(settings):
+def _own(settings: Mapping[str, str]) -> Planner:
     try:
         reach = float(settings.get("range", 0.0))
     except ValueError:

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Planners of the Open Motion Planning Library (the ``ompl`` wheel) on a SphereChecker."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path
+
+if TYPE_CHECKING:
+    from motion_planning.planners.trees import Run
+    from motion_planning.spheres import SphereChecker
 
 #: Planners that improve the path until their time is over.
 ANYTIME = frozenset({"RRTstar", "InformedRRTstar", "BITstar"})
@@ -26,7 +35,7 @@ _FOREIGN = {"type", "projection_evaluator", "longest_valid_segment_fraction", "o
             "hybridize", "multi_query_planning_enabled"}
 
 
-def is_there():
+def is_there() -> bool:
     """Whether the wheel can be imported; the first call takes a tenth of a second and 30 MB."""
     try:
         _library()
@@ -42,13 +51,14 @@ class OmplPlanner:
     name: the planner's; remarks: sentences on unknown and invalid settings.
     """
 
-    def __init__(self, name, settings=None):
+    def __init__(self, name: str, settings: Mapping[str, str] | None = None) -> None:
         """settings: {key: text}, as in an ompl_planning.yaml. Raises ImportError without the wheel."""
         self.name, self._settings = name, {key: value for key, value in (settings or {}).items()
                                             if key not in _FOREIGN}
         self.remarks = self._made(_Space(None, np.zeros((1, 1))))[1]
 
-    def __call__(self, checker, bounds, start, goals, run, reach=None):
+    def __call__(self, checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+                 reach: float | None = None) -> Path:
         """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker``. Raises NoPath."""
         start, goals = np.asarray(start, dtype=float), np.atleast_2d(np.asarray(goals, dtype=float))
         bounds = np.asarray(bounds, dtype=float)
@@ -62,7 +72,7 @@ class OmplPlanner:
             raise NoPath("%s of the ompl wheel ended without a path" % self.name)
         return Path(points, space.asked.edges)
 
-    def _made(self, space):
+    def _made(self, space: _Space) -> tuple[Any, list[str]]:
         """Return (the library's planner, sentences on settings that it refuses)."""
         planner, remarks = getattr(_library()[1], CLASSES[self.name])(space.information), []
         for key, text in self._settings.items():
@@ -80,7 +90,7 @@ class OmplPlanner:
                 remarks.append("planner %s cannot take '%s' for its setting '%s'" % (self.name, text, key))
         return planner, remarks
 
-    def _solve(self, space, ends, run):
+    def _solve(self, space: _Space, ends: tuple[np.ndarray, np.ndarray], run: Run) -> np.ndarray | None:
         base, _ = _library()
         begin = run.clock()
         deadline = begin + _SHARE * (run.deadline - begin) if self.name in ANYTIME else run.deadline
@@ -98,7 +108,7 @@ class OmplPlanner:
 class _Space:
     """The search space for the library: k joints with a checker."""
 
-    def __init__(self, checker, values):
+    def __init__(self, checker: SphereChecker | None, values: np.ndarray) -> None:
         """values (k, any): the joints' bounds are around them."""
         base, _ = _library()
         self._space = base.RealVectorStateSpace(len(values))
@@ -115,7 +125,7 @@ class _Space:
         self.information.setMotionValidator(_validator_class()(self.information, self.asked.edge_is_free))
         self.information.setup()
 
-    def problem(self, start, goals):
+    def problem(self, start: np.ndarray, goals: np.ndarray) -> Any:
         base, _ = _library()
         problem = base.ProblemDefinition(self.information)
         problem.addStartState(self._state(start))
@@ -125,7 +135,7 @@ class _Space:
         problem.setGoal(states)
         return problem
 
-    def _state(self, values):
+    def _state(self, values: np.ndarray) -> Any:
         state = self._space.allocState()
         for i, value in enumerate(values):
             state[i] = float(value)
@@ -135,21 +145,21 @@ class _Space:
 class _Asked:
     """Callbacks of the library. edges: number of checked edges."""
 
-    def __init__(self, checker, k):
+    def __init__(self, checker: SphereChecker | None, k: int) -> None:
         self._checker, self._k, self.edges = checker, k, 0
 
-    def is_free(self, state):
-        return bool(self._checker.valid(self._values(state))[0])
+    def is_free(self, state: Sequence[float]) -> bool:
+        return self._checker is not None and bool(self._checker.valid(self._values(state))[0])
 
-    def edge_is_free(self, a, b):
+    def edge_is_free(self, a: Sequence[float], b: Sequence[float]) -> bool:
         self.edges += 1
-        return self._checker.edge(self._values(a), self._values(b))
+        return self._checker is not None and self._checker.edge(self._values(a), self._values(b))
 
-    def _values(self, state):
+    def _values(self, state: Sequence[float]) -> np.ndarray:
         return np.array([state[i] for i in range(self._k)], dtype=np.float32)
 
 
-def _library():
+def _library() -> tuple[ModuleType, ModuleType]:
     from ompl import base, geometric, util  # its import is slow, and most programs do not need it
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
@@ -157,19 +167,19 @@ def _library():
 
 
 @lru_cache
-def _validator_class():
+def _validator_class() -> type:
     class Validator(_library()[0].MotionValidator):
-        def __init__(self, information, ask):
+        def __init__(self, information: Any, ask: Callable[[Any, Any], bool]) -> None:
             super().__init__(information)
             self._ask = ask
 
-        def checkMotion(self, a, b, last=None):  # noqa: N802  the library's name
+        def checkMotion(self, a: Any, b: Any, last: Any = None) -> bool:  # noqa: N802  the library's name
             return self._ask(a, b)
 
     return Validator
 
 
-def _value(text, usual):
+def _value(text: str, usual: object) -> Any:
     """The value of a text, with the type of ``usual``. Raises ValueError."""
     if isinstance(usual, bool):
         return {"1": True, "true": True, "0": False, "false": False}.get(str(text).lower(), bool(float(text)))

@@ -7,12 +7,23 @@ needed. If the arms cannot pass each other on several pairs of paths, that searc
 alone may take a hundred times as long as usual, both hardly ever do. Further pairs have one arm move aside first: the
 short paths of one arm are all alike.
 """
+from __future__ import annotations
+
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motion_planning.planners import kernels
 from motion_planning.planners.trees import SAMPLES, Path, growing, shorten
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from motion_planning.planners.trees import Run
+    from motion_planning.spheres import SphereChecker
+
+    Parts = Sequence[tuple[np.ndarray, SphereChecker]]
 
 # Distance [rad] of postures on the path of one arm that are combined with those of the other.
 _SPACING = 0.3
@@ -27,7 +38,8 @@ _PAIRS = 3
 _IN_A_TURN = 2 * SAMPLES
 
 
-def two_parts(checker, bounds, start, goals, run, reach):
+def two_parts(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+              reach: float) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) for a ``checker`` of two parts, which are planned
     one by one where they get past each other so; its times are then of "shorten". Arguments and errors as in
     ``rrt_connect``."""
@@ -47,9 +59,11 @@ def two_parts(checker, bounds, start, goals, run, reach):
         for found in itertools.islice(together, max(drawn, _IN_A_TURN) // SAMPLES):
             if found is not None:
                 return found._replace(samples=samples + found.samples)
+    raise AssertionError("not reached")
 
 
-def _one_by_one(checker, bounds, start, goal, run, reach):
+def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: Run,
+                reach: float) -> tuple[np.ndarray | None, int, float]:
     """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
     the parts cannot pass each other on these."""
     samples, shortening, ways = 0, 0.0, []
@@ -66,7 +80,8 @@ def _one_by_one(checker, bounds, start, goal, run, reach):
     return points, samples, shortening
 
 
-def _in_turns(checker, bounds, start, goal, run, reach, yielding):
+def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: Run, reach: float,
+              yielding: int) -> tuple[np.ndarray | None, int]:
     """(points (m, k), samples): a part moves to a random posture, then the other part to its goal, then the first part.
     The searches are bounded, since the posture may be out of reach; points are None where one of them ends."""
     indices, alone = checker.parts[yielding]
@@ -86,18 +101,18 @@ def _in_turns(checker, bounds, start, goal, run, reach, yielding):
     return np.concatenate(ways), samples
 
 
-def _aside(alone, bounds, run):
+def _aside(alone: SphereChecker, bounds: np.ndarray, run: Run) -> np.ndarray:
     """A random posture (j,) that is free for one part."""
-    random = np.random.default_rng(run.seed)
+    random, (low, high) = np.random.default_rng(run.seed), bounds.T
     while True:
-        some = random.uniform(*bounds.T, (16, len(bounds)))
+        some = random.uniform(low, high, (16, len(bounds)))
         free = np.flatnonzero(alone.valid(some))
         if len(free):
             return some[free[0]]
         run.check("a posture was looked for where one arm is out of the other's way")
 
 
-def _at_once(parts, ways):
+def _at_once(parts: Parts, ways: Sequence[np.ndarray]) -> np.ndarray:
     """The points (m, k) of both parts beginning and ending at the same time."""
     (one, _), (other, _) = parts
     found = kernels.at_once(*ways)
@@ -106,7 +121,7 @@ def _at_once(parts, ways):
     return points
 
 
-def _past_each_other(checker, ways):
+def _past_each_other(checker: SphereChecker, ways: Sequence[np.ndarray]) -> np.ndarray | None:
     """The points (m, k) of the two parts moving along their paths; one waits or moves back for the other if needed.
     None if that does not help."""
     grid = _grid(checker.parts, *map(_dense, ways))
@@ -128,7 +143,7 @@ def _past_each_other(checker, ways):
     return None
 
 
-def _grid(parts, first, second):
+def _grid(parts: Parts, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """(a, b, k): each posture ``first`` (a, i) of one part with each ``second`` (b, j) of the other."""
     (one, _), (other, _) = parts
     grid = np.empty((len(first), len(second), len(one) + len(other)), dtype=np.float32)
@@ -136,7 +151,7 @@ def _grid(parts, first, second):
     return grid
 
 
-def _dense(way):
+def _dense(way: np.ndarray) -> np.ndarray:
     """The path (m, j) with points added between its corners."""
     steps = np.diff(way, axis=0)
     counts = np.maximum(1, np.ceil(np.linalg.norm(steps, axis=1) / _SPACING)).astype(int)

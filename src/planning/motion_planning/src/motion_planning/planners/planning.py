@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A path from a start to one of some goals: found with spheres, and always checked by exact geometry."""
+from __future__ import annotations
+
 import itertools
 import math
 import threading
 import time
 import weakref
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,14 @@ from motion_planning.planners.trees import REACH, Path, Run, improve, rrt_connec
 from motion_planning.planners.warming import warm_up
 from motion_planning.scene import Scene
 from motion_planning.spheres import Patience, SphereChecker, SphereModel, make_links
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.constraints import ConstraintSet
+    from motion_planning.exact import ExactChecker
+    from motion_planning.model import Group
+    from motion_planning.planners.trees import Planner
 
 # The share of the time for spheres; after that, a search by exact geometry alone begins.
 _SHARE_OF_SPHERES = 0.7
@@ -57,17 +67,17 @@ class Search(NamedTuple):
     searches with spheres (``names.planner_of``); with constraints, another one is used. improve: whether to make the
     first path that is found shorter for some 20 ms, if the time allows it."""
 
-    exact: Any
+    exact: ExactChecker
     seed: int
     allowed_time: float
     clock: Callable[[], float]
     stop: Callable[[], bool] = lambda: False
-    constraints: Any = None
-    planner: Callable = rrt_connect
+    constraints: ConstraintSet | None = None
+    planner: Planner = rrt_connect
     improve: bool = False
 
 
-def sphere_model_of(exact):
+def sphere_model_of(exact: ExactChecker) -> SphereModel:
     """Return the SphereModel of an ExactChecker's robot, made once."""
     with _sphere_models_lock:
         if exact not in _sphere_models:
@@ -75,7 +85,7 @@ def sphere_model_of(exact):
         return _sphere_models[exact]
 
 
-def checker_of(exact, scene, group, patience=None):
+def checker_of(exact: ExactChecker, scene: Scene, group: Group, patience: Patience | None = None) -> SphereChecker:
     """Return the SphereChecker of a Group in a scene, made once for each scene and group. patience: spheres.Patience
     with that; None: it gets coarse after some seconds."""
     with _checkers_lock:
@@ -89,7 +99,7 @@ def checker_of(exact, scene, group, patience=None):
     return known[group.name]
 
 
-def _make_links(exact, scene, group, stop):
+def _make_links(exact: ExactChecker, scene: Scene, group: Group, stop: Callable[[], bool]) -> None:
     """Make what of a robot does not depend on the scene. Most callers have done so before, by ``prepare``; where
     another thread is at it, this one waits. Raises NoPath if it is stopped then."""
     with _sphere_models_lock:
@@ -107,7 +117,7 @@ def _make_links(exact, scene, group, stop):
         making.release()
 
 
-def first_touching(exact, scene, group, states):
+def first_touching(exact: ExactChecker, scene: Scene, group: Group, states: ArrayLike) -> int | None:
     """Return the index of the first of ``states`` (m, k) of the Group that is in collision, None if there is none.
     Spheres prove most states free and exact geometry decides on the others, so dense states cost little."""
     doubtful = np.flatnonzero(~checker_of(exact, scene, group).valid(states))
@@ -115,7 +125,7 @@ def first_touching(exact, scene, group, states):
     return None if first is None else int(doubtful[first])
 
 
-def prepare(exact):
+def prepare(exact: ExactChecker) -> None:
     """Make all data that do not depend on a scene, so that the first plan is not delayed: spheres of links, maps of
     pairs of them, compiled code."""
     spheres = sphere_model_of(exact)
@@ -127,7 +137,7 @@ def prepare(exact):
     warm_up()
 
 
-def plan_path(scene, group, start, goals, search):
+def plan_path(scene: Scene, group: str, start: np.ndarray, goals: np.ndarray, search: Search) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
 
     Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten", "exact" and
@@ -148,7 +158,7 @@ def plan_path(scene, group, start, goals, search):
 
 
 class _Planning:
-    def __init__(self, scene, group, search):
+    def __init__(self, scene: Scene, group: str, search: Search) -> None:
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
         # The first plan of a robot may have to make its spheres: that must not use up its time.
@@ -164,13 +174,14 @@ class _Planning:
         self.begin += max(0.0, self.times["tables"] - (1.0 - SHARE_OF_SEARCH) * search.allowed_time)
         self.bounds = np.array(self.model.bounds[self.group.indices])
 
-    def path(self, start, goals):
+    def path(self, start: np.ndarray, goals: np.ndarray) -> Path:
         start, goals = self._postures(start, goals)
         self._free_or_raise("the start", [start])
         goals = self._free_or_raise("every goal" if len(goals) > 1 else "the goal", goals)
         self._note("ends")
         if self.search.constraints is not None:
-            found = ConstrainedPlanning(self.scene, self.group, self.checker, self.search).path(start, goals)
+            found = ConstrainedPlanning(self.scene, self.group, self.checker, self.search,
+                                        self.search.constraints).path(start, goals)
             self._note("search")
             return found._replace(times=self.times)
         try:
@@ -184,7 +195,7 @@ class _Planning:
 
     # -- ends ---------------------------------------------------------------------------------------------------
 
-    def _postures(self, start, goals):
+    def _postures(self, start: ArrayLike, goals: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """The arrays, with continuous joints moved to the turn that is nearest to the start."""
         start, goals = np.array(start, dtype=float), np.atleast_2d(np.array(goals, dtype=float))
         count = len(self.group)
@@ -202,7 +213,7 @@ class _Planning:
         self.bounds[turns] = np.column_stack([ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi])[turns]
         return start, goals
 
-    def _free_or_raise(self, what, postures):
+    def _free_or_raise(self, what: str, postures: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
         free = [q for q in postures if self._exact_free(q)]
         if not free:
             state = self.scene.state.with_q(postures[0], self.group.indices)
@@ -212,7 +223,7 @@ class _Planning:
 
     # -- searches ----------------------------------------------------------------------------------------
 
-    def _by_spheres(self, start, goals):
+    def _by_spheres(self, start: np.ndarray, goals: np.ndarray) -> Path:
         run = self._run(_SHARE_OF_SPHERES)
         outwards, inwards = self._ways(start, goals, run)
         checker, seed, samples = self.checker, self.search.seed, _SAMPLES
@@ -245,7 +256,8 @@ class _Planning:
             run.check("a path was looked for that exact geometry agrees with")
             checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
 
-    def _improved(self, path, short, how, ways):
+    def _improved(self, path: Path, short: Path, how: tuple[SphereChecker, Run],
+                  ways: tuple[np.ndarray, np.ndarray]) -> Path:
         """``path``, or a shorter one if there is time: ``short`` improved, between two ``ways``. how: checker, Run."""
         checker, run = how
         run = run._replace(deadline=self.begin + _SHARE_TO_IMPROVE * self.search.allowed_time)
@@ -261,7 +273,8 @@ class _Planning:
         finally:
             self._note("improve")
 
-    def _ways(self, start, goals, run, with_room=False):
+    def _ways(self, start: np.ndarray, goals: np.ndarray, run: Run,
+              with_room: bool = False) -> tuple[np.ndarray, list[np.ndarray]]:
         """(way from the start to where spheres are free, ways from there to the goals); goals without one are left
         out. with_room: see ``_way_out``."""
         outwards, inwards = self._way_out(start, run, with_room), []
@@ -274,13 +287,13 @@ class _Planning:
         self._note("way out")
         return outwards, inwards
 
-    def _found(self, checker, start, goals, run):
+    def _found(self, checker: SphereChecker, start: np.ndarray, goals: np.ndarray, run: Run) -> Path:
         """A Path by spheres to one of ``goals``."""
         if self.search.planner is rrt_connect and len(checker.parts) == 2:
             return two_parts(checker, self.bounds, start, goals, run, REACH)
         return self.search.planner(checker, self.bounds, start, goals, run)
 
-    def _way_out(self, q, run, with_room=False):
+    def _way_out(self, q: np.ndarray, run: Run, with_room: bool = False) -> np.ndarray:
         """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres; with_room: to the one
         of several with the most room around it, and on to where there is more."""
         if self.checker.valid(q)[0]:
@@ -304,7 +317,7 @@ class _Planning:
                     nodes.append(one)
                     parents.append(parent)
 
-    def _to_room(self, ways):
+    def _to_room(self, ways: list[np.ndarray]) -> np.ndarray:
         """Points (m, k) from one of the postures ``ways``, free by spheres, to one that has more room around it."""
         found, best = [], -1
         for _ in range(_HOPS):
@@ -319,16 +332,16 @@ class _Planning:
             ways = [one for one in some[self.checker.valid(some)][:_WAYS_OUT] if self.checker.edge(found[-1], one)]
         return np.array(found)
 
-    def _around(self, q):
+    def _around(self, q: np.ndarray) -> np.ndarray:
         """Random postures (_CANDIDATES, k) at different distances from ``q``."""
         away = self.random.normal(size=(_CANDIDATES, len(q)))
         away *= self.random.uniform(*_STEPS_OUT, (_CANDIDATES, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
         return np.clip(q + away, self.bounds[:, 0], self.bounds[:, 1])
 
-    def _by_exact(self, start, goals):
+    def _by_exact(self, start: np.ndarray, goals: np.ndarray) -> Path:
         """RRT-Connect with exact geometry only: slow, for gaps that are too narrow for spheres."""
         run = self._run(1.0)
-        trees = [([start], [-1]), (list(goals), [-1] * len(goals))]
+        trees: list[tuple[list[np.ndarray], list[int]]] = [([start], [-1]), (list(goals), [-1] * len(goals))]
         grown = 0
         while True:
             run.check("a path was looked for by exact geometry: spheres around the robot found none")
@@ -346,7 +359,7 @@ class _Planning:
                     return Path(self._shortened(points, run))
                 run.check("a path was looked for by exact geometry")
 
-    def _extend(self, nodes, parents, target):
+    def _extend(self, nodes: list[np.ndarray], parents: list[int], target: np.ndarray) -> int | None:
         apart = np.linalg.norm(np.array(nodes) - target, axis=1)
         parent = int(apart.argmin())
         near = nodes[parent]
@@ -357,7 +370,7 @@ class _Planning:
         parents.append(parent)
         return len(nodes) - 1
 
-    def _shortened(self, points, run):
+    def _shortened(self, points: np.ndarray, run: Run) -> np.ndarray:
         """The path without the corners that exact geometry does not need, within the time limit."""
         k = 0
         while k + 2 < len(points):
@@ -372,7 +385,7 @@ class _Planning:
         return points
 
     @staticmethod
-    def _traced(nodes, parents, node):
+    def _traced(nodes: list[np.ndarray], parents: list[int], node: int) -> np.ndarray:
         way = []
         while node >= 0:
             way.append(nodes[node])
@@ -381,18 +394,18 @@ class _Planning:
 
     # -- exact geometry -----------------------------------------------------------------------------------------
 
-    def _exact_free(self, q):
+    def _exact_free(self, q: np.ndarray) -> bool:
         return self.search.exact.free(self.scene, self.scene.state.with_q(q, self.group.indices), self.group.name)
 
-    def _edge_is_free(self, a, b):
+    def _edge_is_free(self, a: np.ndarray, b: np.ndarray) -> bool:
         count = max(1, math.ceil(np.linalg.norm(b - a) / (0.5 * self.checker.resolution)))
         # Far end first: it is new.
         return self._all_free(a + (b - a) * (np.arange(count, 0, -1) / count)[:, None])
 
-    def _all_free(self, states):
+    def _all_free(self, states: np.ndarray) -> bool:
         return self.search.exact.first_blocked(self.scene, states, self.group.name) is None
 
-    def _path_is_free(self, points, run):
+    def _path_is_free(self, points: np.ndarray, run: Run) -> bool:
         """Whether the path is free by exact geometry, at states between those that spheres have checked. Spheres
         contain the robot: if they are free, so is the robot. Exact geometry checks all other states, and in any case
         every eighth state and each corner.
@@ -411,25 +424,25 @@ class _Planning:
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    def _run(self, share):
+    def _run(self, share: float) -> Run:
         return Run(self.search.seed, self.begin + share * self.search.allowed_time, self.search.clock, self.search.stop)
 
-    def _note(self, part):
+    def _note(self, part: str) -> None:
         """Add the time since the last note to that of a part of the work."""
         now = self.search.clock()
         self.times[part] = self.times.get(part, 0.0) + now - self.last
         self.last = now
 
-    def _left(self, share):
+    def _left(self, share: float) -> bool:
         return self.search.clock() < self.begin + share * self.search.allowed_time
 
 
-def _between_ways(outwards, path, inward):
+def _between_ways(outwards: np.ndarray, path: Path, inward: np.ndarray) -> Path:
     """The Path, which begins where the points ``outwards`` end, with these and those ``inward`` from its end."""
     return path._replace(points=np.concatenate([outwards, path.points[1:-1], inward]))
 
 
-def _between_checked(points, resolution):
+def _between_checked(points: np.ndarray, resolution: float) -> tuple[np.ndarray, np.ndarray]:
     """Return (states (m, k), indices of the corners): the corners ``points`` of a path, and what lies halfway between
     the states on its lines that the search has checked, which are at most ``resolution`` apart."""
     steps = np.diff(points, axis=0)

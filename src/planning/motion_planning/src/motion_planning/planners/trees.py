@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RRT-Connect (Kuffner and LaValle 2000) and shortcuts, on a SphereChecker."""
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from motion_planning.planners import kernels
 from motion_planning.planners.errors import NoPath
+
+if TYPE_CHECKING:
+    from motion_planning.spheres import SphereChecker
+
+    Trees = tuple[np.ndarray, np.ndarray, np.ndarray]
+    Planner = Callable[[SphereChecker, np.ndarray, np.ndarray, np.ndarray, "Run"], "Path"]
 
 #: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow passages.
 REACH = 0.5
@@ -31,11 +39,11 @@ class Path(NamedTuple):
 
     points: np.ndarray
     samples: int = 0
-    times: Mapping = MappingProxyType({})
+    times: Mapping[str, float] = MappingProxyType({})
     remarks: tuple[str, ...] = ()
 
     @property
-    def length(self):
+    def length(self) -> float:
         """The sum of Euclidean distances [rad]."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
@@ -50,7 +58,7 @@ class Run(NamedTuple):
     stop: Callable[[], bool] = lambda: False
     samples: float = math.inf
 
-    def check(self, what):
+    def check(self, what: str) -> None:
         """Raise NoPath if the deadline has passed or the caller stops the search."""
         if self.stop():
             raise NoPath("stopped while %s" % what, stopped=True)
@@ -58,7 +66,8 @@ class Run(NamedTuple):
             raise NoPath("time was over while %s" % what, late=True)
 
 
-def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
+def rrt_connect(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+                reach: float = REACH) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker`` (SphereChecker).
 
     Two trees grow towards each other, the smaller one first. bounds (k, 2): of the samples; start and goals must be
@@ -67,7 +76,8 @@ def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
     return next(path for path in growing(checker, bounds, start, goals, run, reach) if path is not None)
 
 
-def growing(checker, bounds, start, goals, run, reach=REACH):
+def growing(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+            reach: float = REACH) -> Iterator[Path | None]:
     """``rrt_connect`` in parts of ``SAMPLES`` samples: yields None after each one, and at last the Path."""
     start, goals = np.asarray(start, dtype=np.float32), np.atleast_2d(np.asarray(goals, dtype=np.float32))
     for goal in goals[np.argsort(np.linalg.norm(goals - start, axis=1), kind="stable")]:
@@ -91,13 +101,13 @@ def growing(checker, bounds, start, goals, run, reach=REACH):
         yield None
 
 
-def shorten(path, checker, run, tries=_TRIES, misses=_MISSES):
+def shorten(path: Path, checker: SphereChecker, run: Run, tries: int = _TRIES, misses: int = _MISSES) -> Path:
     """Return the Path without detours for which ``checker`` finds a straight line; it is never longer than before. Ends
     after so many ``tries``, or so many ``misses`` in a row."""
     return _shorter(path, checker, _numbers(run.seed), (tries, misses, 0.0))
 
 
-def improve(path, checker, run):
+def improve(path: Path, checker: SphereChecker, run: Run) -> Path:
     """Return the Path after ``IMPROVING`` tries to make it shorter, some 20 ms for both arms of Baxter, or fewer if the
     deadline has passed. Raises NoPath if it is stopped."""
     numbers, tries, left = _numbers(run.seed), _FIRST_TRIES, IMPROVING
@@ -114,7 +124,7 @@ def improve(path, checker, run):
     return path
 
 
-def _shorter(path, checker, numbers, effort):
+def _shorter(path: Path, checker: SphereChecker, numbers: np.ndarray, effort: tuple[int, int, float]) -> Path:
     """effort: as of ``kernels.shortcut``."""
     count = len(path.points)
     points = np.empty((count + 2 * effort[0] + 2, path.points.shape[1]), np.float32)
@@ -123,7 +133,7 @@ def _shorter(path, checker, numbers, effort):
     return path._replace(points=points[:count].astype(float))
 
 
-def _numbers(seed):
+def _numbers(seed: int) -> np.ndarray:
     numbers = np.zeros(7, np.int64)
     # Similar seeds must not give similar sequences, and 0 would give only zeros: splitmix64 (Steele, Lea, Flood 2014).
     bits = (seed + 1) * 0x9E3779B97F4A7C15 & _ALL
@@ -133,7 +143,7 @@ def _numbers(seed):
     return numbers
 
 
-def _seeds(start, goals, seed):
+def _seeds(start: np.ndarray, goals: np.ndarray, seed: int) -> Trees:
     """Trees that consist of their roots."""
     room = max(_MIN_ROOM, 2 * len(goals) + 16)
     room += -room % 16
@@ -144,7 +154,7 @@ def _seeds(start, goals, seed):
     return nodes, parents, numbers
 
 
-def _roomier(trees):
+def _roomier(trees: Trees) -> Trees:
     nodes, parents, numbers = trees
     room = 4 * nodes.shape[2]
     if room > _MAX_ROOM:
@@ -156,7 +166,7 @@ def _roomier(trees):
     return more, more_parents, numbers
 
 
-def _traced(trees):
+def _traced(trees: Trees) -> np.ndarray:
     """The points from the first tree's root through the meeting point to a root of the second; the meeting point
     appears once."""
     nodes, parents, numbers = trees

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compile the planner into the cache, so that neither the start nor the first plan has to wait for it."""
+from __future__ import annotations
+
 import time
 
 import numpy as np
@@ -7,7 +9,7 @@ import numpy as np
 from motion_planning.constraints import ConstraintSet, OrientationTarget
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.exact import ExactChecker
-from motion_planning.model import PlanningModel
+from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners import kernels
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
@@ -23,10 +25,10 @@ _URDF = """<robot name="two">
 _SRDF = "<robot name='two'><group name='arm'><joint name='turn'/></group></robot>"
 
 
-def warm_up():
+def warm_up() -> None:
     """Compile all code of planning, or load it from the cache."""
-    model = PlanningModel.from_xml(_URDF, _SRDF)
-    checker = SphereChecker(SphereModel.of(model, None), model.groups["arm"], Scene(model))
+    model, meshes = PlanningModel.from_xml(_URDF, _SRDF), MeshReader(lambda filename: None)
+    checker = SphereChecker(SphereModel.of(model, meshes), model.groups["arm"], Scene(model))
     run = Run(seed=1, deadline=0.0, clock=time.monotonic)
     ends = np.array([[0.5], [2.5]])
     try:
@@ -37,8 +39,8 @@ def warm_up():
     checker.valid(ends)
     kernels.at_once(ends, ends)
     kernels.way_through(np.ones((2, 2), dtype=bool), np.zeros((2, 2, 9), dtype=bool))
-    arm, level = model.groups["arm"], ConstraintSet(orientations=[OrientationTarget("arm", np.eye(3))])
+    arm, level = model.groups["arm"], ConstraintSet(orientations=(OrientationTarget("arm", np.eye(3)),))
     Manifold(Scene(model), arm, level, ends[0]).project(ends[0])
-    exact = ExactChecker(model, None)
+    exact = ExactChecker(model, meshes)
     exact.first_blocked(Scene(model), [[0.0], [1.6]])
     exact.distance(Scene(model))

@@ -2,14 +2,18 @@
 """Which two of a scene's links and objects may touch: MoveIt's allowed-collision matrix."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from command_line.options import counted
 from motion_planning.model.planning_model import pair_of
+
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,22 +24,23 @@ class AllowedCollisions:
     has priority; then defaults, of which a "must not" wins; pairs without either must not touch.
     """
 
-    entries: Mapping = field(default_factory=dict)
-    defaults: Mapping = field(default_factory=dict)
+    entries: Mapping[tuple[str, str], bool] = field(default_factory=dict)
+    defaults: Mapping[str, bool] = field(default_factory=dict)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("entries", "defaults"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @classmethod
-    def of(cls, model):
+    def of(cls, model: PlanningModel) -> AllowedCollisions:
         """Return the matrix of ``model``'s SRDF."""
         entries = {pair_of(*pair): False for pair in model.srdf.enabled}
         entries.update(dict.fromkeys(model.disabled, True))
         return cls(entries, dict.fromkeys(model.srdf.no_default, True))
 
     @classmethod
-    def from_matrix(cls, names, matrix, default_names=(), default_values=()):
+    def from_matrix(cls, names: Sequence[str], matrix: Sequence[Sequence[bool]] | np.ndarray,
+                    default_names: Sequence[str] = (), default_values: Sequence[bool] = ()) -> AllowedCollisions:
         """Return the entries of a message: ``matrix`` (n, n) bool for ``names`` (n), values for default names.
 
         Raises ValueError for lists that do not fit each other.
@@ -51,7 +56,7 @@ class AllowedCollisions:
                    if i != j}
         return cls(entries, dict(zip(default_names, map(bool, default_values), strict=True)))
 
-    def as_matrix(self):
+    def as_matrix(self) -> tuple[list[str], np.ndarray, list[str], list[bool]]:
         """Return (names, matrix (n, n) bool, default names, default values), as in a message. A pair without an entry
         gets the value of its defaults.
         """
@@ -60,7 +65,7 @@ class AllowedCollisions:
                           dtype=bool).reshape(len(names), len(names))
         return names, matrix, list(self.defaults), list(self.defaults.values())
 
-    def allowed(self, a, b):
+    def allowed(self, a: str, b: str) -> bool:
         """Whether ``a`` and ``b`` may touch."""
         entry = self.entries.get((a, b) if a <= b else (b, a))
         if entry is not None:
@@ -68,7 +73,7 @@ class AllowedCollisions:
         said = [self.defaults[name] for name in (a, b) if name in self.defaults]
         return bool(said) and all(said)
 
-    def among(self, names):
+    def among(self, names: Sequence[str]) -> np.ndarray:
         """Return (n, n) bool: whether each two of ``names`` may touch, in a few steps for many names."""
         said = np.array([name in self.defaults for name in names], dtype=bool)
         value = np.array([self.defaults.get(name, False) for name in names], dtype=bool)
@@ -81,11 +86,11 @@ class AllowedCollisions:
                 may[np.ix_(index[a], index[b])] = may[np.ix_(index[b], index[a])] = allowed
         return may
 
-    def with_entries(self, pairs):
+    def with_entries(self, pairs: Mapping[tuple[str, str], bool]) -> AllowedCollisions:
         """Return a copy with the entries ``pairs``, {(name, name): may touch}."""
         return AllowedCollisions({**self.entries, **{pair_of(*pair): bool(value) for pair, value in pairs.items()}},
                                  self.defaults)
 
-    def with_default(self, name, allow):
+    def with_default(self, name: str, allow: bool) -> AllowedCollisions:
         """Return a copy with ``name`` allowed to touch everything, or nothing; its entries stay."""
         return AllowedCollisions(self.entries, {**self.defaults, name: bool(allow)})

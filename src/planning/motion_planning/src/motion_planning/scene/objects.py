@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh, read_only
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from motion_planning.shapes import Geometry, Placed
 
 #: The octomap's name in an AllowedCollisions and in contacts.
 OCTOMAP = "<octomap>"
@@ -33,11 +39,11 @@ class WorldObject:
 
     id: str
     pose: np.ndarray
-    shapes: tuple
-    subframes: Mapping = field(default_factory=dict)
+    shapes: tuple[Placed, ...]
+    subframes: Mapping[str, np.ndarray] = field(default_factory=dict)
     type: tuple[str, str] = ("", "")
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "pose", _pose(self.pose, self.id))
         object.__setattr__(self, "shapes", tuple((shape, _pose(pose, self.id)) for shape, pose in self.shapes))
         for shape, _ in self.shapes:
@@ -46,11 +52,11 @@ class WorldObject:
             checked = {name: _pose(pose, self.id) for name, pose in self.subframes.items()}
             object.__setattr__(self, "subframes", MappingProxyType(checked))
 
-    def at(self, pose):
+    def at(self, pose: np.ndarray) -> WorldObject:
         """Return the object at another ``pose`` (4, 4)."""
         return replace(self, pose=pose)
 
-    def with_shapes_of(self, other):
+    def with_shapes_of(self, other: WorldObject) -> WorldObject:
         """Return the object with the shapes and subframes of ``other``, given in the same frame, added. Raises
         SceneError for an invalid pose.
         """
@@ -73,15 +79,15 @@ class AttachedBody:
     touch_links: frozenset[str] = frozenset()
     detach_posture: object = None
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "touch_links", frozenset(self.touch_links) | {self.link})
 
     @property
-    def id(self):
+    def id(self) -> str:
         return self.object.id
 
 
-def _check_size(shape, name):
+def _check_size(shape: Geometry, name: str) -> None:
     sizes = (*getattr(shape, "size", ()), *(getattr(shape, one) for one in ("radius", "length") if hasattr(shape, one)))
     if not all(0.0 <= size <= FARTHEST for size in sizes):
         raise SceneError("a %s of object '%s' has the sizes %s; expected 0 to %g m"
@@ -91,7 +97,7 @@ def _check_size(shape, name):
                          % (name, np.abs(shape.vertices).max(), FARTHEST))
 
 
-def _pose(pose, name):
+def _pose(pose: ArrayLike, name: str) -> np.ndarray:
     matrix = read_only(pose)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise SceneError("a pose of object '%s' is %s; expected a finite (4, 4) matrix"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from motion_planning.model import PlanningModel, State
 from motion_planning.scene.allowed import AllowedCollisions
 from motion_planning.scene.objects import OCTOMAP, AttachedBody, SceneError, WorldObject
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from motion_planning.shapes import Octree
 
 # Number of known names that are compared with an unknown one.
 _COMPARED = 300
@@ -33,17 +37,17 @@ class Scene:
     """
 
     model: PlanningModel
-    state: State | None = None
-    objects: Mapping = field(default_factory=dict)
-    allowed: AllowedCollisions | None = None
-    colours: Mapping = field(default_factory=dict)
+    state: State = cast(State, None)
+    objects: Mapping[str, WorldObject] = field(default_factory=dict)
+    allowed: AllowedCollisions = cast(AllowedCollisions, None)
+    colours: Mapping[str, Sequence[float]] = field(default_factory=dict)
     octomap: WorldObject | None = None
-    transforms: Mapping = field(default_factory=dict)
-    link_padding: Mapping = field(default_factory=dict)
-    link_scale: Mapping = field(default_factory=dict)
+    transforms: Mapping[str, np.ndarray] = field(default_factory=dict)
+    link_padding: Mapping[str, float] = field(default_factory=dict)
+    link_scale: Mapping[str, float] = field(default_factory=dict)
     name: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.state is None:
             object.__setattr__(self, "state", self.model.default_state())
         if self.allowed is None:
@@ -54,11 +58,11 @@ class Scene:
 
     # -- objects of the world -----------------------------------------------------------------------------------
 
-    def with_object(self, new):
+    def with_object(self, new: WorldObject) -> Scene:
         """Return the scene with a WorldObject added; one of the same id is replaced. Raises SceneError."""
         return self.with_objects([new])
 
-    def with_objects(self, new):
+    def with_objects(self, new: Iterable[WorldObject]) -> Scene:
         """Return the scene with many WorldObjects added at once. Raises SceneError for one without shapes or name."""
         objects = dict(self.objects)
         for one in new:
@@ -66,13 +70,13 @@ class Scene:
             objects[one.id] = one
         return replace(self, objects=objects)
 
-    def appended(self, more):
+    def appended(self, more: WorldObject) -> Scene:
         """Return the scene with the shapes of ``more`` (WorldObject) added to the object of its id, or to a new one.
         Raises SceneError."""
         there = self.objects.get(more.id)
         return self.with_object(more if there is None else there.with_shapes_of(more))
 
-    def without_object(self, name):
+    def without_object(self, name: str) -> Scene:
         """Return the scene without an object and its colour; an empty ``name``: without all objects. What it may touch
         stays, for an object that takes the name again. Raises SceneError for an unknown name.
         """
@@ -81,11 +85,11 @@ class Scene:
         self._object(name)
         return self._without([name])
 
-    def without_objects(self, names):
+    def without_objects(self, names: Iterable[str]) -> Scene:
         """Return the scene without many objects; unknown names are ignored."""
         return self._without(names)
 
-    def moved(self, name, pose, shape_poses=None):
+    def moved(self, name: str, pose: np.ndarray, shape_poses: Sequence[np.ndarray] | None = None) -> Scene:
         """Return the scene with an object at ``pose`` (4, 4), and its shapes at ``shape_poses`` [(4, 4), ...] in it if
         given. Raises SceneError for an unknown object, and for another number of shapes."""
         there = self._object(name)
@@ -97,7 +101,7 @@ class Scene:
             there = replace(there, shapes=shapes)
         return replace(self, objects={**self.objects, name: there.at(pose)})
 
-    def with_octomap(self, octree, pose=None):
+    def with_octomap(self, octree: Octree | None, pose: np.ndarray | None = None) -> Scene:
         """Return the scene with ``octree`` (Octree) at ``pose`` (4, 4) as its octomap; None: with none."""
         octomap = None if octree is None else WorldObject(
             OCTOMAP, np.eye(4) if pose is None else pose, ((octree, np.eye(4)),))
@@ -105,7 +109,8 @@ class Scene:
 
     # -- attached objects -----------------------------------------------------------------------------------
 
-    def attach(self, what, link, touch_links=(), detach_posture=None):
+    def attach(self, what: str | WorldObject, link: str, touch_links: Iterable[str] = (),
+               detach_posture: object = None) -> Scene:
         """Return the scene with ``what`` attached to ``link``.
 
         ``what``: id of an object of the world, which is removed from the world and keeps its pose; or a WorldObject
@@ -127,7 +132,7 @@ class Scene:
         objects = {name: one for name, one in self.objects.items() if name != new.id}
         return replace(self, objects=objects, state=self.state.with_attached({**self.state.attached, new.id: body}))
 
-    def attach_more(self, more, link):
+    def attach_more(self, more: WorldObject, link: str) -> Scene:
         """Return the scene with the shapes of ``more`` (WorldObject, pose in ``link``) added to the attached object of
         its id. Raises SceneError if there is none, or another link holds it."""
         there = self._attached(more.id)
@@ -136,7 +141,7 @@ class Scene:
         body = replace(there, object=there.object.with_shapes_of(more))
         return replace(self, state=self.state.with_attached({**self.state.attached, more.id: body}))
 
-    def detach(self, name="", link=""):
+    def detach(self, name: str = "", link: str = "") -> Scene:
         """Return the scene with attached objects back in the world, at their present poses.
 
         Empty ``name``: all objects of ``link``; both empty: all. If the world already has an object of that name, this
@@ -152,7 +157,7 @@ class Scene:
             objects.setdefault(one, body.object.at(self.attached_pose(body)))
         return replace(self, objects=objects, state=self.state.with_attached(held))
 
-    def attached_pose(self, body, frames=None):
+    def attached_pose(self, body: AttachedBody, frames: np.ndarray | None = None) -> np.ndarray:
         """Return the pose (4, 4) of an AttachedBody's object in the planning frame.
 
         ``frames`` (l, 4, 4): the links', None: those of the scene's state.
@@ -162,23 +167,24 @@ class Scene:
 
     # -- the rest -----------------------------------------------------------------------------------------------
 
-    def with_state(self, state):
+    def with_state(self, state: State) -> Scene:
         """Return the scene with the robot in another State, including its attached objects."""
         return replace(self, state=state)
 
-    def with_allowed(self, allowed):
+    def with_allowed(self, allowed: AllowedCollisions) -> Scene:
         """Return the scene with other AllowedCollisions."""
         return replace(self, allowed=allowed)
 
-    def with_colours(self, colours):
+    def with_colours(self, colours: Mapping[str, Sequence[float]]) -> Scene:
         """Return the scene with {id: (r, g, b, a)} added to its colours."""
         return replace(self, colours={**self.colours, **colours})
 
-    def with_transforms(self, transforms):
+    def with_transforms(self, transforms: Mapping[str, np.ndarray]) -> Scene:
         """Return the scene with {frame: pose (4, 4) in the planning frame} as its fixed frames."""
         return replace(self, transforms=transforms)
 
-    def with_padding(self, padding=None, scale=None):
+    def with_padding(self, padding: Mapping[str, float] | None = None,
+                     scale: Mapping[str, float] | None = None) -> Scene:
         """Return the scene with {link: m} and {link: factor} merged into the present ones. Raises SceneError."""
         for what, table, least in (("padding", padding or {}, 0.0), ("scale", scale or {}, 1e-6)):
             for link, value in table.items():
@@ -192,11 +198,11 @@ class Scene:
                        link_scale={**self.link_scale, **(scale or {})})
 
     @cached_property
-    def link_frames(self):
+    def link_frames(self) -> np.ndarray:
         """Poses (l, 4, 4) of the model's links in the planning frame, at the scene's state."""
         return self.model.frames(self.state.q, self.state.base)
 
-    def frame(self, name):
+    def frame(self, name: str) -> np.ndarray:
         """Return the pose (4, 4) in the planning frame of a link, of an attached object, of an object, of
         "object/subframe", or of a fixed frame; in this order. Raises SceneError for an unknown name."""
         name = name.lstrip("/")
@@ -206,11 +212,11 @@ class Scene:
                              % (name, like(name, self.frame_names())))
         return np.array(pose)
 
-    def has_frame(self, name):
+    def has_frame(self, name: str) -> bool:
         """Whether :meth:`frame` accepts ``name``."""
         return self._known_pose(name.lstrip("/")) is not None
 
-    def frame_names(self):
+    def frame_names(self) -> list[str]:
         """A new list of all names that :meth:`frame` accepts."""
         held = {name: body.object for name, body in self.state.attached.items()}
         return [self.model.frame, *self.model.links,
@@ -218,7 +224,7 @@ class Scene:
                 *("%s/%s" % (name, subframe) for things in (held, self.objects) for name, one in things.items()
                   for subframe in one.subframes), *self.transforms]
 
-    def _known_pose(self, name):
+    def _known_pose(self, name: str) -> np.ndarray | None:
         pose = self._pose_of(name)
         if pose is None and "/" in name:
             owner, _, subframe = name.rpartition("/")
@@ -227,7 +233,7 @@ class Scene:
                 pose = self._pose_of(owner) @ holder.subframes[subframe]
         return self.transforms.get(name) if pose is None else pose
 
-    def _pose_of(self, name):
+    def _pose_of(self, name: str) -> np.ndarray | None:
         if name in self.model.link_index:
             return self.link_frames[self.model.link_index[name]]
         if name == self.model.frame:
@@ -236,7 +242,7 @@ class Scene:
             return self.attached_pose(self.state.attached[name])
         return self.objects[name].pose if name in self.objects else None
 
-    def _take(self, name, link):
+    def _take(self, name: str, link: str) -> WorldObject:
         if name in self.objects:
             there = self.objects[name]
             return there.at(inverse(self.frame(link)) @ there.pose)
@@ -246,37 +252,37 @@ class Scene:
         raise SceneError("object '%s' cannot be attached to '%s': it comes without geometry, and the world has no such "
                          "object%s" % (name, link, like(name, self.objects)))
 
-    def _without(self, names):
+    def _without(self, names: Iterable[str]) -> Scene:
         gone = set(names)
         return replace(self, objects={name: one for name, one in self.objects.items() if name not in gone},
                        colours={name: colour for name, colour in self.colours.items() if name not in gone})
 
-    def _object(self, name):
+    def _object(self, name: str) -> WorldObject:
         if name not in self.objects:
             raise SceneError("the world has no object '%s'%s" % (name, like(name, self.objects)))
         return self.objects[name]
 
-    def _attached(self, name):
+    def _attached(self, name: str) -> AttachedBody:
         if name not in self.state.attached:
             raise SceneError("the robot holds no object '%s'%s" % (name, like(name, self.state.attached)))
         return self.state.attached[name]
 
 
-def check_object(new):
+def check_object(new: WorldObject) -> None:
     """Raise SceneError for a WorldObject that a scene does not accept."""
     _check_name(new.id)
     if not new.shapes:
         raise SceneError("object '%s' has no shapes; give it a primitive, a mesh or a plane" % new.id)
 
 
-def _check_name(name):
+def _check_name(name: str) -> None:
     if name == OCTOMAP:
         raise SceneError("'%s' is the octomap's name; give the object another" % OCTOMAP)
     if not name:
         raise SceneError("an object has no name; give it an id")
 
 
-def like(name, known):
+def like(name: str, known: Iterable[str]) -> str:
     """The end of a sentence: the most similar of the ``known`` names, if any. Only the first ones are compared, because
     a message may have thousands of wrong names."""
     near = difflib.get_close_matches(name, list(itertools.islice(known, _COMPARED)), 1)

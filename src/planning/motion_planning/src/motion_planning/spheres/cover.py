@@ -5,13 +5,20 @@ A sphere whose centre is at depth d in the solid and whose radius is d + toleran
 A greedy choice takes the sphere that contains the most samples not yet contained. Samples are on the surface and
 inside; each must be contained with a margin, so that the points between the samples are contained, too.
 """
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from motion_planning.shapes import TriangleMesh
 from motion_planning.spheres import covering
 from urdf_model import Box, Cylinder, Sphere
+
+if TYPE_CHECKING:
+    from motion_planning.shapes import Geometry, Placed
 
 # Distance of samples [tolerances]; points between them are at most half a diagonal of their squares away.
 _SPACING = 0.5
@@ -54,24 +61,24 @@ class CoverError(ValueError):
     """Geometry that cannot be covered; the text names it."""
 
 
-def cover(parts, tolerance):
+def cover(parts: Sequence[Placed], tolerance: float) -> np.ndarray:
     """Return spheres (n, 4), centre and radius, that contain all ``parts`` and reach ``tolerance`` [m] beyond them.
 
-    parts: [(geometry, pose (4, 4))]; geometry: Box, Cylinder or Sphere of urdf_model, or an object with ``vertices``
-    (n, 3) and ``triangles`` (m, 3). A mesh counts as solid if its surface is closed up to gaps of ``tolerance``. Large
-    geometry gets a larger tolerance. Raises CoverError.
+    parts: [(geometry, pose (4, 4))]; geometry: Box, Cylinder or Sphere of urdf_model, or TriangleMesh. A mesh
+    counts as solid if its surface is closed up to gaps of ``tolerance``. Large geometry gets a larger tolerance. Raises
+    CoverError.
     """
     return _cover(parts, tolerance, OF_LINKS)[0]
 
 
-def cover_object(parts, tolerance):
+def cover_object(parts: Sequence[Placed], tolerance: float) -> np.ndarray:
     """``cover`` with the bounds of OF_OBJECTS: (1 + n, 4), the tolerance that was used [m] in the first row's first
     place, then the spheres. Raises CoverError."""
     spheres, used = _cover(parts, tolerance, OF_OBJECTS)
     return np.concatenate([[[used, 0.0, 0.0, 0.0]], spheres])
 
 
-def _cover(parts, tolerance, bound):
+def _cover(parts: Sequence[Placed], tolerance: float, bound: Bound) -> tuple[np.ndarray, float]:
     """The spheres (n, 4), and the tolerance [m] that was used."""
     alone = [(geometry, pose) for geometry, pose in parts if isinstance(geometry, Sphere)]
     found = [np.append(pose[:3, 3], geometry.radius + ROUNDING) for geometry, pose in alone]
@@ -95,7 +102,7 @@ def _cover(parts, tolerance, bound):
     return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)]), used
 
 
-def ball(spheres, steps=100):
+def ball(spheres: np.ndarray, steps: int = 100) -> np.ndarray:
     """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards the farthest sphere."""
     centre = 0.5 * ((spheres[:, :3] - spheres[:, 3:]).min(0) + (spheres[:, :3] + spheres[:, 3:]).max(0))
     best = np.append(centre, np.inf)
@@ -108,7 +115,7 @@ def ball(spheres, steps=100):
     return best + [0.0, 0.0, 0.0, ROUNDING]
 
 
-def _greedy(wanted, centres, reach):
+def _greedy(wanted: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Indices of centres whose balls with radius ``reach`` contain all points ``wanted``, most points first."""
     balls = np.column_stack([centres, np.square(np.maximum(reach, 0.0))]).astype(np.float32)
     chosen = np.empty(len(balls), dtype=np.int64)
@@ -119,7 +126,7 @@ def _greedy(wanted, centres, reach):
     return chosen[:number]
 
 
-def _shrunk(spheres, wanted, between):
+def _shrunk(spheres: np.ndarray, wanted: np.ndarray, between: float) -> np.ndarray:
     """Without the spheres whose points others contain as well, each as small as the points that only it contains
     allow."""
     # They were chosen in single precision.
@@ -131,7 +138,7 @@ def _shrunk(spheres, wanted, between):
         if count <= room:
             break
         room = count
-    members, apart = (np.split(values[:count], starts[1:-1]) for values in (inside, far))
+    members, apart = np.split(inside[:count], starts[1:-1]), np.split(far[:count], starts[1:-1])
     times = np.bincount(np.concatenate([*members, np.empty(0, dtype=int)]), minlength=len(wanted))
     kept = []
     for k, inside in enumerate(members):
@@ -149,7 +156,7 @@ def _shrunk(spheres, wanted, between):
 class _solid_box:
     """A box or a cylinder: samples of it, points inside, and the depth of points."""
 
-    def __init__(self, geometry, pose, tolerance):
+    def __init__(self, geometry: Box | Cylinder, pose: np.ndarray, tolerance: float) -> None:
         self._geometry, self._pose = geometry, pose
         box = isinstance(geometry, Box)
         half = 0.5 * np.array(geometry.size if box else [2 * geometry.radius, 2 * geometry.radius, geometry.length])
@@ -170,7 +177,7 @@ class _solid_box:
         self.samples = _moved(pose, np.concatenate([samples, inside]))
         self.inside = _moved(pose, inside)
 
-    def depth(self, points):
+    def depth(self, points: np.ndarray) -> np.ndarray:
         geometry = self._geometry
         local = (points - self._pose[:3, 3]) @ self._pose[:3, :3]
         if isinstance(geometry, Box):
@@ -182,7 +189,7 @@ class _solid_box:
 class _solid_mesh:
     """A mesh as voxels: those of its surface and those that it encloses."""
 
-    def __init__(self, mesh, pose, tolerance, bound):
+    def __init__(self, mesh: TriangleMesh, pose: np.ndarray, tolerance: float, bound: Bound) -> None:
         vertices, triangles = used_corners(np.asarray(mesh.vertices, dtype=float).reshape(-1, 3),
                                            np.asarray(mesh.triangles).reshape(-1, 3))
         # Surface voxels have no depth: the tolerance alone must extend a sphere to their corners.
@@ -207,7 +214,7 @@ class _solid_mesh:
         surface, _ = voxels([samples], cell, fill=False)
         self._inside_depth[surface[tuple(cells.T)]] = 0.0
 
-    def depth(self, points):
+    def depth(self, points: np.ndarray) -> np.ndarray:
         """The depth of points of ``inside``; 0 elsewhere, which is a lower bound."""
         depth = np.zeros(len(points))
         own = {tuple(p): d for p, d in zip(self.inside.tolist(), self._inside_depth, strict=True)}
@@ -215,42 +222,42 @@ class _solid_mesh:
             depth[i] = own.get(tuple(point), 0.0)
         return depth
 
-    def _distance(self, points):
+    def _distance(self, points: np.ndarray) -> np.ndarray:
         nearest = np.empty(len(points), dtype=np.float32)
         covering.nearest(covering.by_axes(self._surface), len(self._surface), points.astype(np.float32), nearest)
         return nearest.astype(float)
 
 
-def _solid(geometry, pose, tolerance, bound):
+def _solid(geometry: Geometry, pose: np.ndarray, tolerance: float, bound: Bound) -> _solid_box | _solid_mesh:
     if isinstance(geometry, (Box, Cylinder)):
         return _solid_box(geometry, pose, tolerance)
-    if hasattr(geometry, "triangles"):
+    if isinstance(geometry, TriangleMesh):
         return _solid_mesh(geometry, pose, tolerance, bound)
     raise CoverError("a %s cannot be covered; expected a box, a cylinder, a sphere or a mesh" % type(geometry).__name__)
 
 
-def _moved(pose, points):
+def _moved(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points @ pose[:3, :3].T + pose[:3, 3]
 
 
-def _distances(half, tolerance):
+def _distances(half: np.ndarray, tolerance: float) -> float:
     """Number of samples times centres of a box with half sides (3,)."""
     u, v, w = 2.0 * np.ceil(half / (tolerance * _SPACING)) + 1.0
     centres = (2.0 * np.ceil(half / tolerance) + 1.0).prod()
     return (2.0 * (u * v + v * w + w * u) + centres) * centres
 
 
-def _line(half, spacing):
+def _line(half: float, spacing: float) -> np.ndarray:
     """Points from -half to half, an odd number, so that the middle is one of them."""
     count = 2 * int(np.ceil(half / spacing)) + 1
     return np.linspace(-half, half, count)
 
 
-def _grid(half, spacing):
+def _grid(half: np.ndarray, spacing: float) -> np.ndarray:
     return np.stack(np.meshgrid(*(_line(h, spacing) for h in half), indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _box_surface(half, spacing):
+def _box_surface(half: np.ndarray, spacing: float) -> np.ndarray:
     sides = []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
@@ -262,7 +269,7 @@ def _box_surface(half, spacing):
     return np.concatenate(sides)
 
 
-def _disc(radius, spacing):
+def _disc(radius: float, spacing: float) -> np.ndarray:
     """Points (n, 2) on rings from the middle to the rim, at most ``spacing`` apart along rings and between them."""
     steps = max(1, int(np.ceil(radius / spacing)))
     points = [np.zeros((1, 2))]
@@ -272,12 +279,12 @@ def _disc(radius, spacing):
     return np.concatenate(points)
 
 
-def _around(radius, spacing):
+def _around(radius: float, spacing: float) -> np.ndarray:
     count = max(8, int(np.ceil(2.0 * np.pi * radius / spacing)))
     return 2.0 * np.pi * np.arange(count) / count
 
 
-def _cylinder_surface(cylinder, spacing):
+def _cylinder_surface(cylinder: Cylinder, spacing: float) -> np.ndarray:
     # A circle bulges beyond the line between two samples, so they are a little closer.
     angle, z = _around(cylinder.radius, 0.9 * spacing), _line(0.5 * cylinder.length, spacing)
     angle, z = (grid.ravel() for grid in np.meshgrid(angle, z))
@@ -286,16 +293,16 @@ def _cylinder_surface(cylinder, spacing):
                                     0.5 * cylinder.length * np.array([-1.0, 1.0]))])
 
 
-def _cylinder_grid(cylinder, spacing):
+def _cylinder_grid(cylinder: Cylinder, spacing: float) -> np.ndarray:
     return _stacked(_disc(cylinder.radius, spacing), _line(0.5 * cylinder.length, spacing))
 
 
-def _stacked(disc, heights):
+def _stacked(disc: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """The points (n, 2) at each of the heights."""
     return np.column_stack([np.tile(disc, (len(heights), 1)), np.repeat(heights, len(disc))])
 
 
-def used_corners(vertices, triangles):
+def used_corners(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, triangles) without the vertices of no triangle. Raises CoverError for a mesh without triangles
     or with corners that are not finite."""
     if not len(triangles) or not np.isfinite(vertices[triangles]).all():
@@ -305,20 +312,20 @@ def used_corners(vertices, triangles):
     return vertices[used], renamed.reshape(triangles.shape)
 
 
-def sample_count(vertices, triangles, spacing):
+def sample_count(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> float:
     """Return the number of points that ``mesh_samples`` makes, as a float."""
     parts = _parts_of_sides(vertices[triangles], spacing)
     return len(vertices) + float((0.5 * (parts + 1.0) * (parts + 2.0))[parts > 1.0].sum())
 
 
-def _parts_of_sides(corners, spacing):
+def _parts_of_sides(corners: np.ndarray, spacing: float) -> np.ndarray:
     """Into how many parts each side of triangles (m, 3, 3) is divided, (m,) float."""
     longest = np.max([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=0)
     # A point of a triangle with no longer side than 1 is at most 1 / sqrt(3) from a corner.
     return np.maximum(1.0, np.ceil(longest / (_SIDES * spacing)))
 
 
-def points_on(vertices, triangles, spacing):
+def points_on(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
     """Yield points (n, 3), some at a time, on the triangles, none of whose points is further than ``spacing`` from
     one."""
     yield vertices
@@ -333,7 +340,7 @@ def points_on(vertices, triangles, spacing):
             yield np.matmul(weights[first : first + _AT_ONCE], some[begin : begin + at_once]).reshape(-1, 3)
 
 
-def mesh_samples(vertices, triangles, spacing):
+def mesh_samples(vertices: np.ndarray, triangles: np.ndarray, spacing: float) -> np.ndarray:
     """Return points (n, 3) on the triangles, none of whose points is further than ``spacing`` from one of them."""
     # One sample is enough for a cube with such sides; small triangles have many in one. The numbers of cubes have the
     # order of their rows, which take np.unique ten times as long.
@@ -348,12 +355,12 @@ def mesh_samples(vertices, triangles, spacing):
     return np.concatenate([points for _, points in kept])[first]
 
 
-def voxel_count(vertices, pitch):
+def voxel_count(vertices: np.ndarray, pitch: float) -> float:
     """Return the number of cells of size ``pitch`` that ``voxels`` looks at, as a float."""
     return float((np.ptp(vertices, axis=0) / pitch + 4.0).prod())
 
 
-def voxels(samples, pitch, fill=True):
+def voxels(samples: Iterable[np.ndarray], pitch: float, fill: bool = True) -> tuple[np.ndarray, np.ndarray]:
     """Return (cells (a, b, c) bool, corner (3,)): those of size ``pitch`` that hold samples, or that these enclose.
 
     samples: iterable of arrays of points (n, 3); the first ones have all others between them.
@@ -383,7 +390,8 @@ def voxels(samples, pitch, fill=True):
     return ~outside, lowest
 
 
-def boxes_of_cells(full, lowest, pitch, beyond=0.0, most=None):
+def boxes_of_cells(full: np.ndarray, lowest: np.ndarray, pitch: float, beyond: float = 0.0,
+                   most: int | None = None) -> np.ndarray:
     """Return boxes (n, 2, 3), least and greatest corner, that together are the cells, each larger by ``beyond``. Raises
     CoverError if they are more than ``most``."""
     left, found = full.copy(), []

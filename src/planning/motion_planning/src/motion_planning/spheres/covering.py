@@ -3,15 +3,22 @@
 
 Points (3 * room,) float32 are stored axis by axis; room is a multiple of 16, and what is not used is infinite.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.lanes import below, fill, least, load, store
 
+if TYPE_CHECKING:
+    from motion_planning.spheres.lanes import Vector
+
 _FAR = np.float32(np.inf)
 
 
-def by_axes(points):
+def by_axes(points: np.ndarray) -> np.ndarray:
     """Return ``points`` (n, 3) as these functions take them; n must be passed with them."""
     room = max(16, len(points) + -len(points) % 16)
     flat = np.full((3, room), _FAR, dtype=np.float32)
@@ -20,7 +27,7 @@ def by_axes(points):
 
 
 @compiled
-def _squares(points, begin, x, y, z):
+def _squares(points: np.ndarray, begin: int, x: np.float32, y: np.float32, z: np.float32) -> Vector:
     """The squared distances of 16 points from a point."""
     room = len(points) // 3
     dx = load(points, begin) - fill(x)
@@ -30,7 +37,7 @@ def _squares(points, begin, x, y, z):
 
 
 @compiled
-def _count(points, count, ball):
+def _count(points: np.ndarray, count: int, ball: np.ndarray) -> int:
     """How many of the first ``count`` points lie in ``ball`` (4,): its centre and squared radius."""
     x, y, z, limit = ball[0], ball[1], ball[2], fill(ball[3])
     total = 0
@@ -43,7 +50,7 @@ def _count(points, count, ball):
 
 
 @compiled
-def _part(points, count, ball, inside):
+def _part(points: np.ndarray, count: int, ball: np.ndarray, inside: np.ndarray) -> tuple[int, int]:
     """Move those of the first ``count`` points that lie in ``ball`` into ``inside``; return how many, how many stay."""
     x, y, z, limit = ball[0], ball[1], ball[2], fill(ball[3])
     room = len(points) // 3
@@ -70,7 +77,7 @@ def _part(points, count, ball, inside):
 
 
 @compiled
-def choose(points, count, balls, chosen):
+def choose(points: np.ndarray, count: int, balls: np.ndarray, chosen: np.ndarray) -> tuple[int, int]:
     """Write into ``chosen`` (m,) int64 the indices of ``balls`` (m, 4) float32, centre and squared radius, that
     together contain the first ``count`` points; each is the one that contains most of those that are left.
 
@@ -102,7 +109,8 @@ def choose(points, count, balls, chosen):
 
 
 @compiled
-def within(points, spheres, beyond, starts, members, apart):
+def within(points: np.ndarray, spheres: np.ndarray, beyond: float, starts: np.ndarray, members: np.ndarray,
+           apart: np.ndarray) -> int:
     """Which of ``points`` (n, 3) lie in which of ``spheres`` (m, 4), by the distance from the centre and ``beyond``.
 
     Fills starts (m + 1,) with where the points of each sphere begin in members and apart, and these with the indices
@@ -124,7 +132,7 @@ def within(points, spheres, beyond, starts, members, apart):
 
 
 @compiled
-def nearest(points, count, places, found):
+def nearest(points: np.ndarray, count: int, places: np.ndarray, found: np.ndarray) -> None:
     """Write into ``found`` (m,) float32 the distance of each of ``places`` (m, 3) float32 from the nearest of the first
     ``count`` points."""
     lane = np.empty(16, np.float32)

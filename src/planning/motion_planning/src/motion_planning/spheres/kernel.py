@@ -20,10 +20,22 @@ where the robot may touch itself, see ``pair_maps``. ``nodes`` (6 float32): leas
 ``node_links`` (2 int32): the node to continue with if this one is not hit, the object or -1. ``kinds`` and ``objects``
 (16 float32): SPHERE ... below; centre (3), rotation from the planning frame's axes into the object's (3, 3), sizes (3).
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.lanes import below, fill, greatest, load, magnitude, ramp, root, store, whole
+
+if TYPE_CHECKING:
+    from motion_planning.spheres.lanes import Vector
+
+    Table = tuple[np.ndarray, ...]
+    World = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+    Tables = tuple[Table, World]
+    Work = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 SPHERE, AXIS_BOX, BOX, UPRIGHT_CYLINDER, CYLINDER, PLANE = range(6)
 JOINT, JOINT_NUMBERS, CLUSTER, OBJECT, BRANCH, MAP = 3, 14, 3, 16, 6, 3
@@ -43,7 +55,7 @@ _C8, _C10, _C12 = np.float32(1.0 / 40320.0), np.float32(-1.0 / 3628800.0), np.fl
 
 
 @compiled
-def sine_and_cosine(x):
+def sine_and_cosine(x: Vector) -> tuple[Vector, Vector]:
     """Both share the turns that are taken off: x = turns pi + rest, |rest| <= pi / 2; odd turns change the signs."""
     turns = whole(x * fill(_ONE_OVER_PI))
     rest = (x - turns * fill(_PI_HIGH)) - turns * fill(_PI_LOW)
@@ -63,7 +75,7 @@ def sine_and_cosine(x):
 
 
 @compiled
-def place_joints(robot, q, begin, end, frames):
+def place_joints(robot: Table, q: np.ndarray, begin: int, end: int, frames: np.ndarray) -> None:
     """Write the frames of the joints begin ... end - 1, 12 lanes each: columns x, y, z and the origin.
 
     q: 16 values of each variable.
@@ -106,14 +118,14 @@ def place_joints(robot, q, begin, end, frames):
 
 
 @compiled
-def _store_column(frames, at, x, y, z):
+def _store_column(frames: np.ndarray, at: int, x: Vector, y: Vector, z: Vector) -> None:
     store(frames, at, x)
     store(frames, at + 16, y)
     store(frames, at + 32, z)
 
 
 @compiled
-def _place(frames, joint, numbers, i):
+def _place(frames: np.ndarray, joint: int, numbers: np.ndarray, i: int) -> tuple[Vector, Vector, Vector]:
     """The centre of ball i."""
     at = 192 * joint
     x, y, z = fill(numbers[4 * i]), fill(numbers[4 * i + 1]), fill(numbers[4 * i + 2])
@@ -123,13 +135,13 @@ def _place(frames, joint, numbers, i):
 
 
 @compiled
-def _beyond(x, half):
+def _beyond(x: Vector, half: Vector) -> Vector:
     """The excess of |x| over half, or 0."""
     return greatest(magnitude(x) - half, fill(_ZERO))
 
 
 @compiled
-def _meets_node(nodes, node, x, y, z, square):
+def _meets_node(nodes: np.ndarray, node: int, x: Vector, y: Vector, z: Vector, square: Vector) -> int:
     """Mask of the lanes whose ball with that squared radius meets the node's box."""
     n = 6 * node
     nothing = fill(_ZERO)
@@ -140,7 +152,7 @@ def _meets_node(nodes, node, x, y, z, square):
 
 
 @compiled
-def _meets_object(kind, objects, n, x, y, z, radius):
+def _meets_object(kind: int, objects: np.ndarray, n: int, x: Vector, y: Vector, z: Vector, radius: np.float32) -> int:
     """Mask of the lanes whose ball at x, y, z meets an object."""
     x, y, z = x - fill(objects[n]), y - fill(objects[n + 1]), z - fill(objects[n + 2])
     if kind == BOX or kind == CYLINDER or kind == PLANE:
@@ -163,7 +175,7 @@ def _meets_object(kind, objects, n, x, y, z, radius):
 
 
 @compiled
-def _cluster_meets_object(tables, c, k, frames, found, every):
+def _cluster_meets_object(tables: Tables, c: int, k: int, frames: np.ndarray, found: int, every: bool) -> int:
     """``found`` with the lanes in which a sphere of cluster c meets object k."""
     robot, (_, _, kinds, objects) = tables
     kind, n = kinds[k], OBJECT * k
@@ -183,7 +195,8 @@ def _cluster_meets_object(tables, c, k, frames, found, every):
 
 
 @compiled
-def _clusters_meet(robot, a, b, frames, centres, found, every):
+def _clusters_meet(robot: Table, a: int, b: int, frames: np.ndarray, centres: np.ndarray, found: int,
+                   every: bool) -> int:
     """``found`` with the lanes in which a sphere of cluster a meets one of cluster b."""
     clusters, balls, spheres, skips = robot[2], robot[3], robot[4], robot[8]
     joint, s, last = clusters[CLUSTER * a], clusters[CLUSTER * a + 1], clusters[CLUSTER * a + 2]
@@ -213,13 +226,13 @@ def _clusters_meet(robot, a, b, frames, centres, found, every):
 
 
 @compiled
-def _balls_meet(x, y, z, reach):
+def _balls_meet(x: Vector, y: Vector, z: Vector, reach: np.float32) -> int:
     """Mask of the lanes in which two balls x, y, z apart meet; reach: their radii together."""
     return below(x * x + y * y + z * z, fill(reach * reach))
 
 
 @compiled
-def _in_closed_cells(robot, q, found):
+def _in_closed_cells(robot: Table, q: np.ndarray, found: int) -> int:
     """``found`` with the lanes in which two joints are in a closed cell of their map."""
     maps, cells = robot[9], robot[10]
     for m in range(0, len(maps), MAP):
@@ -233,7 +246,7 @@ def _in_closed_cells(robot, q, found):
 
 
 @compiled
-def hits(tables, work, every):
+def hits(tables: Tables, work: Work, every: bool) -> int:
     """Return the mask of those of 16 configurations that are in collision.
 
     tables: (robot, world). work: ``work_arrays``, the configurations in the first of them, 16 values of each variable.
@@ -289,7 +302,7 @@ def hits(tables, work, every):
 
 
 @compiled
-def work_arrays(robot):
+def work_arrays(robot: Table) -> Work:
     """Return the arrays that ``hits`` works in: values, frames, centres of clusters, the branch to begin with."""
     variables = 1
     for j in range(len(robot[0]) // JOINT):
@@ -299,7 +312,7 @@ def work_arrays(robot):
 
 
 @compiled
-def free_states(tables, states, free):
+def free_states(tables: Tables, states: np.ndarray, free: np.ndarray) -> None:
     """Write for each row of ``states`` (m, k) float32 whether it is free of collisions."""
     work = work_arrays(tables[0])
     q = work[0]
@@ -315,7 +328,7 @@ def free_states(tables, states, free):
 
 
 @compiled
-def free_edge(tables, work, a, b, step):
+def free_edge(tables: Tables, work: Work, a: np.ndarray, b: np.ndarray, step: float) -> bool:
     """Whether the straight line from ``a`` to ``b`` (k,) float32 is free, checked in steps of at most ``step``. ``a``
     itself is left out. There are at least sixteen steps, so that no lane is idle. They are checked from coarse to fine,
     the end first.
@@ -348,7 +361,7 @@ def free_edge(tables, work, a, b, step):
 
 
 @compiled
-def free_edges(tables, points, step, free):
+def free_edges(tables: Tables, points: np.ndarray, step: float, free: np.ndarray) -> None:
     """Write into ``free`` (m - 1,) whether each line between ``points`` (m, k) float32 is, see ``free_edge``."""
     work = work_arrays(tables[0])
     for i in range(len(free)):

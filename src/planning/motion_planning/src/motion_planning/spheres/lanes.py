@@ -13,17 +13,39 @@ inside compiled functions:
     least(v, w), greatest(v, w), magnitude(v), root(v), whole(v)    # whole: the nearest whole number
     below(v, w)             # int32, bit i is set where v[i] < w[i]
 """
+from __future__ import annotations
+
 import operator
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.datamodel import register_default
 from numba.core.datamodel.models import PrimitiveModel
+from numba.core.datamodel.registry import register_default
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin
+from numba.extending import intrinsic as _intrinsic
+from numba.extending import lower_builtin
+
+if TYPE_CHECKING:
+    from numba.core.typing.templates import Signature
+
+    Intrinsic = tuple[Signature, Callable[..., ir.Value]]
+
+    class Vector(Protocol):
+        """Sixteen floats in a compiled function."""
+
+        def __add__(self, other: Vector) -> Vector: ...
+        def __sub__(self, other: Vector) -> Vector: ...
+        def __mul__(self, other: Vector) -> Vector: ...
+        def __truediv__(self, other: Vector) -> Vector: ...
+        def __neg__(self) -> Vector: ...
 
 WIDTH = 16
+# numba's own types say that the function itself is called, and nothing.
+intrinsic = cast("Callable[[Callable[..., Intrinsic]], Callable[..., Any]]", _intrinsic)
+_infer = cast("Callable[..., Any]", infer_global)
 
 _VECTOR = ir.VectorType(ir.FloatType(), WIDTH)
 _MASK = ir.VectorType(ir.IntType(1), WIDTH)
@@ -34,7 +56,7 @@ _FLAGS = ("contract",)
 class Lanes(types.Type):
     """The type of a vector of 16 floats in compiled code."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__(name="lanes16")
 
 
@@ -43,20 +65,20 @@ lanes = Lanes()
 
 @register_default(Lanes)
 class _Model(PrimitiveModel):
-    def __init__(self, dmm, fe_type):
+    def __init__(self, dmm: Any, fe_type: types.Type) -> None:
         super().__init__(dmm, fe_type, _VECTOR)
 
 
-def _arithmetic(function, build):
+def _arithmetic(function: Callable[..., object], build: Callable[..., ir.Value]) -> None:
     """Give lanes an operator of two arguments."""
 
     class Template(ConcreteTemplate):
         cases = [signature(lanes, lanes, lanes)]
 
-    infer_global(function)(Template)
+    _infer(function)(Template)
 
     @lower_builtin(function, lanes, lanes)
-    def lower(context, builder, sig, args):
+    def lower(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         return build(builder, *args)
 
 
@@ -66,35 +88,35 @@ _arithmetic(operator.mul, lambda builder, a, b: builder.fmul(a, b, flags=_FLAGS)
 _arithmetic(operator.truediv, lambda builder, a, b: builder.fdiv(a, b, flags=_FLAGS))
 
 
-@infer_global(operator.neg)
+@_infer(operator.neg)
 class _Negation(ConcreteTemplate):
     cases = [signature(lanes, lanes)]
 
 
 @lower_builtin(operator.neg, lanes)
-def _negate(context, builder, sig, args):
+def _negate(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
     return builder.fneg(args[0])
 
 
-def _pointer(context, builder, array_type, array, index):
+def _pointer(context: Any, builder: Any, array_type: types.Type, array: ir.Value, index: ir.Value) -> ir.Value:
     view = context.make_array(array_type)(context, builder, array)
     place = builder.gep(view.data, [index])
     return builder.bitcast(place, _VECTOR.as_pointer())
 
 
 @intrinsic
-def load(typingctx, array, index):
+def load(typingctx: Any, array: types.Type, index: types.Type) -> Intrinsic:
     """array[index : index + 16]."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         return builder.load(_pointer(context, builder, sig.args[0], *args), align=4)
 
     return lanes(array, types.intp), build
 
 
 @intrinsic
-def store(typingctx, array, index, value):
+def store(typingctx: Any, array: types.Type, index: types.Type, value: types.Type) -> Intrinsic:
     """array[index : index + 16] = value."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         builder.store(args[2], _pointer(context, builder, sig.args[0], *args[:2]), align=4)
         return context.get_dummy_value()
 
@@ -102,9 +124,9 @@ def store(typingctx, array, index, value):
 
 
 @intrinsic
-def fill(typingctx, value):
+def fill(typingctx: Any, value: types.Type) -> Intrinsic:
     """The same float32 in all lanes."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), args[0], cgutils.int32_t(0))
         order = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
         return builder.shuffle_vector(one, ir.Constant(_VECTOR, ir.Undefined), order)
@@ -113,17 +135,17 @@ def fill(typingctx, value):
 
 
 @intrinsic
-def ramp(typingctx):
+def ramp(typingctx: Any) -> Intrinsic:
     """0, 1, ... 15."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         return ir.Constant(_VECTOR, [float(i) for i in range(WIDTH)])
 
     return lanes(), build
 
 
-def _library(name, count):
+def _library(name: str, count: int) -> Intrinsic:
     """An intrinsic function of LLVM's on lanes."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         function = cgutils.get_or_insert_function(
             builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * count), "%s.v%df32" % (name, WIDTH))
         return builder.call(function, args)
@@ -132,46 +154,46 @@ def _library(name, count):
 
 
 @intrinsic
-def root(typingctx, v):
+def root(typingctx: Any, v: types.Type) -> Intrinsic:
     """Square roots."""
     return _library("llvm.sqrt", 1)
 
 
 @intrinsic
-def magnitude(typingctx, v):
+def magnitude(typingctx: Any, v: types.Type) -> Intrinsic:
     """Absolute values."""
     return _library("llvm.fabs", 1)
 
 
 @intrinsic
-def whole(typingctx, v):
+def whole(typingctx: Any, v: types.Type) -> Intrinsic:
     """The nearest whole numbers."""
     return _library("llvm.rint", 1)
 
 
-def _choice(sign):
-    def build(context, builder, sig, args):
+def _choice(sign: str) -> Intrinsic:
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         return builder.select(builder.fcmp_ordered(sign, *args), *args)
 
     return lanes(lanes, lanes), build
 
 
 @intrinsic
-def least(typingctx, v, w):
+def least(typingctx: Any, v: types.Type, w: types.Type) -> Intrinsic:
     """The lesser of each two."""
     return _choice("<")
 
 
 @intrinsic
-def greatest(typingctx, v, w):
+def greatest(typingctx: Any, v: types.Type, w: types.Type) -> Intrinsic:
     """The greater of each two."""
     return _choice(">")
 
 
 @intrinsic
-def below(typingctx, v, w):
+def below(typingctx: Any, v: types.Type, w: types.Type) -> Intrinsic:
     """Bit i of the answer is set where v[i] < w[i]."""
-    def build(context, builder, sig, args):
+    def build(context: Any, builder: Any, sig: Signature, args: Sequence[ir.Value]) -> ir.Value:
         found = builder.fcmp_ordered("<", *args)
         return builder.zext(builder.bitcast(found, ir.IntType(WIDTH)), ir.IntType(32))
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The spheres of all links of a robot, made once from its collision geometry and cached on disk."""
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -27,6 +29,12 @@ from motion_planning.spheres.cover import (
     voxels,
 )
 from urdf_model import Box, Cylinder, Mesh
+
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel
+    from motion_planning.shapes import Geometry, Meshes, Placed
+
+T = TypeVar("T")
 
 #: How far a sphere may reach beyond the geometry [m]; for thin geometry, this share of its thinnest half side, ...
 TOLERANCE_M = 0.01
@@ -65,7 +73,7 @@ class SphereModel:
     cached on disk beside compiled code, by geometry and tolerance [m].
     """
 
-    def __init__(self, model, parts, tolerance):
+    def __init__(self, model: PlanningModel, parts: dict[str, list[Placed]], tolerance: float) -> None:
         self.model, self.tolerance = model, tolerance
         self._parts, self._spheres, self._fixed = parts, {}, {}
         #: What was made for a key: ``kept(key, make)`` returns ``make()``, made again only when many others have been
@@ -73,7 +81,7 @@ class SphereModel:
         self.kept, self.maps, self.scenes = Kept(_MAX_KEPT), Kept(_MAX_MAPS), Kept(_MAX_SCENES)
 
     @classmethod
-    def of(cls, model, meshes, tolerance=TOLERANCE_M):
+    def of(cls, model: PlanningModel, meshes: Meshes, tolerance: float = TOLERANCE_M) -> SphereModel:
         """Return the SphereModel of a PlanningModel.
 
         ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. Meshes for which it
@@ -88,7 +96,7 @@ class SphereModel:
                     continue
         return cls(model, parts, tolerance)
 
-    def spheres(self, link):
+    def spheres(self, link: str) -> np.ndarray:
         """Return (n, 4), centre in the link's frame and radius [m], for a moving link; n may be 0.
 
         Raises CoverError.
@@ -98,17 +106,17 @@ class SphereModel:
             self._spheres[link] = cached(cover, parts, fitting(parts, self.tolerance)) if parts else np.empty((0, 4))
         return self._spheres[link]
 
-    def fixed(self, link):
+    def fixed(self, link: str) -> list[tuple[Geometry | Boxes, np.ndarray]]:
         """Return [(geometry, pose (4, 4) in the link's frame)], for a link that does not move: meshes as Boxes."""
         if link not in self._fixed:
             self._fixed[link] = [(boxes_of(geometry), pose) for geometry, pose in self._parts[link]]
         return self._fixed[link]
 
-    def parts(self, link):
+    def parts(self, link: str) -> list[Placed]:
         """Return [(geometry, pose (4, 4) in the link's frame)]: its collision geometry, meshes as TriangleMesh."""
         return self._parts[link]
 
-    def not_kept(self):
+    def not_kept(self) -> list[str]:
         """Return names of the links whose spheres are not on disk."""
         return [name for name, parts in self._parts.items()
                 if parts and not _file(cover, parts, fitting(parts, self.tolerance)).exists()]
@@ -117,10 +125,10 @@ class SphereModel:
 class Kept:
     """The last ``most`` things that were made. Any thread may call."""
 
-    def __init__(self, most):
+    def __init__(self, most: int) -> None:
         self._most, self._things, self._lock = most, OrderedDict(), threading.Lock()
 
-    def __call__(self, key, make):
+    def __call__(self, key: Hashable, make: Callable[[], T]) -> T:
         with self._lock:
             if key in self._things:
                 self._things.move_to_end(key)
@@ -132,13 +140,13 @@ class Kept:
                 self._things.popitem(last=False)
         return made
 
-    def forget(self, key):
+    def forget(self, key: Hashable) -> None:
         """Make it again when it is asked for next."""
         with self._lock:
             self._things.pop(key, None)
 
 
-def fitting(parts, tolerance):
+def fitting(parts: Sequence[Placed], tolerance: float) -> float:
     """Return the tolerance [m] for parts of these sizes: thin parts get a closer fit."""
     half = [0.5 * min(geometry.size) for geometry, _ in parts if isinstance(geometry, Box)]
     half += [min(geometry.radius, 0.5 * geometry.length) for geometry, _ in parts if isinstance(geometry, Cylinder)]
@@ -149,26 +157,26 @@ class Boxes:
     """Boxes that replace a mesh. corners (n, 2, 3): least and greatest, in the frame of the shape. coarse: size of the
     mesh's cells [m] if it is larger than usual, else None."""
 
-    def __init__(self, corners, coarse=None):
+    def __init__(self, corners: np.ndarray, coarse: float | None = None) -> None:
         self.corners, self.coarse = corners, coarse
 
 
-def boxes_of(geometry):
+def boxes_of(geometry: Geometry) -> Geometry | Boxes:
     """Return ``geometry`` unchanged, or Boxes that contain it if it is a mesh; made once per mesh."""
-    if not _is_mesh(geometry):
+    if not isinstance(geometry, TriangleMesh):
         return geometry
     made = cached(mesh_boxes, [(geometry, np.eye(4))], MESH_CELL_M)
     cell, wanted = made[0, 0, :2]
     return Boxes(made[1:], float(cell) if cell > _REMARKABLE * wanted else None)
 
 
-def box_around(geometry):
+def box_around(geometry: Geometry) -> Boxes:
     """Return the Boxes of a shape's bounding box."""
     bounds = bounds_of(geometry)
     return Boxes(np.array([[bounds.centre - bounds.half, bounds.centre + bounds.half]]))
 
 
-def mesh_boxes(parts, cell):
+def mesh_boxes(parts: Sequence[tuple[TriangleMesh, np.ndarray]], cell: float) -> np.ndarray:
     """Return boxes (1 + n, 2, 3) that contain a mesh and its inside, and exceed it by at most two cells. The first row
     begins with the size of these [m], larger than ``cell`` for a large mesh, and the size wanted for one of so many
     metres."""
@@ -186,7 +194,7 @@ def mesh_boxes(parts, cell):
             cell *= _COARSER
 
 
-def object_spheres(parts, tolerance, late):
+def object_spheres(parts: Sequence[Placed], tolerance: float, late: bool) -> tuple[np.ndarray, float | None]:
     """Return (spheres (n, 4) that contain ``parts`` as in ``cover``, how far they reach beyond them [m] if that is
     more than usual, else None). late: make few large ones."""
     wanted = fitting(parts, tolerance)
@@ -200,7 +208,7 @@ def object_spheres(parts, tolerance, late):
     return spheres, float(spheres[:, 3].max())
 
 
-def _balls_around(geometry, pose):
+def _balls_around(geometry: Geometry, pose: np.ndarray) -> np.ndarray:
     """Balls (n, 4) that together contain a shape's bounding box."""
     bounds = bounds_of(geometry)
     count = np.maximum(1, np.ceil(_PARTS * bounds.half / max(float(bounds.half.max()), 1e-9))).astype(int)
@@ -210,7 +218,7 @@ def _balls_around(geometry, pose):
     return np.column_stack([centres @ pose[:3, :3].T + pose[:3, 3], np.full(len(centres), radius)])
 
 
-def cached(function, parts, size):
+def cached(function: Callable[[Any, Any], np.ndarray], parts: Sequence[Placed], size: Any) -> np.ndarray:
     """Return ``function(parts, size)``, an array, from disk if it has been made before."""
     path = _file(function, parts, size)
     try:
@@ -224,23 +232,19 @@ def cached(function, parts, size):
     return made
 
 
-def _file(function, parts, size):
+def _file(function: Callable[[Any, Any], np.ndarray], parts: Sequence[Placed], size: Any) -> Path:
     """The path of the cache file for ``function`` and ``parts``."""
     digest = hashlib.sha256(repr((function.__name__, size)).encode())
     for geometry, pose in parts:
         digest.update(np.ascontiguousarray(pose).tobytes())
-        if _is_mesh(geometry):
+        if isinstance(geometry, TriangleMesh):
             digest.update(geometry.vertices.tobytes() + geometry.triangles.tobytes())
         else:
             digest.update(repr(geometry).encode())
     return Path(folder("motion_planning_spheres", _SOURCES)) / (digest.hexdigest()[:32] + ".npy")
 
 
-def _is_mesh(geometry):
-    return isinstance(geometry, TriangleMesh)
-
-
-def _scaled(geometry, meshes):
+def _scaled(geometry: Geometry | Mesh, meshes: Meshes) -> Geometry:
     if not isinstance(geometry, Mesh):
         return geometry
     mesh = meshes(geometry.filename)

@@ -4,11 +4,14 @@
 Bodies that move with the group become spheres on joints; all others, including other links of the robot, become the
 world. The robot's part does not depend on the scene and is cached in the SphereModel.
 """
+from __future__ import annotations
+
 import hashlib
 import itertools
 import math
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +23,17 @@ from motion_planning.spheres.sphere_model import Kept, Patience, object_spheres
 from motion_planning.spheres.world_tables import Tree, forest, pyramid, solids_of, tree_of
 from urdf_model import Box, Cylinder, Plane
 
+if TYPE_CHECKING:
+    from motion_planning.model import Group, PlanningModel, State
+    from motion_planning.scene import AllowedCollisions, Scene, WorldObject
+    from motion_planning.shapes import Geometry, Placed
+    from motion_planning.spheres import SphereModel
+    from motion_planning.spheres.kernel import Table, Tables
+    from motion_planning.spheres.sphere_model import Boxes
+    from motion_planning.spheres.world_tables import Forest
+
+    _Joint = tuple[int, int, int, list[float]]
+
 # Clusters on the same joint become one if the ball around both is at most this much larger than the larger one's.
 _MERGED = 1.25
 # Number of spheres that are checked one by one.
@@ -29,13 +43,14 @@ _MAX_HALVINGS = 12
 _ENDLESS = Patience()
 # Number of robots with a group that are split at a time.
 _splits = Kept(16)
+T = TypeVar("T")
 
 
 class _Mover(NamedTuple):
     """A link or an attached object: spheres (n, 4) in the frame of the joint that it moves with."""
 
     name: str
-    touch: frozenset
+    touch: frozenset[str]
     joint: int
     spheres: np.ndarray
 
@@ -44,7 +59,7 @@ class _Cluster(NamedTuple):
     """Movers on one joint that may touch the same bodies."""
 
     joint: int
-    movers: tuple
+    movers: tuple[_Mover, ...]
     spheres: np.ndarray
     ball: np.ndarray
 
@@ -53,23 +68,25 @@ class _Still(NamedTuple):
     """A link or an attached object that the group does not move; may: for each cluster, whether they may touch."""
 
     tree: Tree
-    may: tuple
+    may: tuple[bool, ...]
 
 
 class _Robot(NamedTuple):
     """The robot's part of the tables for a group, independent of objects."""
 
-    clusters: tuple
-    branch: tuple  # of each cluster
-    depth: tuple
-    arrays: tuple  # of the kernel's robot table, without tests and the rest
+    clusters: tuple[_Cluster, ...]
+    branch: tuple[int, ...]  # of each cluster
+    depth: tuple[int, ...]
+    # Of the kernel's robot table, without tests and the rest.
+    arrays: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[int, ...]]
     pairs: np.ndarray
-    still: tuple
-    maps: tuple  # (maps, cells) of the kernel's robot table
-    world: tuple  # the table of ``still``, and their places in it
+    still: tuple[_Still, ...]
+    maps: tuple[np.ndarray, np.ndarray]  # (maps, cells) of the kernel's robot table
+    world: Forest  # the table of ``still``, and their places in it
 
 
-def bake(sphere_model, group, scene, state, patience=_ENDLESS):
+def bake(sphere_model: SphereModel, group: Group, scene: Scene, state: State,
+         patience: Patience = _ENDLESS) -> tuple[Tables, tuple[str, ...]]:
     """Return ((robot, world), see ``kernel``, sentences on what is coarser than usual): what of ``scene`` the joints of
     ``group`` can run into, elsewhere as in ``state``. Scenes that differ in the values of these joints alone have the
     same tables, made once, unless patience ended: the next request makes them better.
@@ -86,7 +103,7 @@ def bake(sphere_model, group, scene, state, patience=_ENDLESS):
     return made
 
 
-def make_links(sphere_model, group, allowed):
+def make_links(sphere_model: SphereModel, group: Group, allowed: AllowedCollisions) -> None:
     """Make what of a robot does not depend on the scene, which may take long the first time."""
     moving = frozenset(group.moving_links)
     for link in sphere_model.model.links:
@@ -94,7 +111,8 @@ def make_links(sphere_model, group, allowed):
     _maps(sphere_model, group, allowed, [link for link in sphere_model.model.links if link in moving])
 
 
-def _baked(sphere_model, group, scene, state, how):
+def _baked(sphere_model: SphereModel, group: Group, scene: Scene, state: State,
+           how: tuple[tuple[Hashable, ...], Patience]) -> tuple[Tables, tuple[str, ...]]:
     key, patience = how
     things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else [])]
     movers = _mover_names(sphere_model.model, group, state)
@@ -122,7 +140,7 @@ def _baked(sphere_model, group, scene, state, how):
         parts += [(shape, thing.pose @ pose) for shape, pose in thing.shapes]
         owners += [thing.id] * len(thing.shapes)
 
-    def remark(owners, number, how):
+    def remark(owners: Sequence[str], number: int, how: str) -> None:
         coarse["object '%s' is planned around as %s" % (owners[number], how)] = True
 
     stills = [_Still(tree_of(solids_of(parts, 0.0, patience, partial(remark, owners))), may)
@@ -133,12 +151,12 @@ def _baked(sphere_model, group, scene, state, how):
             world), tuple(remarks)
 
 
-def _named(allowed):
+def _named(allowed: AllowedCollisions) -> frozenset[str]:
     """The names that an AllowedCollisions says something about."""
     return frozenset(allowed.defaults).union(*allowed.entries)
 
 
-def _with_tests(robot, stills, places):
+def _with_tests(robot: _Robot, stills: Sequence[_Still], places: Sequence[tuple[int, int]]) -> Table:
     """The complete robot table: the tests of each cluster, objects before the robot itself."""
     branch, depth = np.array(robot.branch, dtype=np.int64), np.array(robot.depth, dtype=np.int64)
     found = []
@@ -158,7 +176,7 @@ def _with_tests(robot, stills, places):
         np.int32).ravel(), np.column_stack(ends).astype(np.int32).ravel(), skips, *robot.maps)
 
 
-def split(tables):
+def split(tables: Tables) -> list[tuple[np.ndarray, Tables]]:
     """Return [(indices of variables, tables of these alone)] of the branches of a robot, see ``kernel``.
 
     Empty unless there are at least two, each with its own variables, that together have all of them.
@@ -170,7 +188,7 @@ def split(tables):
                                                            robot[7].reshape(-1, kernel.BRANCH), strict=False)]
 
 
-def between(tables):
+def between(tables: Tables) -> Tables:
     """Return tables of the same robot that know collisions of its branches with each other only."""
     robot, world = tables
     rows = robot[7].reshape(-1, kernel.BRANCH).copy()
@@ -183,18 +201,18 @@ class _Split(NamedTuple):
     """What ``split`` and ``between`` need of a robot alone. parts: [(indices, joints, pairs, maps)]; between: the pairs
     of clusters of different branches; table: the robot's, whose identity is the key."""
 
-    parts: list
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
     between: np.ndarray
-    table: tuple
+    table: Table
 
 
-def _of_robot(robot):
+def _of_robot(robot: Table) -> _Split:
     """The _Split of a robot table."""
     key = tuple(map(id, (robot[0], robot[5], robot[9])))
     return _splits(key, lambda: _Split(_parts(robot), _between(robot), robot))
 
 
-def _parts(robot):
+def _parts(robot: Table) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     joints, pairs, rows = robot[0].reshape(-1, kernel.JOINT), robot[5].reshape(-1, 2), robot[7].reshape(
         -1, kernel.BRANCH)
     if len(rows) < 2:
@@ -216,14 +234,14 @@ def _parts(robot):
     return found
 
 
-def _between(robot):
+def _between(robot: Table) -> np.ndarray:
     branch = np.searchsorted(robot[7].reshape(-1, kernel.BRANCH)[:, 3], robot[5], side="right").reshape(-1, 2)
     return robot[5].reshape(-1, 2)[branch[:, 0] != branch[:, 1]].ravel()
 
 
 # -- the robot ----------------------------------------------------------------------------------------------------
 
-def _mover_names(model, group, state):
+def _mover_names(model: PlanningModel, group: Group, state: State) -> list[tuple[str, frozenset[str]]]:
     """[(name, names of bodies that it may always touch)] of the links that the group moves and their attached
     objects."""
     moving = frozenset(group.moving_links)
@@ -231,7 +249,8 @@ def _mover_names(model, group, state):
             + [(name, body.touch_links) for name, body in state.attached.items() if body.link in moving])
 
 
-def _robot(sphere_model, group, scene, state, about):
+def _robot(sphere_model: SphereModel, group: Group, scene: Scene, state: State,
+           about: tuple[Mapping[str, frozenset[str]], Patience]) -> tuple[_Robot, tuple[str, ...]]:
     """Return (the _Robot, sentences on what is coarser than usual). about: ({object: bodies that may touch it},
     Patience)."""
     model, (special, patience), remarks = sphere_model.model, about, []
@@ -267,7 +286,7 @@ def _robot(sphere_model, group, scene, state, about):
             still.append((body.id, body.touch_links, tree_of(solids)))
         remarks += ["held object '%s' is planned around as %s" % (body.id, how) for how in sorted(coarse)]
 
-    def may(a, b):
+    def may(a: Sequence[Any], b: Sequence[Any]) -> bool:
         return a[0] in b[1] or b[0] in a[1] or scene.allowed.allowed(a[0], b[0])
 
     mapped, maps = _maps(sphere_model, group, scene.allowed, moving)
@@ -300,7 +319,8 @@ def _robot(sphere_model, group, scene, state, about):
                   forest([tree for _, _, tree in still])), tuple(remarks)
 
 
-def _maps(sphere_model, group, allowed, links):
+def _maps(sphere_model: SphereModel, group: Group, allowed: AllowedCollisions,
+          links: Iterable[str]) -> tuple[set[frozenset[str]], tuple[np.ndarray, np.ndarray]]:
     """Return (pairs of ``links`` as frozensets, (maps, cells)): those that maps check in place of spheres, see
     ``kernel``."""
     own = {int(index): number for number, index in enumerate(group.indices)}
@@ -316,7 +336,7 @@ def _maps(sphere_model, group, allowed, links):
     return mapped, (np.array(rows, np.int32).ravel(), np.concatenate(cells))
 
 
-def _joints(model, group, state):
+def _joints(model: PlanningModel, group: Group, state: State) -> tuple[list[_Joint], list[tuple[int, np.ndarray]]]:
     """Return the joints that the group moves [(parent, prismatic, variable, numbers)], and for each link of the model
     (the joint that it moves with or -1, its pose in that joint's frame)."""
     parents, origins, axes, kinds, variables, factors = model.kinematics
@@ -341,7 +361,7 @@ def _joints(model, group, state):
     return joints, carriers
 
 
-def _branches(joints):
+def _branches(joints: Sequence[_Joint]) -> tuple[list[int], list[int]]:
     """Return for each joint its depth, and its root joint."""
     depth, branch = [], []
     for parent, *_ in joints:
@@ -350,14 +370,14 @@ def _branches(joints):
     return depth, branch
 
 
-def _rotation_taking_z_to(axis):
+def _rotation_taking_z_to(axis: np.ndarray) -> np.ndarray:
     z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _motion(kind, axis, value):
+def _motion(kind: int, axis: np.ndarray, value: float) -> np.ndarray:
     pose = np.eye(4)
     if kind == 2:
         pose[:3, 3] = value * np.asarray(axis)
@@ -367,11 +387,11 @@ def _motion(kind, axis, value):
     return pose
 
 
-def _moved(spheres, pose, larger):
+def _moved(spheres: np.ndarray, pose: np.ndarray, larger: float) -> np.ndarray:
     return np.column_stack([spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3], spheres[:, 3] + larger])
 
 
-def _padding(scene, link, spheres, parts):
+def _padding(scene: Scene, link: str, spheres: np.ndarray, parts: Sequence[Placed]) -> float:
     """How much larger [m] the spheres of a link become: its padding, which reaches farther at the corners of boxes and
     the edges of cylinders, and the effect of its scale at the farthest point; a smaller scale has none."""
     larger, scale = scene.link_padding.get(link, 0.0), scene.link_scale.get(link, 1.0)
@@ -382,20 +402,21 @@ def _padding(scene, link, spheres, parts):
     return corner * larger
 
 
-def _made_once(sphere_model, function, spheres):
+def _made_once(sphere_model: SphereModel, function: Callable[[np.ndarray], T], spheres: np.ndarray) -> T:
     """``function(spheres)``: many tables of a robot have the same links in them."""
     key = function.__name__, hashlib.sha256(spheres.tobytes()).digest()
     return sphere_model.kept(key, lambda: function(spheres))
 
 
-def _balls_and_jumps(spheres):
+def _balls_and_jumps(spheres: np.ndarray) -> tuple[list[list[float]], list[int]]:
     """(balls [(4,)], jumps): ``_sphere_tree`` of ``spheres`` (n, 4) that begins at 0."""
     balls, jumps = [], []
     _sphere_tree(spheres, balls, jumps)
     return balls, jumps
 
 
-def _clusters(sphere_model, movers, rows, patience):
+def _clusters(sphere_model: SphereModel, movers: Sequence[_Mover], rows: Sequence[tuple[bool, ...]],
+              patience: Patience) -> list[_Cluster]:
     """Return the _Clusters of ``movers``, whose ``rows`` say what each may touch."""
     found = []
     for number, mover in enumerate(movers):
@@ -419,7 +440,7 @@ def _clusters(sphere_model, movers, rows, patience):
     return found
 
 
-def _sphere_tree(some, spheres, skips):
+def _sphere_tree(some: np.ndarray, spheres: list[list[float]], skips: list[int]) -> None:
     """Append ``some`` (n, 4) to ``spheres`` and ``skips`` as a tree of balls, see ``kernel``; larger ones first."""
     if len(some) <= _FEW_SPHERES:
         spheres += some[np.argsort(-some[:, 3], kind="stable")].tolist()
@@ -435,7 +456,7 @@ def _sphere_tree(some, spheres, skips):
         skips[number] = len(spheres)
 
 
-def _spheres_of(item, tolerance, patience, coarse):
+def _spheres_of(item: WorldObject, tolerance: float, patience: Patience, coarse: set[str]) -> np.ndarray:
     """The spheres (n, 4) of an attached object, in its own frame. ``coarse`` (set) gets a sentence for each shape whose
     spheres are coarser than usual."""
     found = []
@@ -459,7 +480,7 @@ def _spheres_of(item, tolerance, patience, coarse):
     return spheres
 
 
-def _halved(spheres, times):
+def _halved(spheres: np.ndarray, times: int) -> list[np.ndarray]:
     """2**times groups of neighbours among ``spheres`` (n, 4)."""
     if not times:
         return [spheres]
@@ -468,5 +489,6 @@ def _halved(spheres, times):
     return [group for half in (order[:middle], order[middle:]) for group in _halved(half, times - 1)]
 
 
-def _placed(parts, pose):
+def _placed(parts: Iterable[tuple[Geometry | Boxes, np.ndarray]],
+            pose: np.ndarray) -> list[tuple[Geometry | Boxes, np.ndarray]]:
     return [(geometry, pose @ inner) for geometry, inner in parts]

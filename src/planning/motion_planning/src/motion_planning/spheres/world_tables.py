@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fixed bodies as flat arrays for ``kernel``: objects, and trees of boxes around them."""
+from __future__ import annotations
+
 import math
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +14,12 @@ from motion_planning.spheres import kernel
 from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.sphere_model import Boxes, Patience, box_around, boxes_of
 from urdf_model import Box, Cylinder, Plane, Sphere
+
+if TYPE_CHECKING:
+    from motion_planning.shapes import Geometry
+    from motion_planning.spheres.kernel import World
+
+    Forest = tuple[World, list[tuple[int, int]]]
 
 # Corners of infinite shapes are this far away [m].
 _FAR = 1e6
@@ -41,7 +50,8 @@ class Tree(NamedTuple):
     objects: np.ndarray
 
 
-def solids_of(parts, pad=0.0, patience=_ENDLESS, remark=lambda number, how: None):
+def solids_of(parts: Sequence[tuple[Geometry | Boxes, np.ndarray]], pad: float = 0.0, patience: Patience = _ENDLESS,
+              remark: Callable[[int, str], object] = lambda number, how: None) -> Solids:
     """Return the Solids of ``parts``, [(geometry, pose (4, 4) in the planning frame)], ``pad`` [m] larger all round.
 
     remark(number, how): told how a part is replaced by something coarser than usual.
@@ -65,7 +75,7 @@ def solids_of(parts, pad=0.0, patience=_ENDLESS, remark=lambda number, how: None
     return joined(found)
 
 
-def _boxes(centres, rotations, half):
+def _boxes(centres: np.ndarray, rotations: np.ndarray, half: np.ndarray) -> Solids:
     """The Solids of boxes: centres, half sides (n, 3), rotations (n, 3, 3) from the planning frame."""
     reach = np.einsum("ni,nij->nj", half, np.abs(rotations))
     straight = (np.abs(np.abs(rotations) - 1.0) < 1e-9).sum(axis=(1, 2)) == 3
@@ -76,7 +86,7 @@ def _boxes(centres, rotations, half):
                   centres + reach)
 
 
-def _cylinders(centres, rotations, radii, halves):
+def _cylinders(centres: np.ndarray, rotations: np.ndarray, radii: np.ndarray, halves: np.ndarray) -> Solids:
     """The Solids of cylinders: centres (n, 3), rotations (n, 3, 3) from the planning frame, radii and half lengths."""
     axes = rotations[:, 2]
     reach = halves[:, None] * np.abs(axes) + radii[:, None] * np.sqrt(np.maximum(0.0, 1.0 - axes**2))
@@ -88,7 +98,7 @@ def _cylinders(centres, rotations, radii, halves):
                   centres - reach, centres + reach)
 
 
-def _of_boxes(geometry, patience, remark):
+def _of_boxes(geometry: Geometry | Boxes, patience: Patience, remark: Callable[[str], object]) -> Geometry | Boxes:
     """Meshes and cones as Boxes, other geometry unchanged."""
     mesh = pyramid(geometry) if isinstance(geometry, Cone) else geometry
     if not isinstance(mesh, TriangleMesh):
@@ -97,20 +107,20 @@ def _of_boxes(geometry, patience, remark):
         remark("its bounding box, because there was no time for more")
         return box_around(mesh)
     boxes = boxes_of(mesh)
-    if boxes.coarse is not None:
+    if isinstance(boxes, Boxes) and boxes.coarse is not None:
         remark("boxes of %.3g m, because its %d triangles are too many or too large for finer ones"
                % (boxes.coarse, len(mesh.triangles)))
     return boxes
 
 
-def joined(found):
+def joined(found: Sequence[Solids]) -> Solids:
     """Return one Solids of many."""
     if not found:
         return Solids(np.empty(0, np.int32), np.empty((0, kernel.OBJECT), np.float32), *np.empty((2, 0, 3)))
     return Solids(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))
 
 
-def _solids(geometry, pose, pad):
+def _solids(geometry: Geometry | Boxes, pose: np.ndarray, pad: float) -> Solids:
     rotation, centre = pose[:3, :3].T, pose[:3, 3]
     if isinstance(geometry, Plane):
         return _one(kernel.PLANE, centre, rotation, (0.0, 0.0, pad), np.full(3, _FAR))
@@ -122,12 +132,12 @@ def _solids(geometry, pose, pad):
     return _boxes(middle @ rotation + centre, np.broadcast_to(rotation, (len(corners), 3, 3)), half)
 
 
-def _one(kind, centre, rotation, sizes, reach):
+def _one(kind: int, centre: np.ndarray, rotation: np.ndarray, sizes: Sequence[float], reach: np.ndarray) -> Solids:
     return Solids(np.array([kind], np.int32), np.array([[*centre, *rotation.ravel(), *sizes, 0.0]], np.float32),
                   (centre - reach)[None], (centre + reach)[None])
 
 
-def _corners(geometry):
+def _corners(geometry: Geometry | Boxes) -> np.ndarray:
     """(n, 2, 3) of shapes made of boxes."""
     if isinstance(geometry, Boxes):
         return geometry.corners
@@ -137,7 +147,7 @@ def _corners(geometry):
     raise TypeError("%r is not a shape that can collide" % (geometry,))
 
 
-def pyramid(cone):
+def pyramid(cone: Cone) -> TriangleMesh:
     """Return the TriangleMesh of a pyramid around a Cone."""
     k = np.arange(_CONE_SIDES)
     angle, around = 2.0 * np.pi * k / _CONE_SIDES, cone.radius / math.cos(math.pi / _CONE_SIDES)
@@ -149,7 +159,7 @@ def pyramid(cone):
                         np.concatenate([np.column_stack([k, after, tip]), np.column_stack([after, k, base])]))
 
 
-def tree_of(solids):
+def tree_of(solids: Solids) -> Tree:
     """Return the Tree over Solids: halves of the order in which a space-filling curve meets them, one object a leaf."""
     count = len(solids.kinds)
     order = _along_curve(0.5 * (solids.low + solids.high))
@@ -161,7 +171,7 @@ def tree_of(solids):
 
 
 @compiled
-def _fill_tree(boxes, links, nodes):
+def _fill_tree(boxes: np.ndarray, links: np.ndarray, nodes: np.ndarray) -> None:
     """Write the tree over ``boxes`` (n, 6) float32: what is below a node has the numbers that follow."""
     waiting = np.empty((64, 3), np.int64)  # (first, last + 1 object, number of the node)
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, boxes.shape[0], 0
@@ -186,7 +196,7 @@ def _fill_tree(boxes, links, nodes):
                 nodes[number, 3 + axis] = max(nodes[number + 1, 3 + axis], nodes[other, 3 + axis])
 
 
-def _along_curve(points):
+def _along_curve(points: np.ndarray) -> np.ndarray:
     """The order in which Morton's curve meets ``points`` (n, 3)."""
     low, high = points.min(axis=0, initial=_FAR), points.max(axis=0, initial=-_FAR)
     cell = ((points - low) / np.maximum(high - low, 1e-9) * 1023.0).astype(np.int64)
@@ -197,7 +207,7 @@ def _along_curve(points):
     return np.argsort(code, kind="stable")
 
 
-def forest(trees, before=None):
+def forest(trees: Sequence[Tree], before: Forest | None = None) -> Forest:
     """Return (world, [(first node, last + 1)]): many Trees as one table, see ``kernel``.
 
     before: what this function returned for Trees that come before them.
@@ -211,10 +221,11 @@ def forest(trees, before=None):
         moved.append(tree._replace(links=links))
         places.append((nodes_before, nodes_before + len(links)))
         nodes_before, objects_before = nodes_before + len(links), objects_before + len(tree.kinds)
-    return tuple(map(np.concatenate, zip(world, _flat([_EMPTY, *moved]), strict=True))), places
+    links, nodes, kinds, objects = map(np.concatenate, zip(world, _flat([_EMPTY, *moved]), strict=True))
+    return (links, nodes, kinds, objects), places
 
 
-def _flat(trees):
+def _flat(trees: Sequence[Tree]) -> World:
     links, nodes, kinds, objects = (np.concatenate(arrays) for arrays in zip(*trees, strict=True))
     return links.ravel(), nodes.ravel(), kinds, objects.ravel()
 

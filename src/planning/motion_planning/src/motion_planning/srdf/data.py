@@ -69,5 +69,5 @@ class Srdf:
     no_default: list[str] = field(default_factory=list)  # links without collision checks against the robot by default
     joint_properties: dict[str, dict[str, str]] = field(default_factory=dict)
     # link to ((centre x y z in the link's frame, radius), ...) [m]
-    spheres: dict[str, tuple] = field(default_factory=dict)
+    spheres: dict[str, tuple[tuple[tuple[float, ...], float], ...]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)

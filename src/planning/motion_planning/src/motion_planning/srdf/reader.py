@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read SRDF text. An entry that cannot be used is skipped with a warning: source, line, what was found."""
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from motion_planning.errors import PlanningError
 from motion_planning.srdf.data import (
@@ -14,6 +18,11 @@ from motion_planning.srdf.data import (
 )
 from urdf_model import UrdfError, XmlRefused, parse_xml
 
+if TYPE_CHECKING:
+    from urdf_model import Robot
+
+    Element = Any  # lxml's, which only urdf_model knows
+
 
 class SrdfError(PlanningError):
     """The text is not SRDF."""
@@ -23,7 +32,7 @@ class _Skip(Exception):
     """The entry cannot be used; the text says why."""
 
 
-def parse_srdf(xml, robot, source="robot_description_semantic"):
+def parse_srdf(xml: str | bytes, robot: Robot, source: str = "robot_description_semantic") -> Srdf:
     """Return the :class:`~motion_planning.srdf.Srdf` in ``xml`` (str or bytes), for ``robot`` (urdf_model.Robot).
 
     ``source`` names the text in messages. Unknown elements are ignored. An entry with an unknown link, joint or group,
@@ -41,11 +50,11 @@ def parse_srdf(xml, robot, source="robot_description_semantic"):
 
 
 class _Reader:
-    def __init__(self, root, robot, source):
+    def __init__(self, root: Element, robot: Robot, source: str) -> None:
         self.root, self.robot, self.source = root, robot, source
         self.srdf = Srdf(root.get("name") or robot.name)
 
-    def read(self):
+    def read(self) -> Srdf:
         if self.srdf.name != self.robot.name:
             self.warn(self.root, "it describes robot '%s', but the URDF's name is '%s'; it is used nevertheless"
                       % (self.srdf.name, self.robot.name))
@@ -62,19 +71,19 @@ class _Reader:
             self.each(tag, read)
         return self.srdf
 
-    def each(self, tag, read):
+    def each(self, tag: str, read: Callable[[Element], None]) -> None:
         for element in self.root.iterchildren(tag):
             try:
                 read(element)
             except _Skip as skip:
                 self.warn(element, "%s; this <%s> is skipped" % (skip, tag))
 
-    def warn(self, element, text):
+    def warn(self, element: Element, text: str) -> None:
         self.srdf.warnings.append("%s, line %s: %s" % (self.source, element.sourceline, text))
 
     # -- elements -----------------------------------------------------------------------------------------------
 
-    def virtual_joint(self, element):
+    def virtual_joint(self, element: Element) -> None:
         kind = _attribute(element, "type")
         if kind not in VIRTUAL_JOINT_TYPES:
             raise _Skip("its type is '%s'; expected %s" % (kind, ", ".join(VIRTUAL_JOINT_TYPES)))
@@ -87,7 +96,7 @@ class _Reader:
             raise _Skip("there is a virtual joint already, '%s'" % self.srdf.virtual_joints[0].name)
         self.srdf.virtual_joints.append(joint)
 
-    def group(self, element):
+    def group(self, element: Element) -> None:
         name = _attribute(element, "name")
         if name in self.srdf.groups:
             raise _Skip("group '%s' appears twice (first in line %d)" % (name, self.srdf.groups[name].line))
@@ -104,16 +113,16 @@ class _Reader:
                 found[part.tag].append(item)
         if not any(found.values()):
             raise _Skip("group '%s' is empty" % name)
-        self.srdf.groups[name] = GroupEntry(name, *(tuple(found[tag]) for tag in ("link", "joint", "chain", "group")),
-                                            element.sourceline)
+        self.srdf.groups[name] = GroupEntry(name, tuple(found["link"]), tuple(found["joint"]), tuple(found["chain"]),
+                                            tuple(found["group"]), element.sourceline)
 
-    def member_joint(self, element):
+    def member_joint(self, element: Element) -> str:
         name = _attribute(element, "name")
         if name in {joint.name for joint in self.srdf.virtual_joints}:
             raise _Skip("'%s' is a virtual joint, which is not planned for" % name)
         return self.joint(element, "name")
 
-    def chain(self, element):
+    def chain(self, element: Element) -> tuple[str, str]:
         base, tip = self.link(element, "base_link"), self.link(element, "tip_link")
         try:
             joints = self.robot.chain(base, tip)
@@ -123,7 +132,7 @@ class _Reader:
             raise _Skip("the chain from '%s' to itself holds no joint" % base)
         return base, tip
 
-    def drop_unresolved_groups(self):
+    def drop_unresolved_groups(self) -> None:
         """Skip groups with unknown subgroups, and groups that contain themselves."""
         groups, known = self.srdf.groups, set()
         while True:
@@ -139,7 +148,7 @@ class _Reader:
                 "skipped" % (self.source, group.line, name, "s" if len(missing) > 1 else "",
                              ", ".join("'%s'" % sub for sub in missing)))
 
-    def group_state(self, element):
+    def group_state(self, element: Element) -> None:
         name, group = _attribute(element, "name"), self.group_name(element, "group")
         values = {}
         for part in element.iterchildren("joint"):
@@ -155,7 +164,7 @@ class _Reader:
             raise _Skip("state '%s' of group '%s' has no joints" % (name, group))
         self.srdf.states.append(GroupState(name, group, values))
 
-    def end_effector(self, element):
+    def end_effector(self, element: Element) -> None:
         name, group = _attribute(element, "name"), self.group_name(element, "group")
         parent_group = element.get("parent_group", "")
         if parent_group and parent_group not in self.srdf.groups:
@@ -164,30 +173,30 @@ class _Reader:
             parent_group = ""
         self.srdf.end_effectors.append(EndEffector(name, group, self.link(element, "parent_link"), parent_group))
 
-    def passive_joint(self, element):
+    def passive_joint(self, element: Element) -> None:
         name = _attribute(element, "name")
         if name not in {joint.name for joint in self.srdf.virtual_joints}:
             self.joint(element, "name")
         self.srdf.passive_joints.append(name)
 
-    def disable_collisions(self, element):
+    def disable_collisions(self, element: Element) -> None:
         pair = self.link(element, "link1"), self.link(element, "link2")
         self.srdf.disabled.append(DisabledPair(*pair, element.get("reason", "")))
 
-    def enable_collisions(self, element):
+    def enable_collisions(self, element: Element) -> None:
         self.srdf.enabled.append((self.link(element, "link1"), self.link(element, "link2")))
 
-    def disable_default_collisions(self, element):
+    def disable_default_collisions(self, element: Element) -> None:
         self.srdf.no_default.append(self.link(element, "link"))
 
-    def joint_property(self, element):
+    def joint_property(self, element: Element) -> None:
         joint = _attribute(element, "joint_name")
         if joint not in {virtual.name for virtual in self.srdf.virtual_joints}:
             self.joint(element, "joint_name")
         value = _attribute(element, "value")
         self.srdf.joint_properties.setdefault(joint, {})[_attribute(element, "property_name")] = value
 
-    def link_sphere_approximation(self, element):
+    def link_sphere_approximation(self, element: Element) -> None:
         link, spheres = self.link(element, "link"), []
         for part in element.iterchildren("sphere"):
             centre = tuple(_number(word, "center") for word in _attribute(part, "center").split())
@@ -201,33 +210,33 @@ class _Reader:
 
     # -- pieces -------------------------------------------------------------------------------------------------
 
-    def link(self, element, attribute):
+    def link(self, element: Element, attribute: str) -> str:
         name = _attribute(element, attribute)
         if name not in self.robot.links:
             raise _Skip("link '%s' is not in the URDF" % name)
         return name
 
-    def joint(self, element, attribute):
+    def joint(self, element: Element, attribute: str) -> str:
         name = _attribute(element, attribute)
         if name not in self.robot.joints:
             raise _Skip("joint '%s' is not in the URDF" % name)
         return name
 
-    def group_name(self, element, attribute):
+    def group_name(self, element: Element, attribute: str) -> str:
         name = _attribute(element, attribute)
         if name not in self.srdf.groups:
             raise _Skip("group '%s' does not exist" % name)
         return name
 
 
-def _attribute(element, name):
+def _attribute(element: Element, name: str) -> str:
     value = (element.get(name) or "").strip()
     if not value:
         raise _Skip("<%s> has no %s" % (element.tag, name))
     return value
 
 
-def _number(text, name):
+def _number(text: str, name: str) -> float:
     try:
         value = float(text)
     except ValueError:

@@ -3,7 +3,10 @@
 
 The limits hold between the points too, as controllers interpolate them (``joint_trajectory``: quintic polynomials).
 """
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,9 @@ from motion_planning.timing.profile import fastest
 from motion_planning.timing.rounded import RoundedPath
 from motion_planning.timing.timed import Timed, within_limits
 from motion_planning.timing.waypoints import through_points
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # How far [rad or m, Euclidean over the joints] the time-optimal algorithms may cut a corner, unless told.
 TOLERANCE = 0.05
@@ -34,7 +40,8 @@ class TimingError(PlanningError):
     """A path that cannot be timed, with the reason."""
 
 
-def time_path(path, velocity, acceleration, algorithm="time_optimal_trajectory_generation", *, tolerance=TOLERANCE):
+def time_path(path: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
+              algorithm: str = "time_optimal_trajectory_generation", *, tolerance: float = TOLERANCE) -> Timed:
     """Return the path as a :class:`Timed` that starts and ends at rest.
 
     path (m, k): joint values [rad or m]; velocity, acceleration (k,): limits, above 0. algorithm: one of
@@ -69,7 +76,8 @@ def time_path(path, velocity, acceleration, algorithm="time_optimal_trajectory_g
     return within_limits(timed, velocity, acceleration)
 
 
-def _checked(path, velocity, acceleration):
+def _checked(path: ArrayLike, velocity: ArrayLike,
+             acceleration: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     try:
         path, velocity, acceleration = (np.array(values, dtype=float) for values in (path, velocity, acceleration))
     except (TypeError, ValueError):
@@ -86,7 +94,7 @@ def _checked(path, velocity, acceleration):
     return path, velocity, acceleration
 
 
-def _check_duration(path, velocity, acceleration):
+def _check_duration(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> None:
     """Raise TimingError where no motion could be short enough: at full speed, and from rest to rest on one line."""
     way = np.abs(np.diff(path, axis=0)).sum(axis=0)
     far = np.abs(path - path[0]).max(axis=0)
@@ -98,7 +106,8 @@ def _check_duration(path, velocity, acceleration):
                                                       np.array2string(acceleration, precision=3), least, LONGEST_S))
 
 
-def _time_optimal(path, velocity, acceleration, tolerance, window):
+def _time_optimal(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, tolerance: float,
+                  window: float) -> Timed:
     rounded = RoundedPath(path, tolerance)
     motion = fastest(rounded, velocity, acceleration)
     intervals = max(4, math.ceil((motion.duration + window) / (0.5 * window)))

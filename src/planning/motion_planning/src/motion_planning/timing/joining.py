@@ -4,6 +4,10 @@
 The first motion comes to rest on its own path, the second one begins at rest there. Their sum with the second one begun
 earlier is a motion without a stop, with continuous velocities and accelerations.
 """
+from __future__ import annotations
+
+from collections.abc import Iterator
+
 import numpy as np
 
 from motion_planning.timing.timed import Timed
@@ -18,12 +22,13 @@ _STEP_S, LEAD_S = 0.04, 0.1
 _OVERLAPS = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25, 0.1)
 
 
-def brakings(timed, begin, acceleration):
+def brakings(timed: Timed, begin: float, acceleration: np.ndarray) -> list[Timed]:
     """Return Timeds that continue ``timed`` from its time ``begin`` [s] on, with its velocity and acceleration, and
     come to rest as soon as the limits acceleration (k,) allow: one on its path, if that takes hardly longer than the
     other one, which goes straight on where the path turns.
     """
-    straight = _straight_on(*(part[0] for part in timed.sampled([begin])), acceleration)
+    q, v, a = (part[0] for part in timed.sampled([begin]))
+    straight = _straight_on(q, v, a, acceleration)
     duration = 2.0 * _RAMP_S
     while duration < min(_LONGER * straight.duration, timed.duration - begin):
         found = _slowing(timed, begin, duration)
@@ -33,14 +38,14 @@ def brakings(timed, begin, acceleration):
     return [straight]
 
 
-def _moments(duration):
+def _moments(duration: float) -> np.ndarray:
     return np.linspace(0.0, duration, max(5, 1 + int(np.ceil(duration / (0.5 * _STEP_S)))))
 
 
-def _trapezium(times, duration):
+def _trapezium(times: np.ndarray, duration: float) -> np.ndarray:
     """Of a function that rises from 0 to 1 within the ramp's time, stays and falls to 0 at ``duration``: its values,
     its integral and the integral of that at ``times`` (n,)."""
-    def ramp(t):
+    def ramp(t: np.ndarray) -> np.ndarray:
         inside = np.clip(t, 0.0, _RAMP_S)
         late = np.maximum(t - _RAMP_S, 0.0)
         return np.array([inside / _RAMP_S, inside**2 / (2.0 * _RAMP_S) + late,
@@ -49,7 +54,7 @@ def _trapezium(times, duration):
     return ramp(times) - ramp(times - (duration - _RAMP_S))
 
 
-def _slowing(timed, begin, duration):
+def _slowing(timed: Timed, begin: float, duration: float) -> Timed:
     """On the path: its speed falls from 1 to 0."""
     times = _moments(duration)
     falls, fallen, behind = _trapezium(times, duration)[:, :, None] / (duration - _RAMP_S)
@@ -57,7 +62,7 @@ def _slowing(timed, begin, duration):
     return Timed(times, q, v * (1.0 - fallen), a * (1.0 - fallen) ** 2 - v * falls)
 
 
-def _straight_on(q, v, a, limit):
+def _straight_on(q: np.ndarray, v: np.ndarray, a: np.ndarray, limit: np.ndarray) -> Timed:
     """From the state ``q``, ``v``, ``a`` to rest: the acceleration fades within the ramp's time, and as it does, that
     of braking builds up."""
     faded = v + 0.5 * _RAMP_S * a
@@ -72,7 +77,7 @@ def _straight_on(q, v, a, limit):
                  a * fading - faded * falls)
 
 
-def joined(first, second, overlap):
+def joined(first: Timed, second: Timed, overlap: float) -> Timed:
     """Return the Timed of ``first``, which ends at rest where ``second`` begins at rest, and of ``second``, begun
     ``overlap`` [s] before that; at most as long as the shorter of the two. Its second point is LEAD_S after its first
     one, or it has one point behind that."""
@@ -85,7 +90,8 @@ def joined(first, second, overlap):
     return Timed(times, parts[0] - second.positions[0], *parts[1:])
 
 
-def joinings(first, second, velocity, acceleration):
+def joinings(first: Timed, second: Timed, velocity: np.ndarray,
+             acceleration: np.ndarray) -> Iterator[tuple[float, Timed]]:
     """Yield (overlap [s], ``joined`` with it) from the longest overlap that keeps to the limits (k,) of velocity and
     acceleration to none."""
     for share in _OVERLAPS:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled inner loops: the time-optimal profile, and splines through given points."""
+from __future__ import annotations
+
 import numpy as np
 
 from disk_cache.compiled import compiler
@@ -9,7 +11,8 @@ _TINY = 1e-12
 
 
 @_compiled
-def _range_of_rate(x, gain, offset, limits, low, high):
+def _range_of_rate(x: float, gain: np.ndarray, offset: np.ndarray, limits: np.ndarray, low: np.ndarray,
+                   high: np.ndarray) -> tuple[float, float, float, float]:
     """The range of u under |gain u + offset x| <= limits and low[0] + low[1] x <= u <= high[0] + high[1] x.
 
     Returns both ends, each with its slope over x: lower, its slope, upper, its slope.
@@ -30,7 +33,8 @@ def _range_of_rate(x, gain, offset, limits, low, high):
 
 
 @_compiled
-def greatest_speeds(widths, derivatives, velocity, acceleration, stop):
+def greatest_speeds(widths: np.ndarray, derivatives: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray,
+                    stop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Squared speeds (n + 1,) at the ends of n intervals and accelerations (n,) within, both along the curve.
 
     widths (n,); derivatives (4, n, k): first and second of the joints by the curve's parameter at the left end of
@@ -85,7 +89,7 @@ def greatest_speeds(widths, derivatives, velocity, acceleration, stop):
 
 
 @_compiled
-def second_derivatives(h, path):
+def second_derivatives(h: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Those (m, k) of the spline through ``path`` (m, k) with durations ``h`` (m - 1,), at rest at both ends.
 
     Thomas's algorithm; the system is diagonally dominant.
@@ -113,7 +117,7 @@ def second_derivatives(h, path):
 
 
 @_compiled
-def peaks_of_cubics(h, velocities, accelerations):
+def peaks_of_cubics(h: np.ndarray, velocities: np.ndarray, accelerations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The greatest speeds and accelerations (m - 1, k) of cubics that last ``h`` (m - 1,), from what they have at their
     ends (m, k)."""
     m, k = velocities.shape

@@ -7,9 +7,16 @@ constraints; a pass backwards finds the greatest x from which the end can be rea
 greatest u. The curve's second derivative jumps between pieces, so constraints hold for each interval by itself, with
 the derivatives at both of its ends.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.timing.kernels import greatest_speeds
+
+if TYPE_CHECKING:
+    from motion_planning.timing.rounded import RoundedPath
 
 # Intervals of the whole curve, and the greatest turn [rad] of an arc within one.
 _INTERVALS = 200
@@ -18,7 +25,7 @@ _TURN = 0.1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-def fastest(curve, velocity, acceleration):
+def fastest(curve: RoundedPath, velocity: np.ndarray, acceleration: np.ndarray) -> Motion:
     """Return the fastest :class:`Motion` along a RoundedPath, from rest to rest; limits (k,) above 0."""
     s, derivatives, stops = curve.grid(curve.length / _INTERVALS, _TURN)
     stop = np.zeros(len(s), dtype=np.bool_)
@@ -30,14 +37,14 @@ def fastest(curve, velocity, acceleration):
 class Motion:
     """A motion along a curve: s(t) is a parabola on each interval of the grid. duration [s]."""
 
-    def __init__(self, curve, s, squared, rates):
+    def __init__(self, curve: RoundedPath, s: np.ndarray, squared: np.ndarray, rates: np.ndarray) -> None:
         """s, squared (n + 1,): the grid and (ds/dt)**2 there; rates (n,): d2s/dt2 in the intervals."""
         self._curve, self._s, self._rates = curve, s, rates
         self._speeds = np.sqrt(squared)
         self._times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (self._speeds[:-1] + self._speeds[1:]))])
         self.duration = float(self._times[-1])
 
-    def at(self, times):
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions and velocities (n, k) at ``times`` (n,) [s]; at rest before 0 and after the end."""
         inside = np.clip(times, 0.0, self.duration)
         i = np.clip(np.searchsorted(self._times, inside, side="right") - 1, 0, len(self._rates) - 1)
@@ -47,14 +54,14 @@ class Motion:
         q, direction = self._curve.at(s)
         return q, direction * speed[:, None]
 
-    def mean(self, times, window):
+    def mean(self, times: np.ndarray, window: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, velocities, accelerations (n, k) of the motion's moving mean over ``window`` [s].
 
         The mean keeps limits on velocity and acceleration, which are convex, makes the acceleration continuous, and
         moves the curve by at most acceleration * window**2 / 24.
         """
-        q = sum(0.5 * weight * self.at(times + 0.5 * window * node)[0]
-                for node, weight in zip(_NODES, _WEIGHTS, strict=True))
+        q = sum((0.5 * weight * self.at(times + 0.5 * window * node)[0]
+                 for node, weight in zip(_NODES, _WEIGHTS, strict=True)), np.zeros(1))
         q_before, v_before = self.at(times - 0.5 * window)
         q_after, v_after = self.at(times + 0.5 * window)
         return q, (q_after - q_before) / window, (v_after - v_before) / window

@@ -4,9 +4,15 @@
 T. Kunz, M. Stilman: Time-Optimal Trajectory Generation for Path Following with Bounded Acceleration and Velocity
 (RSS 2012), section IV: an arc touches both lines and stays within a tolerance of the corner.
 """
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    _Arc = tuple[float, np.ndarray, np.ndarray, np.ndarray, float]
 
 # Turns below this [rad] need no arc; turns within it of a full reversal cannot have one: the motion stops there.
 _STRAIGHT = 1e-4
@@ -21,7 +27,7 @@ class RoundedPath:
     starts (p + 1,): s at the ends of the pieces; stops: set of indices into ``starts`` where the direction jumps.
     """
 
-    def __init__(self, path, tolerance):
+    def __init__(self, path: np.ndarray, tolerance: float) -> None:
         """``path`` (m, k), m at least 2, no two points in a row the same; ``tolerance`` above 0."""
         steps = np.diff(path, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
@@ -47,14 +53,14 @@ class RoundedPath:
         self.length = float(self.starts[-1])
         self._ends = np.array(path[0]), np.array(path[-1])
 
-    def at(self, s):
+    def at(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """q and dq/ds (n, k) at s (n,)."""
         piece = np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self._lengths) - 1)
         q, first, _ = self._on_piece(piece, s - self.starts[piece])
         q[s <= 0.0], q[s >= self.length] = self._ends
         return q, first
 
-    def grid(self, spacing, turn):
+    def grid(self, spacing: float, turn: float) -> tuple[np.ndarray, np.ndarray, set[int]]:
         """Cut the pieces: s (n + 1,), derivatives (4, n, k), and the set of indices into s where to stop.
 
         derivatives: dq/ds, d2q/ds2 at the left end of each interval, then at the right. Intervals are at most
@@ -72,7 +78,7 @@ class RoundedPath:
         first_of_piece = np.concatenate([[0], np.cumsum(counts)])
         return s, np.array([left1, left2, right1, right2]), {int(first_of_piece[stop]) for stop in self.stops}
 
-    def _on_piece(self, piece, s):
+    def _on_piece(self, piece: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         radius, s = self._radii[piece][:, None], s[:, None]
         origin, first, second = self._origins[piece], self._first[piece], self._second[piece]
         straight = np.isinf(radius)
@@ -85,12 +91,13 @@ class RoundedPath:
         return q, derivative, curvature
 
 
-def _turn(before, after):
+def _turn(before: np.ndarray, after: np.ndarray) -> float:
     """The angle [rad] between two unit vectors; exact for small ones."""
     return 2.0 * math.atan2(np.linalg.norm(after - before), np.linalg.norm(after + before))
 
 
-def _corner(corner, before, after, length_before, length_after, tolerance):
+def _corner(corner: np.ndarray, before: np.ndarray, after: np.ndarray, length_before: float, length_after: float,
+            tolerance: float) -> tuple[float, _Arc | None]:
     """How much of each line the arc takes, and the arc (length, centre, first, second, radius); 0, None if none."""
     turn = _turn(before, after)
     if turn < _STRAIGHT or turn > math.pi - _REVERSAL:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Times for given points: a cubic spline in time goes through all of them, within the limits."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -12,7 +14,7 @@ _ROUNDS = 60
 _PUSH = 1.01
 
 
-def through_points(path, velocity, acceleration, rest_acceleration):
+def through_points(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, rest_acceleration: bool) -> Timed:
     """Return a Timed through all points of ``path`` (m, k), m at least 2, from rest to rest; limits (k,).
 
     rest_acceleration: also with acceleration 0 at both ends; a point is added behind the first and before the last.
@@ -22,21 +24,20 @@ def through_points(path, velocity, acceleration, rest_acceleration):
     if rest_acceleration:
         path = _with_end_points(path)
     durations = _first_guess(path, velocity, acceleration)
-    best, best_length = None, math.inf
+    found = []
     for _ in range(_ROUNDS):
         timed = _spline(durations, path, rest_acceleration)
         speeds, accelerations = peaks_of_cubics(durations, timed.velocities, timed.accelerations)
         excess = np.maximum((speeds / velocity).max(axis=1), np.sqrt((accelerations / acceleration).max(axis=1)))
         worst = float(excess.max())
-        if timed.duration * max(1.0, worst) < best_length:
-            best, best_length = timed, timed.duration * max(1.0, worst)
+        found.append((timed.duration * max(1.0, worst), timed))
         if worst <= 1.0:
             break
         durations = durations * np.where(excess > 1.0, _PUSH * np.minimum(excess, 2.0), 1.0)
-    return best
+    return min(found, key=lambda one: one[0])[1]
 
 
-def _first_guess(path, velocity, acceleration):
+def _first_guess(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """Durations (m - 1,) [s]: no shorter than the velocities ask for, and the ends' than the accelerations."""
     steps = np.abs(np.diff(path, axis=0))
     durations = (steps / velocity).max(axis=1)
@@ -45,13 +46,13 @@ def _first_guess(path, velocity, acceleration):
     return np.maximum(durations, 1e-4)
 
 
-def _with_end_points(path):
+def _with_end_points(path: np.ndarray) -> np.ndarray:
     """Points near both ends, on the first and the last line, so that the ends' accelerations can be chosen."""
     first, last = path[0] + 0.1 * (path[1] - path[0]), path[-1] + 0.1 * (path[-2] - path[-1])
     return np.concatenate([path[:1], [first], path[1:-1], [last], path[-1:]])
 
 
-def _spline(durations, path, rest_acceleration):
+def _spline(durations: np.ndarray, path: np.ndarray, rest_acceleration: bool) -> Timed:
     """The Timed of a spline with two continuous derivatives, at rest at both ends.
 
     Second derivatives solve a tridiagonal system (C. de Boor, A Practical Guide to Splines, chapter IV). With
@@ -70,12 +71,12 @@ def _spline(durations, path, rest_acceleration):
     return Timed(times, path, velocities, accelerations)
 
 
-def _moved_for_rest(h, path):
+def _moved_for_rest(h: np.ndarray, path: np.ndarray) -> np.ndarray:
     """``path`` with points 1 and m - 2 where a clamped spline has second derivative 0 at both ends.
 
     The ends' second derivatives are affine in the two points, so four splines give the place.
     """
-    def ends(moved_by_first, moved_by_last):
+    def ends(moved_by_first: float, moved_by_last: float) -> np.ndarray:
         moved = path.copy()
         moved[1] += moved_by_first
         moved[-2] += moved_by_last
