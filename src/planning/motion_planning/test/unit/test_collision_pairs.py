@@ -95,6 +95,9 @@ def test_text_keeps_everything_else(column):
     for text in ("<robot name='column'/>", "<robot name='column'></robot>", "<robot name='column'>\n</robot>\n\n"):
         changed = with_disabled_pairs(text, [DisabledPair("base", "tip")])
         assert len(parse_srdf(changed, column.robot).disabled) == 1
+    for root in ("<robot name='column'></robot>", "<robot name='column'/>"):
+        noted = with_disabled_pairs(root + "\n<!-- by hand -->\n", [DisabledPair("base", "tip")])
+        assert noted.endswith("/>\n</robot>\n<!-- by hand -->\n")
     for text in ("<sdf/>", "", "<robot"):
         with pytest.raises(SrdfError):
             with_disabled_pairs(text, [])

@@ -23,7 +23,7 @@ from motion_planning.pipeline import Code, Plan, PlanningFailure
 from motion_planning.scene import Scene, SceneError, WorldObject
 from motion_planning.shapes import Cone, TriangleMesh
 from motion_planning.timing import time_path
-from urdf_model import Box, Cylinder, Sphere
+from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import axis_rotation, rigid
 
 NEUTRAL = {"left_s0": 0.0, "left_s1": -0.55, "left_e0": 0.0, "left_e1": 0.75, "left_w0": 0.0, "left_w1": 1.26,
@@ -258,6 +258,11 @@ def test_places_on_a_table_are_on_it_and_the_nearest_comes_first(scene):
     assert distances[0] < 0.08 and (np.diff(distances) >= -1e-9).all()
     with pytest.raises(SceneError, match="'desk' is not in the scene"):
         places_on(scene, "desk", scene.objects["block"])
+
+
+def test_a_plane_cannot_be_put_down(scene):
+    with pytest.raises(SceneError, match="plane"):
+        places_on(scene, "table", WorldObject("wall", np.eye(4), ((Plane(), np.eye(4)),)))
 
 
 @pytest.mark.parametrize("shape, upright, tilted", [
