@@ -182,8 +182,9 @@ def test_the_launch_file_of_inverse_kinematics_sets_the_same_names():
     launch = ElementTree.parse(ROOT / IK_LAUNCH).getroot()
     values = {tag.get("name"): tag.get("value") for tag in launch.iter("param") if tag.get("value")}
     orders = {tag.get("param"): tuple(re.findall(r"\w+", tag.text)) for tag in launch.iter("rosparam")}
+    limbs = orders.pop("limbs")
     assert values["root_name"] == baxter_model.BASE_FRAME
     for side in SIDES:
         assert values[side + "_tip_name"] == values["grav_%s_name" % side] == baxter_model.tip_of(side)
         assert orders["robot_config/%s_config/joint_names" % side] == baxter_model.joint_names(side)
-    assert [tag.get("value") for tag in launch.iter("param") if tag.get("name") == "limb"] == list(SIDES)
+    assert limbs == SIDES
