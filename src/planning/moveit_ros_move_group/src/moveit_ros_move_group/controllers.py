@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which controllers there are and which of them move given joints. Free of ROS."""
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from motion_planning.errors import PlanningError
 
@@ -32,16 +36,16 @@ class Controller:
 
     name: str
     kind: str
-    joints: tuple
+    joints: tuple[str, ...]
     action: str = ""
     default: bool = False
-    options: dict = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
-    def __str__(self):
+    def __str__(self) -> str:
         return "'%s'" % (self.action or self.name)
 
     @property
-    def remedy(self):
+    def remedy(self) -> str:
         """Advice where the action does not answer, the command that starts its server if that is known."""
         action = self.action.lstrip("/")
         command = self.options.get("started_by") or next(
@@ -51,7 +55,7 @@ class Controller:
         return "start the controller that serves it, or correct its name in controller_list"
 
 
-def read_list(entries, fake=False):
+def read_list(entries: object, fake: bool = False) -> tuple[list[Controller], list[str]]:
     """Return (list of Controllers, list of sentences on entries that were left out) of a ``controller_list``."""
     controllers, complaints = [], []
     for number, entry in enumerate(entries if isinstance(entries, list) else [], 1):
@@ -85,7 +89,8 @@ def read_list(entries, fake=False):
     return controllers, complaints
 
 
-def choose(controllers, joints, alive=lambda controller: True):
+def choose(controllers: Sequence[Controller], joints: Iterable[str],
+           alive: Callable[[Controller], bool] = lambda controller: True) -> list[Controller]:
     """Return the fewest Controllers that together move all ``joints``; those that answer and defaults are preferred.
 
     alive(controller): whether its action answers. Raises ControllerError, which names the joints without a controller.
@@ -99,7 +104,7 @@ def choose(controllers, joints, alive=lambda controller: True):
             "moves %s; %s" % (" ".join(sorted(joints)), ", ".join(orphans), _known(controllers)))
     answering = {controller.action: alive(controller) for controller in useful}
 
-    def cost(chosen):
+    def cost(chosen: Sequence[Controller]) -> tuple[int, ...]:
         moved = [joint for controller in chosen for joint in controller.joints]
         return (sum(not answering[controller.action] for controller in chosen), len(chosen),
                 len(moved) - len(set(moved)), sum(not controller.default for controller in chosen), len(moved))
@@ -115,7 +120,7 @@ def choose(controllers, joints, alive=lambda controller: True):
     return list(best)
 
 
-def _greedy(useful, joints):
+def _greedy(useful: Sequence[Controller], joints: Iterable[str]) -> list[Controller]:
     chosen, left = [], set(joints)
     while left:
         most = max(useful, key=lambda controller: len(left & set(controller.joints)))
@@ -124,14 +129,15 @@ def _greedy(useful, joints):
     return chosen
 
 
-def _known(controllers):
+def _known(controllers: Sequence[Controller]) -> str:
     if not controllers:
         return "there are no controllers: the parameter controller_list is empty or missing"
     return "the controllers are %s" % ", ".join(
         "%s (%s)" % (controller, ", ".join(controller.joints)) for controller in controllers)
 
 
-def start_deviation(names, positions, current, tolerance, continuous=()):
+def start_deviation(names: Sequence[str], positions: Sequence[float], current: Mapping[str, float],
+                    tolerance: float | dict[str, float], continuous: Container[str] = ()) -> tuple[str, float] | None:
     """Return (joint, by how much) of the joint that is furthest from where a trajectory starts; None if all are near.
 
     names, positions: of the first point; current: {joint: value}; tolerance: [rad or m] or {joint: value}, where 0
@@ -150,9 +156,9 @@ def start_deviation(names, positions, current, tolerance, continuous=()):
     return worst
 
 
-def allowed_duration(duration, controllers, scaling, margin):
+def allowed_duration(duration: float, controllers: Sequence[Controller], scaling: float, margin: float) -> float:
     """How long [s] the controllers may take for a trajectory of ``duration``: the most generous of them decides."""
-    def number(controller, key, usual):
+    def number(controller: Controller, key: str, usual: float) -> float:
         value = controller.options.get(key, usual)
         return value if isinstance(value, (int, float)) and math.isfinite(value) else usual
 

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Has controllers follow trajectories, watches them, stops them."""
+from __future__ import annotations
+
 import math
 import threading
 import time
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes
@@ -13,6 +17,13 @@ from command_line.options import counted
 from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
 from moveit_ros_move_group.handles import TICK_S
 from moveit_ros_move_group.rest_of_the_way import LATER_S, NewWay
+
+if TYPE_CHECKING:
+    from moveit_msgs.msg import RobotTrajectory
+
+    from moveit_ros_move_group.controllers import Controller
+    from moveit_ros_move_group.handles import Handle
+    from moveit_ros_move_group.monitor import SceneMonitor
 
 # Time limits [s] for a cancelled controller to report it, for the joints to come to rest, and for the first joint state
 # (MoveIt waits as long).
@@ -31,17 +42,17 @@ class ExecutionSettings:
     monitored: bool = True
     scaling: float = 1.1
     margin: float = 0.5
-    start_tolerance: object = 0.01
+    start_tolerance: float | dict[str, float] = 0.01
     wait_for_rest: bool = True
     connection_timeout: float = 15.0
 
     @property
-    def usual_start_tolerance(self):
+    def usual_start_tolerance(self) -> float:
         """That of joints without one of their own."""
         tolerance = self.start_tolerance
         return tolerance.get("", 0.0) if isinstance(tolerance, dict) else tolerance
 
-    def allow_at_start(self, tolerance):
+    def allow_at_start(self, tolerance: float) -> None:
         """Put ``tolerance`` [rad or m] in the place of that of joints without one of their own."""
         own = self.start_tolerance
         self.start_tolerance = type(own)(tolerance, own) if isinstance(own, dict) else tolerance
@@ -53,31 +64,33 @@ class Outcome:
 
     code: int
     text: str = ""
-    joints: dict = field(default_factory=dict)
+    joints: dict[str, float] = field(default_factory=dict)
 
 
 class Executor:
     """One execution at a time. settings: ExecutionSettings, which may be changed."""
 
-    def __init__(self, controllers, settings, monitor, handle_of):
+    def __init__(self, controllers: Callable[[], list[Controller]], settings: ExecutionSettings, monitor: SceneMonitor,
+                 handle_of: Callable[[Controller], Handle]) -> None:
         """controllers(): list of controllers.Controller at present; may raise ControllerError. handle_of(controller):
         how it is spoken to, as handles.Handles.of."""
         self._controllers, self.settings, self._monitor = controllers, settings, monitor
         self._handle_of = handle_of
         self._busy = threading.Lock()
         self._stop = threading.Event()
-        self._followed_by = []
+        self._followed_by: list[Handle] = []
 
-    def began(self):
+    def began(self) -> float | None:
         """ROS time [s] at which the trajectory that is being executed began, by the word of its controllers; None as
         long as they do not say."""
         return max((began for handle in self._followed_by if (began := handle.began()) is not None), default=None)
 
-    def stop(self):
+    def stop(self) -> None:
         """End what is being executed, if anything is."""
         self._stop.set()
 
-    def execute(self, message, preempted=lambda: False, invalidated=lambda: None, from_anywhere=False):
+    def execute(self, message: RobotTrajectory, preempted: Callable[[], bool] = lambda: False,
+                invalidated: Callable[[], str | NewWay | None] = lambda: None, from_anywhere: bool = False) -> Outcome:
         """Follow a RobotTrajectory to its end; return an Outcome.
 
         preempted(): whether the caller wants to stop it; invalidated(): None, the reason why the rest of the path is no
@@ -104,7 +117,7 @@ class Executor:
         finally:
             self._busy.release()
 
-    def why_not(self, joints):
+    def why_not(self, joints: Sequence[str]) -> str | None:
         """None where there are controllers for all ``joints``, else the sentence that names what is missing."""
         try:
             choose(self._controllers(), joints)
@@ -112,14 +125,15 @@ class Executor:
             return str(error)
         return None
 
-    def silent(self, timeout_s):
+    def silent(self, timeout_s: float) -> list[Controller]:
         """Return the Controllers whose actions do not answer within ``timeout_s`` [s, wall time] in all."""
         deadline = time.monotonic() + timeout_s
         return [controller for controller in self._controllers()
                 if not self._handle_of(controller).connected(max(0.0, deadline - time.monotonic()))]
 
-    def _follow(self, trajectory, preempted, invalidated, from_anywhere):
-        def given_up():
+    def _follow(self, trajectory: JointTrajectory, preempted: Callable[[], bool],
+                invalidated: Callable[[], str | NewWay | None], from_anywhere: bool) -> Outcome:
+        def given_up() -> bool:
             return self._stop.is_set() or preempted()
 
         chosen = choose(self._controllers(), trajectory.joint_names, self._is_alive)
@@ -141,7 +155,7 @@ class Executor:
                 handle.cancel()
             raise
 
-    def _flaw_of_start(self, trajectory, given_up):
+    def _flaw_of_start(self, trajectory: JointTrajectory, given_up: Callable[[], bool]) -> Outcome | None:
         """An Outcome where the joints are not where the trajectory starts, or do not say where they are; else None."""
         tolerance, names = self.settings.start_tolerance, trajectory.joint_names
         checked = [name for name, limit in zip(names, self._limits(names), strict=True) if limit > 0.0]
@@ -157,7 +171,8 @@ class Executor:
                        "Invalid Trajectory: start point deviates from current robot state more than the allowed start "
                        "tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
 
-    def _watch(self, trajectory, chosen, handles, preempted, invalidated):
+    def _watch(self, trajectory: JointTrajectory, chosen: Sequence[Controller], handles: Sequence[Handle],
+               preempted: Callable[[], bool], invalidated: Callable[[], str | NewWay | None]) -> Outcome:
         duration = trajectory.points[-1].time_from_start.to_sec()
         allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
         begin = rospy.get_time()
@@ -192,7 +207,7 @@ class Executor:
             self._wait_for_rest(trajectory.joint_names, preempted)
         return Outcome(MoveItErrorCodes.SUCCESS)
 
-    def _cancel(self, handles, code, text):
+    def _cancel(self, handles: Sequence[Handle], code: int, text: str) -> Outcome:
         for handle in handles:
             handle.cancel()
         deadline = time.monotonic() + _CANCEL_S
@@ -200,7 +215,7 @@ class Executor:
             handle.done.wait(max(0.0, deadline - time.monotonic()))
         return Outcome(code, text)
 
-    def _wait_for_rest(self, names, preempted):
+    def _wait_for_rest(self, names: Sequence[str], preempted: Callable[[], bool]) -> None:
         """Until three joint states in a row agree within the start tolerance."""
         limits = self._limits(names)
         deadline, before, same, number = time.monotonic() + _REST_S, None, 0, -1
@@ -218,21 +233,21 @@ class Executor:
                     return
             before = now
 
-    def _limits(self, names):
+    def _limits(self, names: Sequence[str]) -> list[float]:
         """The start tolerance of each joint [rad or m]; 0 where it is not checked."""
         tolerance = self.settings.start_tolerance
         return [tolerance.get(name, 0.0) if isinstance(tolerance, dict) else tolerance for name in names]
 
-    def _is_alive(self, controller):
+    def _is_alive(self, controller: Controller) -> bool:
         return self._handle_of(controller).connected(0.0)
 
 
-def _send(trajectory, chosen, handles):
+def _send(trajectory: JointTrajectory, chosen: Sequence[Controller], handles: Sequence[Handle]) -> None:
     for controller, handle in zip(chosen, handles, strict=True):
         handle.send(part_of(trajectory, controller.joints))
 
 
-def _failed(handles):
+def _failed(handles: Sequence[Handle]) -> Outcome | None:
     """The Outcome of the first of those that have ended with an error, or None."""
     for handle in handles:
         if handle.done.is_set() and handle.error():
@@ -241,13 +256,13 @@ def _failed(handles):
     return None
 
 
-def part_of(trajectory, joints):
+def part_of(trajectory: JointTrajectory, joints: Container[str]) -> JointTrajectory:
     """Return the JointTrajectory of those of its joints that are among ``joints``."""
     keep = [i for i, name in enumerate(trajectory.joint_names) if name in joints]
     if len(keep) == len(trajectory.joint_names):
         return trajectory
 
-    def pick(values):
+    def pick(values: Sequence[float]) -> list[float]:
         return [values[i] for i in keep] if values else []
 
     part = JointTrajectory(header=trajectory.header, joint_names=[trajectory.joint_names[i] for i in keep])
@@ -256,7 +271,7 @@ def part_of(trajectory, joints):
     return part
 
 
-def _flaw(trajectory):
+def _flaw(trajectory: JointTrajectory) -> str:
     """The sentence why a JointTrajectory cannot be executed, or an empty one."""
     count, last = len(trajectory.joint_names), -1.0
     if not count or len(set(trajectory.joint_names)) != count:

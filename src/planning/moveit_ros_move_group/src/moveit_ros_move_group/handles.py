@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Handles of controllers: an action client each, or nothing where they are fake."""
+from __future__ import annotations
+
 import itertools
 import threading
 import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import actionlib
 import rospy
@@ -19,6 +23,16 @@ from sensor_msgs.msg import JointState
 
 from moveit_ros_move_group.controllers import FAKE, FOLLOW
 
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from actionlib import ClientGoalHandle
+    from trajectory_msgs.msg import JointTrajectory
+
+    from moveit_ros_move_group.controllers import Controller
+
+    Handle: TypeAlias = "FollowHandle | GripperHandle | FakeHandle"
+
 # Polling period [s].
 TICK_S = 0.01
 # Between two joint states of a fake controller that interpolates, where its ``rate`` does not say [s].
@@ -34,7 +48,8 @@ _STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if isin
 class Handles:
     """A handle for each controller, made when it is first asked for; controllers of one action share it."""
 
-    def __init__(self, controllers, initial=None, limits=None):
+    def __init__(self, controllers: Sequence[Controller], initial: Mapping[str, float] | None = None,
+                 limits: Mapping[str, Sequence[float]] | None = None) -> None:
         """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin. limits:
         {joint: (lowest, highest)}, for grippers that are commanded in percent."""
         self._limits = limits or {}
@@ -47,7 +62,7 @@ class Handles:
         for controller in controllers:
             self.of(controller)
 
-    def of(self, controller):
+    def of(self, controller: Controller) -> Handle:
         key = controller.action or controller.name
         if key not in self._made:
             if controller.kind == FAKE:
@@ -70,16 +85,16 @@ def goal_id() -> GoalID:
 class _Goal:
     """One goal. handle: actionlib's once it is over; began: when, by the server's feedback [s, ROS time]."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.over, self.handle, self.began = threading.Event(), None, None
 
-    def moved(self, handle):
+    def moved(self, handle: ClientGoalHandle) -> None:
         """The goal's state has changed; may come before send_goal returns, and again after the goal is over."""
         if handle.get_comm_state() == actionlib.CommState.DONE:
             self.handle = handle
             self.over.set()
 
-    def told(self, handle, feedback):
+    def told(self, handle: ClientGoalHandle, feedback: rospy.Message) -> None:
         """The goal's feedback has come."""
         since = feedback.desired.time_from_start.to_sec() if hasattr(feedback, "desired") else 0.0
         if since > _SINCE_S:
@@ -89,7 +104,7 @@ class _Goal:
 class _ActionHandle:
     """A controller that serves an action. Each goal has its own record: the late end of an older one ends no other."""
 
-    def __init__(self, controller, action_type):
+    def __init__(self, controller: Controller, action_type: type[rospy.Message]) -> None:
         self.controller = controller
         # Resolved: actionlib remaps the name as written, roscpp's version remaps the resolved name.
         self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
@@ -97,11 +112,11 @@ class _ActionHandle:
         self._goal, self._open = _Goal(), []
 
     @property
-    def done(self):
+    def done(self) -> threading.Event:
         """The Event that is set once the newest goal has ended."""
         return self._goal.over
 
-    def connected(self, timeout_s, given_up=lambda: False):
+    def connected(self, timeout_s: float, given_up: Callable[[], bool] = lambda: False) -> bool:
         """Whether the action's server exists; waits this long in wall time, or until ``given_up()``."""
         deadline = time.monotonic() + timeout_s
         client = self._client
@@ -113,38 +128,38 @@ class _ActionHandle:
             time.sleep(TICK_S)
         return True
 
-    def send(self, trajectory):
+    def send(self, trajectory: JointTrajectory) -> None:
         goal = self._goal = _Goal()
         self._open = [(sent, one) for sent, one in self._open if not one.over.is_set()]
         self._open.append((self._client.send_goal(self._goal_of(trajectory), goal.moved, goal.told), goal))
 
-    def began(self):
+    def began(self) -> float | None:
         """ROS time [s] at which the newest goal began, None as long as its feedback has not told."""
         return self._goal.began
 
-    def cancel(self):
+    def cancel(self) -> None:
         # A goal that was to take another's place may have been refused, and the other still run.
         for sent, goal in self._open:
             if not goal.over.is_set():
                 sent.cancel()
 
-    def was_preempted(self):
+    def was_preempted(self) -> bool:
         return self._status() in (GoalStatus.PREEMPTED, GoalStatus.RECALLED)
 
-    def error(self):
+    def error(self) -> str:
         """The sentence what went wrong, empty where nothing has."""
         status = self._status()
         if status in (None, GoalStatus.SUCCEEDED):
             return ""
         return "controller %s ended with %s%s" % (self.controller, _STATUS_NAMES.get(status, status), self._detail())
 
-    def _status(self):
+    def _status(self) -> int | None:
         return self._goal.handle.get_terminal_state() if self._goal.handle is not None else None
 
-    def _goal_of(self, trajectory):
+    def _goal_of(self, trajectory: JointTrajectory) -> rospy.Message:
         raise NotImplementedError
 
-    def _detail(self):
+    def _detail(self) -> str:
         text = self._goal.handle.get_goal_status_text()
         return ": %s" % text if text else ""
 
@@ -152,10 +167,10 @@ class _ActionHandle:
 class FollowHandle(_ActionHandle):
     """FollowJointTrajectory."""
 
-    def __init__(self, controller):
+    def __init__(self, controller: Controller) -> None:
         super().__init__(controller, FollowJointTrajectoryAction)
 
-    def _goal_of(self, trajectory):
+    def _goal_of(self, trajectory: JointTrajectory) -> FollowJointTrajectoryGoal:
         goal, options = FollowJointTrajectoryGoal(trajectory=trajectory), self.controller.options
         goal.path_tolerance = tolerances_of(options.get("path_tolerance"), self.controller.joints)
         goal.goal_tolerance = tolerances_of(options.get("goal_tolerance"), self.controller.joints)
@@ -163,7 +178,7 @@ class FollowHandle(_ActionHandle):
             goal.goal_time_tolerance = rospy.Duration(options["goal_time_tolerance"])
         return goal
 
-    def _detail(self):
+    def _detail(self) -> str:
         result = self._goal.handle.get_result()
         if result is None:
             return super()._detail()
@@ -176,11 +191,11 @@ class GripperHandle(_ActionHandle):
     """GripperCommand: the last point's position is the command; with the option ``percent``, how much of the joint's
     range that is, 0 at its lower limit and 100 at its upper."""
 
-    def __init__(self, controller, limits):
+    def __init__(self, controller: Controller, limits: Mapping[str, Sequence[float]]) -> None:
         super().__init__(controller, GripperCommandAction)
         self._limits = limits
 
-    def _goal_of(self, trajectory):
+    def _goal_of(self, trajectory: JointTrajectory) -> GripperCommandGoal:
         goal, options = GripperCommandGoal(), self.controller.options
         point = trajectory.points[-1]
         if options.get("parallel"):
@@ -193,13 +208,13 @@ class GripperHandle(_ActionHandle):
         goal.command.max_effort = float(effort)
         return goal
 
-    def _command(self, joint, position):
+    def _command(self, joint: str, position: float) -> float:
         if not self.controller.options.get("percent") or joint not in self._limits:
             return position
         low, high = self._limits[joint]
         return min(100.0, max(0.0, 100.0 * (position - low) / (high - low)))
 
-    def error(self):
+    def error(self) -> str:
         allowed = self.controller.options.get("allow_failure") and self._status() == GoalStatus.ABORTED
         return "" if allowed else super().error()
 
@@ -207,37 +222,38 @@ class GripperHandle(_ActionHandle):
 class FakeHandle:
     """A controller that moves nothing and says where the joints would be."""
 
-    def __init__(self, controller, publisher):
+    def __init__(self, controller: Controller, publisher: rospy.Publisher) -> None:
         self.controller, self.done = controller, threading.Event()
         self._publisher = publisher
         self._cancelled = threading.Event()
         rate = controller.options.get("rate")
         self._step = 1.0 / rate if isinstance(rate, (int, float)) and rate > 0.0 else _FAKE_STEP_S
 
-    def connected(self, timeout_s, given_up=None):
+    def connected(self, timeout_s: float, given_up: Callable[[], bool] | None = None) -> bool:
         return True
 
-    def send(self, trajectory):
+    def send(self, trajectory: JointTrajectory) -> None:
         # New events: the previous playback may still sleep, and must neither continue nor end this one.
         before = self._cancelled
         self.done, self._cancelled = threading.Event(), threading.Event()
         threading.Thread(target=self._play, args=(trajectory, self.done, self._cancelled, before), daemon=True).start()
 
-    def began(self):
+    def began(self) -> None:
         return None
 
-    def cancel(self):
+    def cancel(self) -> None:
         self._cancelled.set()
 
-    def was_preempted(self):
+    def was_preempted(self) -> bool:
         return self._cancelled.is_set()
 
-    def error(self):
+    def error(self) -> str:
         return ""
 
-    def _play(self, trajectory, done, cancelled, before):
+    def _play(self, trajectory: JointTrajectory, done: threading.Event, cancelled: threading.Event,
+              before: threading.Event) -> None:
         """before: the Event that ends the previous playback, which goes on until the trajectory's stamp."""
-        def over():
+        def over() -> bool:
             return cancelled.is_set() or rospy.is_shutdown()
 
         while rospy.get_rostime() < trajectory.header.stamp and not over():
@@ -257,7 +273,7 @@ class FakeHandle:
                 self._say(trajectory.joint_names, point.positions)
         done.set()
 
-    def _interpolate(self, trajectory, over):
+    def _interpolate(self, trajectory: JointTrajectory, over: Callable[[], bool]) -> None:
         points, begin = trajectory.points, rospy.get_time()
         while not over():
             now = rospy.get_time() - begin
@@ -272,17 +288,17 @@ class FakeHandle:
                                                    for p, q in zip(a.positions, b.positions, strict=True)])
             time.sleep(self._step)
 
-    def _say(self, names, positions):
+    def _say(self, names: Sequence[str], positions: Sequence[float]) -> None:
         self._publisher.publish(_joint_state(names, positions))
 
 
-def _joint_state(names, positions):
+def _joint_state(names: Iterable[str], positions: Iterable[float]) -> JointState:
     message = JointState(name=list(names), position=list(positions))
     message.header.stamp = rospy.Time.now()
     return message
 
 
-def tolerances_of(value, joints):
+def tolerances_of(value: object, joints: Sequence[str]) -> list[JointTolerance]:
     """Return the JointTolerances of a controller_list's path_tolerance or goal_tolerance.
 
     A map {position|velocity|acceleration: number, list or {joint: number}}, or a list of {name, position, ...}.

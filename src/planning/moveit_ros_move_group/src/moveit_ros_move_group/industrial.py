@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests to the pipeline pilz_industrial_motion_planner."""
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -14,6 +18,15 @@ from moveit_ros_move_group.context import RequestError
 from moveit_ros_move_group.convert.constraints import constraint_set_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import Constraints, MotionPlanRequest, MotionSequenceItem
+
+    from motion_planning.industrial import Auxiliary, Command
+    from motion_planning.pipeline import Plan, Tools
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.context import Context
+    from moveit_ros_move_group.settings import Pipeline
+
 # Radius of a position that was given without a region [m].
 _POINT_M = 1e-4
 
@@ -21,17 +34,18 @@ _POINT_M = 1e-4
 class IndustrialPlanner:
     """PTP, LIN, CIRC and sequences of them. Calls may come from any thread."""
 
-    def __init__(self, context, description):
+    def __init__(self, context: Context, description: str) -> None:
         """description: name of the robot's parameter, beside which its limits are."""
         self._context = context
         self._limits, self._complaints = industrial.CartesianLimits.from_mapping(
             rospy.get_param(description + "_planning/cartesian_limits", None))
 
-    def plan(self, request, scene, pipe, tools):
+    def plan(self, request: MotionPlanRequest, scene: Scene, pipe: Pipeline, tools: Tools) -> Plan:
         """Return a pipeline.Plan for a MotionPlanRequest. Raises PlanningError."""
         return industrial.plan(self._command(request, scene, pipe), tools, self._limits)
 
-    def plan_sequence(self, items, scene, pipes, tools):
+    def plan_sequence(self, items: Sequence[MotionSequenceItem], scene: Scene, pipes: Sequence[Pipeline],
+                      tools: Tools) -> list[tuple[str, Plan]]:
         """Return [(group name, pipeline.Plan), ...] for MotionSequenceItems; pipes: a settings.Pipeline for each.
 
         Raises PlanningError.
@@ -44,7 +58,7 @@ class IndustrialPlanner:
             commands.append(self._command(item.req, scene, pipe))
         return industrial.plan_sequence(commands, [item.blend_radius for item in items], tools, self._limits)
 
-    def _command(self, request, scene, pipe):
+    def _command(self, request: MotionPlanRequest, scene: Scene, pipe: Pipeline) -> Command:
         """The industrial.Command of a MotionPlanRequest."""
         for text in self._complaints:
             rospy.logwarn("%s", text)
@@ -74,7 +88,7 @@ class IndustrialPlanner:
         joints = self._context.group(request.group_name).joints
         return industrial.Command(query, auxiliary, [speeds.get(joint, 0.0) for joint in joints])
 
-    def _auxiliary(self, message, scene):
+    def _auxiliary(self, message: Constraints, scene: Scene) -> Auxiliary | None:
         """The industrial.Auxiliary of CIRC's path constraints, None where there are none."""
         positions = message.position_constraints
         if not message.name and not positions:
@@ -88,7 +102,7 @@ class IndustrialPlanner:
         return industrial.Auxiliary(message.name, pose[:3, 3])
 
 
-def _with_regions(constraints):
+def _with_regions(constraints: Constraints) -> Constraints:
     """The message, with a region around positions that are given by primitive_poses alone, and with quaternions of
     length 1, as this planner takes them."""
     for one in constraints.orientation_constraints:

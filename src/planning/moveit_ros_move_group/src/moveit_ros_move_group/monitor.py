@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the planning scene up to date with the topics and services that change it, and publishes its changes."""
+from __future__ import annotations
+
 import contextlib
 import functools
 import math
 import threading
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -19,6 +23,12 @@ from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
 from moveit_ros_move_group.convert.octomap import octomap_message
 from moveit_ros_move_group.convert.scene_in import SceneReader
 from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message
+
+if TYPE_CHECKING:
+    from octomap_msgs.msg import OctomapWithPose
+
+    from motion_planning.model import PlanningModel
+    from motion_planning.scene import Octree
 
 # Time limit [s] for a frame that tf does not know yet, in wall time.
 _NEWEST = rospy.Time()
@@ -40,7 +50,8 @@ class SceneMonitor:
     and of the robot alone, are published, at most ``hz`` times per second. All methods may be called from any thread.
     """
 
-    def __init__(self, model, say_failure, topics=None):
+    def __init__(self, model: PlanningModel, say_failure: Callable[[str, str], object],
+                 topics: Mapping[str, str] | None = None) -> None:
         """say_failure(request, text): told what could not be applied. topics: {key of _NAMES: topic} of the node's own
         parameters."""
         self.model = model
@@ -80,7 +91,7 @@ class SceneMonitor:
 
     # -- the scene ----------------------------------------------------------------------------------------------
 
-    def scene(self):
+    def scene(self) -> Scene:
         """The Scene with the robot where it is now, joints without a joint state where the scene had them."""
         with self._lock:
             scene = self._scene
@@ -90,22 +101,22 @@ class SceneMonitor:
             state = scene.state.with_q(self._onto_limits(q))
             return scene.with_state(state.with_base(self._robot_base(state.base)))
 
-    def octomap(self):
+    def octomap(self) -> OctomapWithPose | None:
         """The OctomapWithPose that the scene's octomap came with, or None."""
         octomap = self._octomap
         return octomap() if callable(octomap) else octomap
 
-    def apply(self, message, request):
+    def apply(self, message: PlanningScene, request: str) -> list[str]:
         """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
         # The poses of attached objects depend on the robot's posture.
         return self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request,
                             message.world.octomap)
 
-    def clear_octomap(self):
+    def clear_octomap(self) -> None:
         self._clear_sensors()
         self._change(lambda scene: (scene.with_octomap(None), []), "clear_octomap")
 
-    def set_octomap(self, octree, pose):
+    def set_octomap(self, octree: Octree | None, pose: np.ndarray) -> None:
         """Put an Octree, or None, at ``pose`` (4, 4) in the place of the scene's octomap."""
         stamp = rospy.Time.now()
         # Many maps come between two requests for one.
@@ -113,21 +124,22 @@ class SceneMonitor:
                                                                                       stamp))
         self._change(lambda scene: (scene.with_octomap(octree, pose), []), "octomap", message)
 
-    def on_clear_octomap(self, clear):
+    def on_clear_octomap(self, clear: Callable[[], None]) -> None:
         """``clear()`` is called before the octomap is cleared."""
         self._clear_sensors = clear
 
-    def change(self, function, request):
+    def change(self, function: Callable[[Scene], Scene], request: str) -> None:
         """Put ``function(scene)`` in the scene's place. Raises PlanningError and leaves the scene as it is."""
         with self._changing:
             self._replace(function(self._scene))
         self._tell()
 
-    def on_change(self, listener):
+    def on_change(self, listener: Callable[[], object]) -> None:
         """``listener()`` is called after each change of the scene that is not the robot's motion."""
         self._listeners.append(listener)
 
-    def _change(self, function, request, octomap=None):
+    def _change(self, function: Callable[[Scene], tuple[Scene, list[str]]], request: str,
+                octomap: OctomapWithPose | None = None) -> list[str]:
         """Put the scene of ``function(scene)`` = (scene, errors) in the scene's place; return the errors.
 
         octomap: the OctomapWithPose that a new octomap comes from.
@@ -147,52 +159,53 @@ class SceneMonitor:
         self._tell()
         return errors
 
-    def _replace(self, scene, octomap=None):
+    def _replace(self, scene: Scene, octomap: OctomapWithPose | None = None) -> None:
         with self._lock:
             if scene.octomap is not self._scene.octomap:
                 self._octomap = None if scene.octomap is None else octomap
             self._scene = scene
 
-    def _tell(self):
+    def _tell(self) -> None:
         for listener in self._listeners:
             listener()
 
-    def _on_scene(self, message):
+    def _on_scene(self, message: PlanningScene) -> None:
         self.apply(message, "planning_scene")
 
-    def _on_object(self, message):
+    def _on_object(self, message: CollisionObject) -> None:
         self._change(lambda scene: (self.reader.with_collision_object(scene, message), []), "collision_object")
 
-    def _on_attached(self, message):
+    def _on_attached(self, message: AttachedCollisionObject) -> None:
         self._change(lambda _: (self.reader.with_attached_object(self.scene(), message), []),
                      "attached_collision_object")
 
-    def _on_world(self, message):
+    def _on_world(self, message: PlanningSceneWorld) -> None:
         self._change(lambda scene: self.reader.with_world(scene, message), "planning_scene_world", message.octomap)
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
-    def joint_values(self):
+    def joint_values(self) -> dict[str, float]:
         """{joint: newest value} of the joints that have been heard of."""
         with self._lock:
             return dict(self._values)
 
-    def joint_update(self):
+    def joint_update(self) -> tuple[int, dict[str, float]]:
         """(number of the newest joint state, {joint: value})"""
         with self._lock:
             return self._updates, dict(self._values)
 
-    def missing_joints(self):
+    def missing_joints(self) -> list[str]:
         """Joints of the model that no message has told a value of; passive ones do not count."""
         with self._lock:
             return [name for name in self.model.variables
                     if name not in self._values and name not in self.model.passive]
 
-    def state_stamp(self):
+    def state_stamp(self) -> rospy.Time:
         """The stamp of the newest joint state."""
         return self._newest_stamp
 
-    def wait_for_state(self, after, timeout_s, joints=(), given_up=lambda: False):
+    def wait_for_state(self, after: rospy.Time, timeout_s: float, joints: Sequence[str] | None = (),
+                       given_up: Callable[[], bool] = lambda: False) -> str | None:
         """Wait in wall time until each of ``joints`` has a value no older than ``after`` (rospy.Time).
 
         Returns None if it came or the caller gave up, or the reason why it did not come.
@@ -218,7 +231,7 @@ class SceneMonitor:
         return "the newest joint state of %s is of %.3f s, older than the request (%.3f s); do clocks agree?" % (
             late[0], self._stamps[late[0]].to_sec(), after.to_sec())
 
-    def _on_joint_state(self, message):
+    def _on_joint_state(self, message: JointState) -> None:
         if len(message.name) != len(message.position):
             rospy.logwarn_throttle(30.0, "a joint state on %s has %s but %s; it is left out"
                                    % (self.joint_state_topic, counted(len(message.name), "name"),
@@ -236,12 +249,12 @@ class SceneMonitor:
         with self._news:
             self._news.notify_all()
 
-    def _onto_limits(self, q):
+    def _onto_limits(self, q: np.ndarray) -> np.ndarray:
         low, high = self.model.bounds.T
         near = ~self.model.continuous & (q > low - self._bounds_error) & (q < high + self._bounds_error)
         return np.where(near, np.clip(q, low, high), q)
 
-    def _robot_base(self, before):
+    def _robot_base(self, before: np.ndarray) -> np.ndarray:
         joint = self.model.virtual_joint
         if joint is None or joint.type == "fixed":
             return before
@@ -256,7 +269,7 @@ class SceneMonitor:
     # -- frames -------------------------------------------------------------------------------------------------
 
     @contextlib.contextmanager
-    def asking_for(self, given_up):
+    def asking_for(self, given_up: Callable[[], bool]) -> Iterator[None]:
         """A context in which the thread's waits for frames end as soon as ``given_up()``."""
         self._asking.given_up = given_up
         try:
@@ -264,7 +277,7 @@ class SceneMonitor:
         finally:
             self._asking.given_up = None
 
-    def tf_frame(self, name, stamp=_NEWEST):
+    def tf_frame(self, name: str, stamp: rospy.Time = _NEWEST) -> np.ndarray:
         """Return the pose (4, 4) of a tf frame in the planning frame at ``stamp``. Raises PlanningError."""
         self._listen_to_tf()
         given_up = getattr(self._asking, "given_up", None)
@@ -286,7 +299,7 @@ class SceneMonitor:
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)
 
-    def _listen_to_tf(self):
+    def _listen_to_tf(self) -> None:
         with self._lock:
             if self._buffer is None:
                 self._buffer = tf2_ros.Buffer(debug=False)
@@ -294,7 +307,7 @@ class SceneMonitor:
 
     # -- what is published ---------------------------------------------------------------------------------------
 
-    def _publish_changes(self):
+    def _publish_changes(self) -> None:
         published = None
         while not rospy.is_shutdown():
             time.sleep(1.0 / self.hz)
@@ -307,7 +320,7 @@ class SceneMonitor:
                     rospy.logerr_throttle(30.0, "the scene could not be published: %s: %s"
                                           % (type(error).__name__, error))
 
-    def _publish_change(self, published):
+    def _publish_change(self, published: Scene | None) -> Scene | None:
         scene, stamp = self.scene(), self.state_stamp()
         if published is None:
             self._publisher.publish(scene_message(scene, octomap=self.octomap(), stamp=stamp))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node: reads what it needs, builds the core, serves."""
+from __future__ import annotations
+
 import argparse
 import logging
 import sys
@@ -59,7 +61,7 @@ Parameters: ~robot_description (the name of the URDF's), ~controller_list, ~move
 """
 
 
-def build():
+def build() -> list[object]:
     """Return what has to be kept alive. Raises PlanningError, MissingParameter."""
     name = rospy.get_param("~robot_description", rospy.get_param("~planning_scene_monitor_options/robot_description",
                                                                   "robot_description"))
@@ -86,7 +88,7 @@ def build():
     return kept
 
 
-def _executor(monitor):
+def _executor(monitor: SceneMonitor) -> Executor:
     controllers, complaints = settings.controllers()
     for text in complaints:
         rospy.logwarn("%s", text)
@@ -101,7 +103,7 @@ def _executor(monitor):
     return Executor(present, settings.execution_settings(), monitor, handles.of)
 
 
-def _capabilities(context, wanted, description, may_execute):
+def _capabilities(context: Context, wanted: set[str], description: str, may_execute: bool) -> list[object]:
     planner = Planner(context, IndustrialPlanner(context, description))
     planner.prepare(_PREPARED_S, compiler_pages.release)
     timeouts = {group: entry["kinematics_solver_timeout"]
@@ -131,7 +133,7 @@ def _capabilities(context, wanted, description, may_execute):
     return made + tuning.servers(context.executor, context.monitor, move_action)
 
 
-def tell_of_silent_controllers(executor):
+def tell_of_silent_controllers(executor: Executor | None) -> None:
     """Warn of controllers that do not answer, by which command they are started. Servers may start after this node."""
     if executor is None:
         return
@@ -147,7 +149,7 @@ def tell_of_silent_controllers(executor):
         rospy.logwarn("%s", error)
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--debug", action="store_true", help="log more")
     options = parser.parse_args(rospy.myargv()[1:])

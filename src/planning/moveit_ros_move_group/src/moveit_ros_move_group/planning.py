@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """MotionPlanRequests to plans."""
+from __future__ import annotations
+
 import itertools
 import math
 import threading
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -21,6 +25,16 @@ from moveit_ros_move_group.capabilities.cartesian import slowed
 from moveit_ros_move_group.context import RequestError, wall_clock
 from moveit_ros_move_group.convert.constraints import constraint_set_of
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import MotionPlanRequest, MotionSequenceItem, PlanningScene
+
+    from motion_planning.pipeline import Plan, PlanQuery, Tools
+    from motion_planning.planners.trees import Planner as PathPlanner
+    from motion_planning.replanning import Redirection, Running
+    from moveit_ros_move_group.context import Context
+    from moveit_ros_move_group.industrial import IndustrialPlanner
+    from moveit_ros_move_group.settings import Pipeline
+
 # [s], if a request has none.
 _USUAL_TIME_S = 5.0
 # Polling period while the robot is being prepared [s].
@@ -32,7 +46,7 @@ _MAX_REMARKS = 1000
 class Planner:
     """Plans requests. Calls may come from any thread."""
 
-    def __init__(self, context, industrial):
+    def __init__(self, context: Context, industrial: IndustrialPlanner) -> None:
         """industrial: IndustrialPlanner, for the pipelines that are."""
         self._context, self._industrial = context, industrial
         self._remarks = set()
@@ -40,7 +54,7 @@ class Planner:
         self._prepared = threading.Event()
         self._prepared.set()
 
-    def plan(self, request, scene, stop=lambda: False):
+    def plan(self, request: MotionPlanRequest, scene: Scene, stop: Callable[[], bool] = lambda: False) -> Plan:
         """Return a pipeline.Plan for a MotionPlanRequest from the state of ``scene``. Raises PlanningError."""
         context = self._context
         pipe = self._pipeline(request.pipeline_id)
@@ -57,7 +71,8 @@ class Planner:
         context.remark("planning", remarks, request.group_name)
         return self._limited(request, plan._replace(remarks=tuple(remarks)))
 
-    def redirected(self, request, scene, running, stop=lambda: False):
+    def redirected(self, request: MotionPlanRequest, scene: Scene, running: Running,
+                   stop: Callable[[], bool] = lambda: False) -> Redirection:
         """Return a replanning.Redirection for joints that move by a MotionPlanRequest already, see there. Raises
         PlanningError."""
         pipe = self._pipeline(request.pipeline_id)
@@ -67,7 +82,7 @@ class Planner:
         query, _ = self._query(request, scene, pipe)
         return redirected(query, self._tools(stop), running)
 
-    def _query(self, request, scene, pipe):
+    def _query(self, request: MotionPlanRequest, scene: Scene, pipe: Pipeline) -> tuple[PlanQuery, list[str]]:
         """(pipeline.PlanQuery, remarks) of a MotionPlanRequest. Raises RequestError."""
         remarks, reader = [], self._context.monitor.reader
         try:
@@ -85,7 +100,8 @@ class Planner:
             _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
         return query, remarks
 
-    def plan_sequence(self, items, scene, stop=lambda: False):
+    def plan_sequence(self, items: Sequence[MotionSequenceItem], scene: Scene,
+                      stop: Callable[[], bool] = lambda: False) -> list[tuple[str, Plan]]:
         """Return [(group name, pipeline.Plan), ...] for MotionSequenceItems from the state of ``scene``.
 
         Raises PlanningError.
@@ -101,11 +117,11 @@ class Planner:
         self._wait_until_prepared(stop)
         return self._industrial.plan_sequence(items, scene, pipes, self._tools(stop))
 
-    def prepare(self, patience_s, done=lambda: None):
+    def prepare(self, patience_s: float, done: Callable[[], object] = lambda: None) -> None:
         """Load compiled code and make the robot's spheres, so that the first request does not wait for them. Returns
         when that is done, or after ``patience_s`` [s], and goes on beside: plans wait for it, nothing else does.
         ``done()`` is called in the end."""
-        def work():
+        def work() -> None:
             begin = wall_clock()
             try:
                 self._warm_up()
@@ -124,12 +140,12 @@ class Planner:
             rospy.logwarn("the robot is still being prepared for planning; the first time its links are covered by "
                           "spheres, which may take half a minute. Plans wait for that, everything else answers already")
 
-    def _wait_until_prepared(self, stop):
+    def _wait_until_prepared(self, stop: Callable[[], bool]) -> None:
         while not self._prepared.wait(_LOOK_UP_S):
             if stop() or rospy.is_shutdown():
                 raise RequestError(MoveItErrorCodes.PREEMPTED, "stopped while the robot was prepared for planning")
 
-    def _warm_up(self):
+    def _warm_up(self) -> None:
         context = self._context
         scene = Scene(context.model)
         for name, group in context.model.groups.items():
@@ -144,11 +160,11 @@ class Planner:
             time_path(np.array([q, near]), context.model.velocity[group.indices],
                       context.model.acceleration[group.indices])
 
-    def _tools(self, stop):
+    def _tools(self, stop: Callable[[], bool]) -> Tools:
         return pipeline.Tools(self._context.exact, plan_path, sampler, wall_clock, next(self._seeds),
                               lambda: stop() or rospy.is_shutdown())
 
-    def _limited(self, request, plan):
+    def _limited(self, request: MotionPlanRequest, plan: Plan) -> Plan:
         """The plan, slowed to ``max_cartesian_speed`` where the request limits a link's speed."""
         speed, link = request.max_cartesian_speed, request.cartesian_speed_limited_link
         group = self._context.group(request.group_name)
@@ -157,14 +173,14 @@ class Planner:
             return plan
         return plan._replace(timed=slowed(self._context.model, plan.start, group, link, plan.timed, speed))
 
-    def _pipeline(self, name):
+    def _pipeline(self, name: str) -> Pipeline:
         name = name or self._context.default_pipeline
         if name not in self._context.pipelines:
             raise RequestError(MoveItErrorCodes.FAILURE, "there is no planning pipeline '%s'; there are %s"
                                % (name, ", ".join(self._context.pipelines)))
         return self._context.pipelines[name]
 
-    def _planner(self, request, pipe):
+    def _planner(self, request: MotionPlanRequest, pipe: Pipeline) -> PathPlanner:
         """The planner that a request names; what is to be said of it is said once."""
         asked = request.planner_id or pipe.default_planner(request.group_name)
         planner, remarks = planner_of(kind_of(asked, pipe.planners),
@@ -176,12 +192,12 @@ class Planner:
         return planner
 
 
-def _scaling(factor):
+def _scaling(factor: float) -> float:
     """A scaling factor as MoveIt takes it: 1 for what is not above 0 or above 1."""
     return factor if math.isfinite(factor) and 0.0 < factor <= 1.0 else 1.0
 
 
-def scene_with_diff(context, scene, diff, request, keep_robot):
+def scene_with_diff(context: Context, scene: Scene, diff: PlanningScene, request: str, keep_robot: bool) -> Scene:
     """Return ``scene`` with a request's planning_scene_diff applied; ``keep_robot``: without its robot state.
 
     Raises RequestError for a diff that cannot be applied as a whole.
@@ -195,7 +211,7 @@ def scene_with_diff(context, scene, diff, request, keep_robot):
     return changed.with_state(replace(changed.state, q=before.q, base=before.base)) if keep_robot else changed
 
 
-def _as_diff(message):
+def _as_diff(message: PlanningScene) -> PlanningScene:
     message.is_diff = True
     message.robot_state.is_diff = True
     return message

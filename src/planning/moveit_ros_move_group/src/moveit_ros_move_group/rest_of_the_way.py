@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether what is left of a running trajectory is still free, and another way where it is not."""
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import rospy
 from moveit_msgs.msg import RobotTrajectory
@@ -10,6 +14,12 @@ from motion_planning.planners import first_touching
 from motion_planning.replanning import Running
 from motion_planning.timing import Timed
 from moveit_ros_move_group.convert.scene_out import trajectory_message
+
+if TYPE_CHECKING:
+    from motion_planning.exact import Contact, ExactChecker
+    from motion_planning.model import Group
+    from motion_planning.replanning import Redirection
+    from motion_planning.scene import Scene
 
 # Greatest distance between two checked states [rad or m, in any joint].
 _APART = 0.05
@@ -32,17 +42,19 @@ class NewWay:
 class RestOfTheWay:
     """Looks whether a change of the scene stands in what is left of a trajectory. contacts: of the last look."""
 
-    def __init__(self, exact, group, timed, changed_scene, onward=None, began=lambda: None):
+    def __init__(self, exact: ExactChecker, group: Group, timed: Timed, changed_scene: Callable[[], Scene | None],
+                 onward: Callable[[Scene, Running], Redirection] | None = None,
+                 began: Callable[[], float | None] = lambda: None) -> None:
         """exact: ExactChecker; group: Group; timed: timing.Timed of its joints. changed_scene(): the Scene if it has
         changed since it was last asked for, else None. onward(scene, replanning.Running): a replanning.Redirection;
         raises PlanningError; None: there is no other way. began(): ROS time [s] at which the controller says that the
         trajectory began, None if it does not."""
         self._exact, self._group, self._timed = exact, group, timed
         self._changed_scene, self._onward, self._began = changed_scene, onward, began
-        self._begin = None
-        self.contacts = []
+        self._begin: float | None = None
+        self.contacts: list[Contact] = []
 
-    def hit(self):
+    def hit(self) -> str | NewWay | None:
         """None, the sentence what is in the way, or a NewWay around it. The first call is when the trajectory
         begins."""
         now = rospy.get_time()
@@ -63,7 +75,7 @@ class RestOfTheWay:
         reason = "in the way of what is left: %s" % self.contacts[0] if self.contacts else "something is in the way"
         return reason if self._onward is None else self._around(scene, float(times[first]), reason)
 
-    def _around(self, scene, blocked_from, reason):
+    def _around(self, scene: Scene, blocked_from: float, reason: str) -> str | NewWay:
         try:
             found = self._onward(scene, Running(self._timed, rospy.get_time() - self._begin, blocked_from))
         except PlanningError as error:

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that controller managers list, in the place of a controller_list."""
+from __future__ import annotations
+
 import threading
 import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
 from controller_manager_msgs.srv import ListControllers
 
 from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, Controller, ControllerError
+
+if TYPE_CHECKING:
+    from controller_manager_msgs.msg import ControllerState
 
 # Value of ~moveit_controller_manager: whether all controller managers count, or the one in ~ros_control_namespace.
 PLUGINS = {"moveit_ros_control_interface::MoveItControllerManager": False,
@@ -20,7 +27,7 @@ _KINDS = {"JointTrajectoryController": (FOLLOW, "follow_joint_trajectory"),
           "GripperActionController": (GRIPPER, "gripper_cmd")}
 
 
-def running(namespace, states):
+def running(namespace: str, states: Iterable[ControllerState]) -> list[Controller]:
     """Return the Controllers of those controller_manager_msgs/ControllerState that run and serve a known action.
 
     namespace: that of their controller manager, with a slash at its end.
@@ -39,8 +46,10 @@ def running(namespace, states):
 class RosControl:
     """Asks controller managers each time for what they have: controllers come and go."""
 
-    def __init__(self, namespace, listed=(), list_controllers=None, service_names=None, warn=rospy.logwarn,
-                 answer_s=ANSWER_S):
+    def __init__(self, namespace: str | None, listed: Iterable[Controller] = (),
+                 list_controllers: Callable[[str], Sequence[ControllerState]] | None = None,
+                 service_names: Callable[[], Sequence[str]] | None = None,
+                 warn: Callable[[str], object] = rospy.logwarn, answer_s: float = ANSWER_S) -> None:
         """namespace: of one controller manager, or None for all; listed: Controllers of the controller_list, taken
         where no manager has one of that action. list_controllers(service): states; service_names(): those of
         the master; warn(format, *values): for managers that do not answer beside others that do."""
@@ -49,7 +58,7 @@ class RosControl:
         self._service_names = service_names or _service_names
         self._warn, self._answer_s = warn, answer_s
 
-    def __call__(self):
+    def __call__(self) -> list[Controller]:
         """Return the present Controllers; raise ControllerError, which names the services, if no manager answers."""
         services = self._services()
         answers, failures = self._ask(services)
@@ -64,16 +73,16 @@ class RosControl:
         actions = {controller.action for controller in found}
         return found + [controller for controller in self._listed if _absolute(controller.action) not in actions]
 
-    def _services(self):
+    def _services(self) -> list[str]:
         if self._namespace is not None:
             return [_absolute(self._namespace.rstrip("/") + "/" + _SERVICE)]
         return sorted(name for name in self._service_names() if name.endswith("/" + _SERVICE))
 
-    def _ask(self, services):
+    def _ask(self, services: Sequence[str]) -> tuple[dict[str, Sequence[ControllerState]], dict[str, Exception]]:
         """({service: states}, {service: why it failed}); a service that does not answer in time is in neither."""
         answers, failures = {}, {}
 
-        def ask(service):
+        def ask(service: str) -> None:
             try:
                 answers[service] = self._list_controllers(service)
             except (rospy.ServiceException, rospy.ROSException, OSError) as error:
@@ -90,13 +99,13 @@ class RosControl:
         return dict(answers), dict(failures)
 
 
-def _absolute(name):
+def _absolute(name: str) -> str:
     return name if name.startswith("/") else "/" + name
 
 
-def _list_controllers(service):
+def _list_controllers(service: str) -> Sequence[ControllerState]:
     return rospy.ServiceProxy(service, ListControllers)().controller
 
 
-def _service_names():
+def _service_names() -> list[str]:
     return [name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]]

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Depth cameras whose clouds become the scene's octomap."""
+from __future__ import annotations
+
 import collections
 import math
 import threading
 import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -18,6 +22,13 @@ from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
 from urdf_model import read_file
+
+if TYPE_CHECKING:
+    from moveit_msgs.srv import LoadMapRequest, SaveMapRequest
+
+    from motion_planning.scene import Octree, Scene, WorldObject
+    from motion_planning.spheres import SphereModel
+    from moveit_ros_move_group.monitor import SceneMonitor
 
 # Defaults [m]: size of cells, and range of a sensor.
 _RESOLUTION_M, _MAX_RANGE_M = 0.1, 5.0
@@ -50,7 +61,7 @@ class SensorSettings:
     far: float
 
 
-def read_settings(entries):
+def read_settings(entries: object) -> tuple[list[SensorSettings], list[str]]:
     """Return (list of SensorSettings of ``~sensors``, list of complaints)."""
     found, complaints = [], []
     for number, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -65,7 +76,7 @@ def read_settings(entries):
                               % (number + 1, entry.get("sensor_plugin", "")))
             continue
 
-        def number_of(key, usual, entry=entry):
+        def number_of(key: str, usual: float, entry: Mapping[str, Any] = entry) -> float:
             value = entry.get(key, usual)
             good = isinstance(value, (int, float)) and math.isfinite(value) and value >= 0.0
             if not good:
@@ -85,11 +96,11 @@ def read_settings(entries):
 class _Past:
     """Where the robot was: joint states of the last seconds."""
 
-    def __init__(self, monitor):
+    def __init__(self, monitor: SceneMonitor) -> None:
         self._monitor, self._states = monitor, collections.deque(maxlen=_STATES)
         self._subscriber = rospy.Subscriber(monitor.joint_state_topic, JointState, self._states.append, queue_size=25)
 
-    def scene(self, stamp):
+    def scene(self, stamp: rospy.Time) -> Scene:
         """The monitor's Scene with each joint where it was next to ``stamp`` (rospy.Time)."""
         scene = self._monitor.scene()
         model, time_s = scene.model, stamp.to_sec()
@@ -111,7 +122,7 @@ class Sensors:
     ``~display_octomap``, for rviz to draw as boxes. ``~save_map`` and ``~load_map`` write and read files of octomap.
     """
 
-    def __init__(self, monitor, spheres):
+    def __init__(self, monitor: SceneMonitor, spheres: SphereModel) -> None:
         """monitor: SceneMonitor; spheres: SphereModel of the robot."""
         settings, complaints = read_settings(rospy.get_param("~sensors", []))
         for text in complaints:
@@ -136,7 +147,7 @@ class Sensors:
         rospy.loginfo("octomap: cells of %g m in '%s' from %s", self._map.resolution, self._frame,
                       ", ".join(one.topic for one in settings))
 
-    def _see(self, points, header, settings):
+    def _see(self, points: np.ndarray, header: Header, settings: SensorSettings) -> np.ndarray:
         """Enter points (n, 3) of a sensor; return (n,) bool: those that are not the robot. Raises PlanningError."""
         scene = self._past.scene(header.stamp)
         sensor, frame = (self._pose(name, scene, header.stamp) for name in (header.frame_id.lstrip("/"), self._frame))
@@ -152,7 +163,7 @@ class Sensors:
         return outside
 
     @staticmethod
-    def _kind_of_map(settings):
+    def _kind_of_map(settings: Sequence[SensorSettings]) -> type[OccupancyMap]:
         alone = [one.topic for one in settings if one.kind == CLOUDS_ALONE]
         if alone and len(alone) < len(settings):
             rospy.logwarn("sensors: %s enter the octomap as the others do, since only one map is kept; %s counts where "
@@ -160,11 +171,11 @@ class Sensors:
             return OccupancyMap
         return CloudMap if alone else OccupancyMap
 
-    def _pose(self, name, scene, stamp):
+    def _pose(self, name: str, scene: Scene, stamp: rospy.Time) -> np.ndarray:
         """The pose (4, 4) of a frame in the planning frame. Raises PlanningError."""
         return scene.frame(name) if scene.has_frame(name) else self._monitor.tf_frame(name, stamp)
 
-    def _save(self, request):
+    def _save(self, request: SaveMapRequest) -> SaveMapResponse:
         with self._lock:
             content = file_of(self._map.octree(), self._map.resolution)
         try:
@@ -174,7 +185,7 @@ class Sensors:
             return SaveMapResponse(False)
         return SaveMapResponse(True)
 
-    def _load(self, request):
+    def _load(self, request: LoadMapRequest) -> LoadMapResponse:
         """The cubes of the file take the place of those of the map, in ``~octomap_frame``."""
         try:
             octree = octree_of_file(read_file(request.filename, _LONGEST_FILE))
@@ -189,25 +200,26 @@ class Sensors:
             return LoadMapResponse(False)
         return LoadMapResponse(True)
 
-    def _clear(self):
+    def _clear(self) -> None:
         with self._lock:
             self._map.clear()
             self._octree = None
             self._show(rospy.Time.now())
 
-    def _show(self, stamp):
+    def _show(self, stamp: rospy.Time) -> None:
         centres = np.empty((0, 3)) if self._octree is None else self._octree.boxes[:, :3]
         self._display.publish(cloud_of(centres, Header(stamp=stamp, frame_id=self._frame)))
 
 
-def _shape_of(octomap):
+def _shape_of(octomap: WorldObject | None) -> Octree | None:
     return None if octomap is None else octomap.shapes[0][0]
 
 
 class _Source:
     """A sensor's topic. The newest message counts; a separate thread hands its points on."""
 
-    def __init__(self, settings, see):
+    def __init__(self, settings: SensorSettings,
+                 see: Callable[[np.ndarray, Header, SensorSettings], np.ndarray]) -> None:
         """see(points, header, settings) -> (n,) bool: points that are not the robot."""
         self._settings, self._see = settings, see
         self._message, self._info, self._news = None, None, threading.Condition()
@@ -223,15 +235,15 @@ class _Source:
                                                   buff_size=_BUFFER))
         threading.Thread(target=self._run, daemon=True).start()
 
-    def _on_info(self, message):
+    def _on_info(self, message: CameraInfo) -> None:
         self._info = message
 
-    def _on_message(self, message):
+    def _on_message(self, message: PointCloud2 | Image) -> None:
         with self._news:
             self._message = message
             self._news.notify()
 
-    def _run(self):
+    def _run(self) -> None:
         while not rospy.is_shutdown():
             with self._news:
                 if self._message is None:
@@ -251,7 +263,7 @@ class _Source:
             if self._settings.rate > 0.0:
                 time.sleep(max(0.0, 1.0 / self._settings.rate - (time.monotonic() - begin)))
 
-    def _enter(self, message):
+    def _enter(self, message: PointCloud2 | Image) -> None:
         settings = self._settings
         if settings.kind == "DepthImageOctomapUpdater":
             if self._info is None:

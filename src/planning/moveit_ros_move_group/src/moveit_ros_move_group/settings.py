@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings that move_group reads from the parameter server."""
+from __future__ import annotations
+
 import math
 import re
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import rospy
 
@@ -11,6 +15,11 @@ from motion_planning.industrial import PLANNERS as INDUSTRIAL_PLANNERS
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings
 from moveit_ros_move_group.ros_control import PLUGINS, RosControl
+
+if TYPE_CHECKING:
+    from motion_planning.model import PlanningModel
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.controllers import Controller
 
 DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupCartesianPathService", "move_group/MoveGroupKinematicsService",
@@ -41,29 +50,29 @@ class Pipeline:
     if neither request nor group names one."""
 
     name: str
-    planners: dict = field(default_factory=dict)
-    groups: dict = field(default_factory=dict)
+    planners: dict[str, dict[str, str]] = field(default_factory=dict)
+    groups: dict[str, dict[str, Any]] = field(default_factory=dict)
     timing: str = "ruckig"
     start_bounds_error: float = 0.05
     jiggle: float = 0.02
     industrial: bool = False
     usual: str = ""
 
-    def planner_ids(self):
+    def planner_ids(self) -> list[str]:
         """Names as query_planner_interface gives them: ``group[planner]`` and plain."""
         ids = ["%s[%s]" % (group, planner) for group, entry in self.groups.items()
                for planner in entry.get("planner_configs") or [] if planner in self.planners]
         return list(dict.fromkeys([*ids, *self.planners]))
 
-    def settings(self, group, planner):
+    def settings(self, group: str, planner: str) -> dict[str, str]:
         """Return {key: text} of a planner's configuration, with what was set for the group alone in place."""
         return {**self.planners.get(planner, {}), **self.planners.get("%s[%s]" % (group, planner), {})}
 
-    def default_planner(self, group):
+    def default_planner(self, group: str) -> str:
         return str(self.groups.get(group, {}).get("default_planner_config") or self.usual)
 
 
-def pipelines(groups):
+def pipelines(groups: Collection[str]) -> tuple[dict[str, Pipeline], str, list[str]]:
     """Return ({name: Pipeline}, the default one's name, list of complaints); ``groups``: names of the model's."""
     named, complaints = rospy.get_param("~planning_pipelines", {}), []
     found = {}
@@ -88,7 +97,7 @@ def pipelines(groups):
     return found, usual, complaints
 
 
-def _pipeline(name, tree, groups):
+def _pipeline(name: str, tree: Mapping[str, Any], groups: Collection[str]) -> Pipeline:
     pipeline = Pipeline(name)
     if str(tree.get("planning_plugin", "")).startswith(_INDUSTRIAL):
         pipeline.industrial, pipeline.usual = True, str(tree.get("default_planner_config", ""))
@@ -106,14 +115,14 @@ def _pipeline(name, tree, groups):
     return pipeline
 
 
-def described_scene(scene, planning):
+def described_scene(scene: Scene, planning: Mapping[str, Any]) -> tuple[Scene, list[str]]:
     """Return (Scene, list of complaints): ``scene`` with what ``robot_description_planning`` says of collisions.
 
     ``planning``: its mapping. Padding and scale of all links and of single ones; pairs that may touch or may not.
     """
     complaints = []
 
-    def of_links(what, usual):
+    def of_links(what: str, usual: float) -> dict[str, float]:
         usual = _number(planning.get("default_robot_" + what), usual)
         named = planning.get("default_robot_link_" + what)
         return {**dict.fromkeys(scene.model.links, usual), **(named if isinstance(named, dict) else {})}
@@ -134,7 +143,7 @@ def described_scene(scene, planning):
     return scene.with_allowed(scene.allowed.with_entries(pairs)) if pairs else scene, complaints
 
 
-def execution_settings():
+def execution_settings() -> ExecutionSettings:
     """Return the ExecutionSettings of ``~trajectory_execution``."""
     tree = rospy.get_param("~trajectory_execution", {})
     usual = ExecutionSettings()
@@ -153,22 +162,22 @@ def execution_settings():
 class _Tolerances(dict):
     """Tolerances of some joints, and one for all others."""
 
-    def __init__(self, usual, by_joint):
+    def __init__(self, usual: float, by_joint: Mapping[str, float]) -> None:
         super().__init__(by_joint)
         self._usual = usual
 
-    def get(self, name, default=None):
+    def get(self, name: str, default: float | None = None) -> float:
         return super().get(name, self._usual)
 
 
-def controllers():
+def controllers() -> tuple[list[Controller], list[str]]:
     """Return (list of Controllers, list of complaints) of ``~controller_list``."""
     fake = rospy.get_param("~moveit_controller_manager", "") == _FAKE
     entries = rospy.get_param("~controller_list", [])
     return read_list(entries, fake)
 
 
-def controllers_at_present(listed):
+def controllers_at_present(listed: list[Controller]) -> Callable[[], list[Controller]]:
     """Return a function that returns the list of Controllers: ``listed``, or what controller managers have by then."""
     manager = rospy.get_param("~moveit_controller_manager", "")
     if manager not in PLUGINS:
@@ -177,7 +186,7 @@ def controllers_at_present(listed):
     return RosControl(namespace, listed)
 
 
-def initial_positions(model):
+def initial_positions(model: PlanningModel) -> dict[str, float]:
     """Return {joint: value} of the group states that ``~initial`` names, as fake controllers begin with them."""
     found = {}
     entries = rospy.get_param("~initial", [])
@@ -188,7 +197,7 @@ def initial_positions(model):
     return found
 
 
-def capabilities():
+def capabilities() -> tuple[set[str], list[str]]:
     """Return (set of the capabilities that are wanted, list of complaints)."""
     wanted = set(DEFAULT_CAPABILITIES) | set(str(rospy.get_param("~capabilities", "")).split())
     named = rospy.get_param("~planning_pipelines", {})
@@ -199,5 +208,5 @@ def capabilities():
     return wanted, ["there is no capability '%s'; it is left out" % name for name in unknown]
 
 
-def _number(value, usual):
+def _number(value: object, usual: float) -> float:
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else usual

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Result texts, as clients of MoveIt compare them."""
+from __future__ import annotations
+
 from moveit_msgs.msg import MoveItErrorCodes
 
 # Field and class share names; only the constants are of interest.
@@ -8,13 +10,13 @@ _NAMES = {value: name for name, value in vars(MoveItErrorCodes).items() if isins
 _LONGEST = 1000
 
 
-def one_line(text):
+def one_line(text: str) -> str:
     """Return ``text`` in one line, its end left out where it is too long for one."""
     text = " ".join(text.split())
     return text if len(text) <= _LONGEST else "%s ... (%d characters in all)" % (text[:_LONGEST], len(text))
 
 
-def result_text(code, reason="", *, empty=False, plan_only=False):
+def result_text(code: int, reason: str = "", *, empty: bool = False, plan_only: bool = False) -> str:
     """Return the text of an action's result; ``empty``: nothing had to be moved, or no plan was found.
 
     If MoveIt returns only a code, the ``reason`` is added to it.

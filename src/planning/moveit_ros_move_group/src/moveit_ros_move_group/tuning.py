@@ -1,21 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Settings that dynamic_reconfigure's clients may change while the node runs, under MoveIt's names."""
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
 import rospy
 
 from loop_ros.reconfigure import Setting, SettingsServer
+
+if TYPE_CHECKING:
+    from moveit_ros_move_group.capabilities.motion import MoveAction
+    from moveit_ros_move_group.execution import ExecutionSettings, Executor
+    from moveit_ros_move_group.monitor import SceneMonitor
 
 
 class _RosTopics:
     """Publishers and services of a plain node, as SettingsServer asks for them."""
 
-    def publisher(self, topic, msg_class, latch=False):
+    def publisher(self, topic: str, msg_class: type[rospy.Message], latch: bool = False) -> rospy.Publisher:
         return rospy.Publisher(topic, msg_class, latch=latch, queue_size=10)
 
-    def service(self, name, service_class, handler):
+    def service(self, name: str, service_class: type, handler: Callable[[Any], Any]) -> rospy.Service:
         return rospy.Service(name, service_class, handler)
 
 
-def servers(executor, monitor, move_action):
+def servers(executor: Executor | None, monitor: SceneMonitor, move_action: MoveAction | None) -> list[SettingsServer]:
     """Return the SettingsServers of ``~trajectory_execution``, ``~planning_scene_monitor`` and ``~plan_execution``.
 
     executor: execution.Executor; move_action: motion.MoveAction; no server of one that is None. monitor: SceneMonitor.
@@ -31,8 +41,8 @@ def servers(executor, monitor, move_action):
     return made
 
 
-def _of_execution(topics, settings):
-    def apply(values):
+def _of_execution(topics: _RosTopics, settings: ExecutionSettings) -> SettingsServer:
+    def apply(values: Mapping[str, Any]) -> None:
         settings.monitored = values["execution_duration_monitoring"]
         settings.scaling = values["allowed_execution_duration_scaling"]
         settings.margin = values["allowed_goal_duration_margin"]
@@ -52,8 +62,8 @@ def _of_execution(topics, settings):
     return server
 
 
-def _of_monitor(topics, monitor):
-    def apply(values):
+def _of_monitor(topics: _RosTopics, monitor: SceneMonitor) -> SettingsServer:
+    def apply(values: Mapping[str, Any]) -> None:
         monitor.publishes, monitor.publishes_states, monitor.hz = (
             values["publish_planning_scene"], values["publish_state_updates"], values["publish_planning_scene_hz"])
 

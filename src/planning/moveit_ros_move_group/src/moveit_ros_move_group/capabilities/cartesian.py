@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """compute_cartesian_path."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes
@@ -14,16 +19,24 @@ from moveit_ros_move_group.convert.constraints import constraint_set_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
 
+if TYPE_CHECKING:
+    from moveit_msgs.srv import GetCartesianPathRequest
+
+    from motion_planning.model import Group, PlanningModel, State
+    from motion_planning.scene import Scene
+    from motion_planning.timing import Timed
+    from moveit_ros_move_group.context import Context
+
 
 class CartesianPath:
     """A fraction below 1 is not an error; the reason why the path ends there is published as a failure."""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("compute_cartesian_path", GetCartesianPath, self._serve)
 
     @answered("compute_cartesian_path", GetCartesianPathResponse)
-    def _serve(self, request, response):
+    def _serve(self, request: GetCartesianPathRequest, response: GetCartesianPathResponse) -> None:
         context, model = self.context, self.context.model
         group = context.group(request.group_name)
         scene = context.scene_from(request.start_state, "compute_cartesian_path")
@@ -52,13 +65,13 @@ class CartesianPath:
             context.failures.tell("compute_cartesian_path", MoveItErrorCodes.SUCCESS,
                                   "the path ends at fraction %.3f: %s" % (path.fraction, path.reason), group.name)
 
-    def _frame(self, request, scene, link):
+    def _frame(self, request: GetCartesianPathRequest, scene: Scene, link: str) -> np.ndarray:
         """The frame (4, 4) of the waypoints: the header's; where that is the link itself, as it is at the start."""
         if link not in self.context.model.link_index and not scene.has_frame(link):
             raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "the robot has no link '%s'" % link)
         return self.context.frame(scene, request.header.frame_id)
 
-    def _rigid_link(self, scene, link, waypoints):
+    def _rigid_link(self, scene: Scene, link: str, waypoints: list[np.ndarray]) -> str:
         """A link of the robot for one that may be an object it holds; the waypoints are changed to fit."""
         if link in self.context.model.link_index:
             return link
@@ -69,7 +82,8 @@ class CartesianPath:
         waypoints[:] = [waypoint @ np.linalg.inv(within) for waypoint in waypoints]
         return link
 
-    def _acceptance(self, request, scene, group):
+    def _acceptance(self, request: GetCartesianPathRequest, scene: Scene,
+                    group: Group) -> Callable[[np.ndarray], str | None] | None:
         remarks = []
         constraints = constraint_set_of(request.path_constraints, scene, self.context.monitor.reader, remarks)
         self.context.remark("compute_cartesian_path", remarks, group.name)
@@ -77,7 +91,7 @@ class CartesianPath:
         if not request.avoid_collisions and constraints is None:
             return None
 
-        def accept(q):
+        def accept(q: np.ndarray) -> str | None:
             state = scene.state.with_q(q, group.indices)
             if request.avoid_collisions and not exact.free(scene, state, group.name):
                 return "; ".join(map(str, exact.contacts(scene, state, group.name, 3)))
@@ -86,7 +100,7 @@ class CartesianPath:
         return accept
 
 
-def slowed(model, state, group, link, timed, speed):
+def slowed(model: PlanningModel, state: State, group: Group, link: str, timed: Timed, speed: float) -> Timed:
     """Return ``timed``, stretched so that the origin of ``link`` is nowhere faster than ``speed`` [m/s].
 
     Raises RequestError if that would exceed the longest duration of a motion.

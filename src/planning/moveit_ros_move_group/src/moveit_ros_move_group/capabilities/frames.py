@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -13,11 +13,14 @@ from tf2_msgs.msg import TFMessage
 
 from moveit_ros_move_group.convert.geometry import transform_of
 
+if TYPE_CHECKING:
+    from motion_planning.scene import Scene
+
 # Rate of publishing [Hz], unless ~planning_scene_frame_publishing_rate says another.
 _USUAL_HZ = 10.0
 
 
-def scene_frames(scene: Any, prefix: str, stamp: rospy.Time) -> list[TransformStamped]:
+def scene_frames(scene: Scene, prefix: str, stamp: rospy.Time) -> list[TransformStamped]:
     """The frames of a Scene's objects, those that the robot holds in their links, and of all their subframes."""
     things = [(thing, scene.model.frame) for thing in scene.objects.values()]
     things += [(body.object, body.link) for body in scene.state.attached.values()]

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """compute_ik and compute_fk."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPositionFK, GetPositionFKResponse, GetPositionIK, GetPositionIKResponse
@@ -14,6 +20,14 @@ from moveit_ros_move_group.convert.geometry import matrix_of, stamped
 from moveit_ros_move_group.convert.scene_out import state_message
 from urdf_model.transforms import inverse
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import PositionIKRequest
+    from moveit_msgs.srv import GetPositionFKRequest, GetPositionIKRequest
+
+    from motion_planning.model import Group
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.context import Context
+
 # [s], for a request without a time-out.
 _TIMEOUT_S = 0.05
 # [s], upper bound of a request's time limit if all solutions are refused: a service cannot be cancelled.
@@ -23,13 +37,13 @@ _LONGEST_S = 5.0
 class Kinematics:
     """Both services. timeouts: {group: kinematics_solver_timeout [s]}."""
 
-    def __init__(self, context, timeouts):
+    def __init__(self, context: Context, timeouts: Mapping[str, float]) -> None:
         self.context, self._timeouts = context, timeouts
         self._services = [rospy.Service("compute_ik", GetPositionIK, self._ik),
                           rospy.Service("compute_fk", GetPositionFK, self._fk)]
 
     @answered("compute_ik", GetPositionIKResponse)
-    def _ik(self, request, response):
+    def _ik(self, request: GetPositionIKRequest, response: GetPositionIKResponse) -> None:
         request, context = request.ik_request, self.context
         group = context.group(request.group_name)
         scene = context.scene_from(request.robot_state, "compute_ik")
@@ -40,7 +54,7 @@ class Kinematics:
         constraints = constraint_set_of(request.constraints, scene, context.monitor.reader, remarks)
         context.remark("compute_ik", remarks, group.name)
 
-        def accept(q):
+        def accept(q: np.ndarray) -> str | None:
             state = scene.state.with_q(q)
             if request.avoid_collisions and not context.exact.free(scene, state, group.name):
                 touching[:] = context.exact.contacts(scene, state, group.name)
@@ -53,7 +67,7 @@ class Kinematics:
             raise RequestError(MoveItErrorCodes.NO_IK_SOLUTION, str(error), touching) from None
         response.solution = state_message(context.model, scene.state.with_q(q), rospy.Time.now(), attached=False)
 
-    def _poses(self, request, group, scene):
+    def _poses(self, request: PositionIKRequest, group: Group, scene: Scene) -> dict[str, np.ndarray]:
         """{link: pose (4, 4) in the planning frame} that a PositionIKRequest asks for."""
         if request.pose_stamped_vector:
             links, poses = list(request.ik_link_names), request.pose_stamped_vector
@@ -78,7 +92,7 @@ class Kinematics:
         return found
 
     @answered("compute_fk", GetPositionFKResponse)
-    def _fk(self, request, response):
+    def _fk(self, request: GetPositionFKRequest, response: GetPositionFKResponse) -> None:
         context, model = self.context, self.context.model
         scene = context.scene_from(request.robot_state, "compute_fk")
         frame = request.header.frame_id.lstrip("/") or model.frame

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """plan_kinematic_path, and the actions move_group and execute_trajectory."""
+from __future__ import annotations
+
 import threading
 import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rospy
@@ -25,6 +29,24 @@ from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import (
+        ExecuteTrajectoryGoal,
+        MotionPlanRequest,
+        MoveGroupGoal,
+        PlanningOptions,
+        RobotTrajectory,
+    )
+    from moveit_msgs.srv import ExecuteKnownTrajectoryRequest, GetMotionPlanRequest
+
+    from motion_planning.model import Group
+    from motion_planning.pipeline import Plan
+    from motion_planning.replanning import Redirection, Running
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.context import Context
+    from moveit_ros_move_group.execution import Executor
+    from moveit_ros_move_group.planning import Planner
+
 # Time limit [s] for a joint state newer than the goal.
 _STATE_TIMEOUT_S = 1.0
 # Number of replanning attempts if neither the goal nor a parameter sets it.
@@ -34,11 +56,11 @@ _REPLAN_ATTEMPTS = 5
 class PlanService:
     """``plan_kinematic_path``"""
 
-    def __init__(self, context, planner):
+    def __init__(self, context: Context, planner: Planner) -> None:
         self.context, self._planner = context, planner
         self._service = rospy.Service("plan_kinematic_path", GetMotionPlan, self._serve)
 
-    def _serve(self, request):
+    def _serve(self, request: GetMotionPlanRequest) -> GetMotionPlanResponse:
         response = MotionPlanResponse()
         request = request.motion_plan_request
         response.group_name = request.group_name
@@ -59,7 +81,7 @@ class PlanService:
 class MoveAction:
     """The action ``move_group``: plan, or plan and execute. replan_attempts: where a goal does not say how many."""
 
-    def __init__(self, context, planner, may_execute):
+    def __init__(self, context: Context, planner: Planner, may_execute: bool) -> None:
         self.context, self._planner, self._may_execute = context, planner, may_execute
         self.replan_attempts = rospy.get_param("~plan_execution/max_replan_attempts", _REPLAN_ATTEMPTS)
         self._changed = threading.Event()
@@ -67,7 +89,7 @@ class MoveAction:
         self._server = actionlib.SimpleActionServer("move_group", MoveGroupAction, self._run, auto_start=False)
         self._server.start()
 
-    def _run(self, goal):
+    def _run(self, goal: MoveGroupGoal) -> None:
         result = MoveGroupResult()
         group = goal.request.group_name
         plan_only = goal.planning_options.plan_only or not self._may_execute or self.context.executor is None
@@ -89,7 +111,7 @@ class MoveAction:
         finish(self._server, result, result_text(code, reason, empty=empty and not (
             plan_only and code == MoveItErrorCodes.SUCCESS), plan_only=plan_only))
 
-    def _wait_for_state(self, group):
+    def _wait_for_state(self, group: str) -> None:
         joints = self.context.model.groups[group].joints
         late = self.context.monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, joints,
                                                    self._server.is_preempt_requested)
@@ -98,7 +120,7 @@ class MoveAction:
         if late:
             rospy.logwarn("move_group: %s", late)
 
-    def _plan_only(self, goal, result):
+    def _plan_only(self, goal: MoveGroupGoal, result: MoveGroupResult) -> str:
         context, options = self.context, goal.planning_options
         scene = context.scene_from(goal.request.start_state, "move_group")
         scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=False)
@@ -106,16 +128,17 @@ class MoveAction:
         result.error_code.val = MoveItErrorCodes.SUCCESS
         return "; ".join(plan.remarks)
 
-    def _plan(self, request, scene, result):
+    def _plan(self, request: MotionPlanRequest, scene: Scene, result: MoveGroupResult) -> Plan:
         result.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())
         plan = self._planner.plan(request, scene, self._server.is_preempt_requested)
         result.planned_trajectory = show(self.context, request.group_name, plan)
         result.planning_time = plan.planning_time
         return plan
 
-    def _plan_and_execute(self, goal, result):
+    def _plan_and_execute(self, goal: MoveGroupGoal, result: MoveGroupResult) -> str:
         """Fill the result; return the reason if it fails, else what was planned otherwise than asked."""
         context, options, request = self.context, goal.planning_options, goal.request
+        executor = context.require_executor()
         if request.start_state.joint_state.name and not request.start_state.is_diff:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
         group = context.model.groups[request.group_name]
@@ -132,8 +155,8 @@ class MoveAction:
             self._feedback("MONITOR")
             watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options),
                                  self._onward(request, left, result) if options.replan else None,
-                                 context.executor.began)
-            outcome = context.executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
+                                 executor.began)
+            outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
             again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
@@ -147,9 +170,9 @@ class MoveAction:
                                   outcome.joints)
         return "; ".join(plan.remarks) if outcome.code == MoveItErrorCodes.SUCCESS else outcome.text
 
-    def _scene_after_change(self, options):
+    def _scene_after_change(self, options: PlanningOptions) -> Callable[[], Scene | None]:
         """A function that returns the scene if it has changed since the last call, else None."""
-        def changed():
+        def changed() -> Scene | None:
             if not self._changed.is_set():
                 return None
             self._changed.clear()
@@ -158,9 +181,10 @@ class MoveAction:
 
         return changed
 
-    def _onward(self, request, left, result):
+    def _onward(self, request: MotionPlanRequest, left: _Attempts,
+                result: MoveGroupResult) -> Callable[[Scene, Running], Redirection]:
         """A function that finds another way for joints that move, as RestOfTheWay asks for it."""
-        def onward(scene, running):
+        def onward(scene: Scene, running: Running) -> Redirection:
             if not left.take():
                 raise RequestError(MoveItErrorCodes.FAILURE, "all attempts to plan again are used up")
             begin = time.monotonic()
@@ -174,12 +198,12 @@ class MoveAction:
 
         return onward
 
-    def _pause(self, seconds):
+    def _pause(self, seconds: float) -> None:
         end = time.monotonic() + max(0.0, min(seconds, 60.0))
         while time.monotonic() < end and not self._server.is_preempt_requested() and not rospy.is_shutdown():
             time.sleep(0.01)
 
-    def _feedback(self, state):
+    def _feedback(self, state: str) -> None:
         if self._server.is_active():
             self._server.publish_feedback(MoveGroupFeedback(state))
 
@@ -187,10 +211,10 @@ class MoveAction:
 class _Attempts:
     """How often may still be planned again, moving or not."""
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         self._left = count
 
-    def take(self):
+    def take(self) -> bool:
         """Whether there was one more, which is used then."""
         self._left -= 1
         return self._left >= 0
@@ -199,22 +223,21 @@ class _Attempts:
 class ExecuteAction:
     """The action ``execute_trajectory``."""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._server = actionlib.SimpleActionServer("execute_trajectory", ExecuteTrajectoryAction, self._run,
                                                     auto_start=False)
         self._server.start()
 
-    def _run(self, goal):
+    def _run(self, goal: ExecuteTrajectoryGoal) -> None:
         result, reason = ExecuteTrajectoryResult(), ""
         try:
-            if self.context.executor is None:
-                raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "~allow_trajectory_execution is false")
+            executor = self.context.require_executor()
             if not (goal.trajectory.joint_trajectory.points or goal.trajectory.multi_dof_joint_trajectory.points):
                 raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "the trajectory to execute has no points; was it "
                                    "planned with success?")
             self._server.publish_feedback(ExecuteTrajectoryFeedback("MONITOR"))
-            outcome = self.context.executor.execute(goal.trajectory, self._server.is_preempt_requested)
+            outcome = executor.execute(goal.trajectory, self._server.is_preempt_requested)
             result.error_code.val, reason = outcome.code, outcome.text
             if outcome.code != MoveItErrorCodes.SUCCESS:
                 self.context.failures.tell("execute_trajectory", outcome.code, outcome.text, joints=outcome.joints)
@@ -227,22 +250,21 @@ class ExecuteAction:
 class ExecuteService:
     """``execute_kinematic_path``, which old clients look for."""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("execute_kinematic_path", ExecuteKnownTrajectory, self._serve)
 
     @answered("execute_kinematic_path", ExecuteKnownTrajectoryResponse)
-    def _serve(self, request, response):
-        if self.context.executor is None:
-            raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "~allow_trajectory_execution is false")
+    def _serve(self, request: ExecuteKnownTrajectoryRequest, response: ExecuteKnownTrajectoryResponse) -> None:
+        self.context.require_executor()
         if request.wait_for_execution:
             response.error_code.val = self._execute(request.trajectory)
         else:
             threading.Thread(target=self._execute, args=(request.trajectory,), daemon=True).start()
 
-    def _execute(self, trajectory):
+    def _execute(self, trajectory: RobotTrajectory) -> int:
         try:
-            outcome = self.context.executor.execute(trajectory)
+            outcome = self.context.require_executor().execute(trajectory)
         except Exception as error:  # the caller may have ended, so the node logs it
             return failed(self.context, "execute_kinematic_path", error)[0]
         if outcome.code != MoveItErrorCodes.SUCCESS:
@@ -253,18 +275,18 @@ class ExecuteService:
 class StopEvent:
     """The topic ``trajectory_execution_event``: "stop" ends what is being executed."""
 
-    def __init__(self, executor):
+    def __init__(self, executor: Executor) -> None:
         self._executor = executor
         self._subscriber = rospy.Subscriber("trajectory_execution_event", String, self._on_event, queue_size=10)
 
-    def _on_event(self, message):
+    def _on_event(self, message: String) -> None:
         if message.data == "stop":
             self._executor.stop()
         else:
             rospy.logwarn("trajectory_execution_event knows 'stop', not '%s'", message.data)
 
 
-def require_state(context, group):
+def require_state(context: Context, group: Group) -> None:
     """Raise RequestError where no joint state has told of a joint of a Group."""
     silent = [name for name in group.joints if name in context.monitor.missing_joints()]
     if silent:
@@ -273,14 +295,14 @@ def require_state(context, group):
                            % (", ".join(silent), context.monitor.joint_state_topic))
 
 
-def show(context, group, plan):
+def show(context: Context, group: str, plan: Plan) -> RobotTrajectory:
     """Publish a pipeline.Plan as the planned path; return its RobotTrajectory."""
     trajectory = trajectory_message(context.model.groups[group].joints, plan.timed, context.model.frame)
     context.show_path(plan.start, trajectory)
     return trajectory
 
 
-def failed(context, request, error, group=""):
+def failed(context: Context, request: str, error: Exception, group: str = "") -> tuple[int, str]:
     """Tell of an exception; return (code, reason)."""
     if isinstance(error, PlanningError):
         return tell(context, request, error, group), str(error)
@@ -289,7 +311,7 @@ def failed(context, request, error, group=""):
     return MoveItErrorCodes.FAILURE, text
 
 
-def finish(server, result, text, code=None):
+def finish(server: actionlib.SimpleActionServer, result: Any, text: str, code: int | None = None) -> None:
     """End an action's goal as MoveIt does: succeeded, preempted or aborted. code: the result's unless given."""
     code = result.error_code.val if code is None else code
     if code == MoveItErrorCodes.SUCCESS:

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The actions pickup and place."""
+from __future__ import annotations
+
 import math
 import threading
 from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import actionlib
+import numpy as np
 import rospy
 from moveit_msgs.msg import (
     Constraints,
@@ -43,6 +48,19 @@ from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import Grasp, PickupGoal, PlaceGoal, RobotTrajectory
+    from trajectory_msgs.msg import JointTrajectory
+
+    from motion_planning.exact import Contact
+    from motion_planning.manipulation import Candidate, Manipulation, Stage
+    from motion_planning.pipeline import Plan
+    from motion_planning.scene import Scene
+    from motion_planning.srdf import EndEffector
+    from moveit_ros_move_group.context import Context
+    from moveit_ros_move_group.execution import Outcome
+    from moveit_ros_move_group.planning import Planner
+
 # [s], if a goal has none.
 _USUAL_TIME_S = 5.0
 # Time limit [s] for a joint state newer than the goal.
@@ -57,11 +75,11 @@ class PickPlace:
     """Both actions. ``~pick_place/max_velocity_scaling_factor`` and ``~pick_place/max_acceleration_scaling_factor``
     (1.0) say how fast, as their goals do not."""
 
-    def __init__(self, context, planner, may_execute):
+    def __init__(self, context: Context, planner: Planner, may_execute: bool) -> None:
         self.context, self.planner = context, planner
         self.may_execute = may_execute and context.executor is not None
-        self.scaling = tuple(_share("~pick_place/max_%s_scaling_factor" % what)
-                             for what in ("velocity", "acceleration"))
+        self.scaling = (_share("~pick_place/max_velocity_scaling_factor"),
+                        _share("~pick_place/max_acceleration_scaling_factor"))
         self.hands = rospy.Publisher("~display_grasp_markers", MarkerArray, queue_size=1, latch=True)
         self._actions = [_Action(self, _Pick), _Action(self, _Place)]
 
@@ -69,14 +87,14 @@ class PickPlace:
 class _Action:
     """One of the two actions."""
 
-    def __init__(self, shared, kind):
+    def __init__(self, shared: PickPlace, kind: type[_Pick] | type[_Place]) -> None:
         self._shared, self._kind, self._context = shared, kind, shared.context
         self._changed = threading.Event()
         self._context.monitor.on_change(self._changed.set)
         self._server = actionlib.SimpleActionServer(kind.name, kind.action, self._run, auto_start=False)
         self._server.start()
 
-    def _run(self, goal):
+    def _run(self, goal: PickupGoal | PlaceGoal) -> None:
         result, reason, name = self._kind.result(), "", self._kind.name
         plan_only = goal.planning_options.plan_only or not self._shared.may_execute
         begin = wall_clock()
@@ -99,7 +117,7 @@ class _Action:
         empty = not result.trajectory_stages
         finish(self._server, result, result_text(result.error_code.val, reason, empty=empty, plan_only=plan_only))
 
-    def _wait_for_state(self, group):
+    def _wait_for_state(self, group: str) -> None:
         monitor, groups = self._context.monitor, self._context.model.groups
         joints = groups[group].joints if group in groups else ()
         late = monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, joints, self._server.is_preempt_requested)
@@ -108,12 +126,12 @@ class _Action:
 
     # -- planning -----------------------------------------------------------------------------------------------
 
-    def _plan(self, job, goal):
+    def _plan(self, job: _Pick | _Place, goal: PickupGoal | PlaceGoal) -> Manipulation:
         seconds = goal.allowed_planning_time
         seconds = seconds if math.isfinite(seconds) and seconds > 0.0 else _USUAL_TIME_S
         stop = self._server.is_preempt_requested
 
-        def plan(scene, q, seconds):
+        def plan(scene: Scene, q: np.ndarray, seconds: float) -> Plan:
             return self._shared.planner.plan(self._request(job, goal, q, seconds), scene, stop)
 
         tools = Tools(self._context.exact, plan, wall_clock, lambda: stop() or rospy.is_shutdown(),
@@ -128,7 +146,8 @@ class _Action:
             rospy.loginfo("%s: %s", self._kind.name, fall)
         return found
 
-    def _request(self, job, goal, q, seconds):
+    def _request(self, job: _Pick | _Place, goal: PickupGoal | PlaceGoal, q: np.ndarray,
+                 seconds: float) -> MotionPlanRequest:
         names = self._context.model.groups[job.task.group].joints
         request = MotionPlanRequest(
             group_name=job.task.group, planner_id=goal.planner_id, allowed_planning_time=seconds,
@@ -139,7 +158,7 @@ class _Action:
             for name, value in zip(names, q.tolist(), strict=True)])]
         return request
 
-    def _fill(self, result, job, found):
+    def _fill(self, result: PickupResult | PlaceResult, job: _Pick | _Place, found: Manipulation) -> None:
         model = self._context.model
         start = job.task.scene.state
         result.trajectory_start = state_message(model, start, rospy.Time.now())
@@ -151,7 +170,8 @@ class _Action:
                 result.trajectory_descriptions.append(stage.description)
         self._context.show_path(start, *result.trajectory_stages)
 
-    def _message(self, job, found, stage, values):
+    def _message(self, job: _Pick | _Place, found: Manipulation, stage: Stage,
+                 values: Mapping[str, float]) -> RobotTrajectory | None:
         """The RobotTrajectory of a stage, None where nothing moves in it."""
         model = self._context.model
         if stage.timed is not None:
@@ -163,13 +183,13 @@ class _Action:
 
     # -- execution ----------------------------------------------------------------------------------------------
 
-    def _execute(self, job, found):
+    def _execute(self, job: _Pick | _Place, found: Manipulation) -> tuple[int, str]:
         """Return (code, reason)."""
         context, name = self._context, self._kind.name
         require_state(context, context.model.groups[job.task.group])
         for stage in found.stages:
             message = self._message(job, found, stage, stage.scene.state.positions)
-            lacking = message and context.executor.why_not(message.joint_trajectory.joint_names)
+            lacking = message and context.require_executor().why_not(message.joint_trajectory.joint_names)
             if lacking:
                 raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "stage '%s': %s" % (stage.description, lacking))
         for stage in found.stages:
@@ -182,26 +202,27 @@ class _Action:
                 job.hand_over(found.candidate)
         return MoveItErrorCodes.SUCCESS, ""
 
-    def _execute_stage(self, job, found, stage):
+    def _execute_stage(self, job: _Pick | _Place, found: Manipulation,
+                       stage: Stage) -> tuple[Outcome | None, list[Contact]]:
         """(Outcome, contacts that ended it); (None, []) where nothing moves."""
         context, stop = self._context, self._server.is_preempt_requested
         message = self._message(job, found, stage, context.monitor.joint_values())
         if message is None:
             return None, []
         if stage.timed is None:
-            return context.executor.execute(message, stop, from_anywhere=True), []
+            return context.require_executor().execute(message, stop, from_anywhere=True), []
         self._changed.clear()
         group = context.model.groups[job.task.group]
         watch = RestOfTheWay(context.exact, group, stage.timed, lambda: self._changed_scene(stage))
-        return context.executor.execute(message, stop, watch.hit), watch.contacts
+        return context.require_executor().execute(message, stop, watch.hit), watch.contacts
 
-    def _changed_scene(self, stage):
+    def _changed_scene(self, stage: Stage) -> Scene | None:
         if not self._changed.is_set():
             return None
         self._changed.clear()
         return self._context.monitor.scene().with_allowed(stage.scene.allowed)
 
-    def _feedback(self, state):
+    def _feedback(self, state: str) -> None:
         if self._server.is_active():
             self._server.publish_feedback(self._kind.feedback(state))
 
@@ -209,7 +230,14 @@ class _Action:
 class _Job:
     """One goal. task: PickTask or PlaceTask; candidates: list of Candidates. Raises PlanningError."""
 
-    def __init__(self, context, goal):
+    #: Of the action: its name, what one candidate is called, and its types.
+    name: str
+    one: str
+    action: type[rospy.Message]
+    result: type[rospy.Message]
+    feedback: type[rospy.Message]
+
+    def __init__(self, context: Context, goal: Any) -> None:
         self.context, self.goal = context, goal
         scene = scene_with_diff(context, context.monitor.scene(), goal.planning_options.planning_scene_diff, self.name,
                                 keep_robot=True)
@@ -234,17 +262,17 @@ class _Job:
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
 
-    def common(self):
+    def common(self) -> dict[str, Any]:
         """Arguments that both tasks have."""
         goal = self.goal
         return {"group": self.group, "link": self.link, "hand": self.hand, "support": goal.support_surface_name,
                 "hand_may_touch_support": goal.allow_gripper_support_collision}
 
-    def chosen(self, candidate):
+    def chosen(self, candidate: Candidate) -> Any:
         """The Grasp or PlaceLocation of a Candidate."""
         return self._listed[self.candidates.index(candidate)]
 
-    def _effectors(self):
+    def _effectors(self) -> list[EndEffector]:
         """srdf.EndEffectors of the goal's group, all where it names none; by their own name, too."""
         model, name = self.context.model, self.goal.group_name
         found = list(model.end_effectors.values())
@@ -259,14 +287,23 @@ class _Job:
                                "SRDF has %s" % (name, ", ".join(model.end_effectors) or "none"))
         return found
 
-    def _candidate(self, one, name, scene):
+    def _effector(self, scene: Scene) -> EndEffector:
+        raise NotImplementedError
+
+    def _task(self, scene: Scene) -> Any:
+        raise NotImplementedError
+
+    def _list(self, scene: Scene) -> list[Any]:
+        raise NotImplementedError
+
+    def _candidate(self, one: Any, name: str, scene: Scene) -> Candidate:
         raise NotImplementedError
 
 
 class _Pick(_Job):
     name, one, action, result, feedback = "pickup", "grasp", PickupAction, PickupResult, PickupFeedback
 
-    def _effector(self, scene):
+    def _effector(self, scene: Scene) -> EndEffector:
         found, name = self._effectors(), self.goal.end_effector
         if name:
             found = [one for one in found if one.name == name]
@@ -276,31 +313,31 @@ class _Pick(_Job):
                                                         ", ".join(self.context.model.end_effectors) or "none"))
         return found[0]
 
-    def _task(self, scene):
+    def _task(self, scene: Scene) -> PickTask:
         goal = self.goal
         return PickTask(scene, target=goal.target_name, touch_links=frozenset(goal.attached_object_touch_links),
                         minimize_distance=goal.minimize_object_distance or not goal.possible_grasps, **self.common())
 
-    def _list(self, scene):
+    def _list(self, scene: Scene) -> list[Grasp]:
         model = self.context.model
         return list(self.goal.possible_grasps) or [
             usual_grasp(self.goal.target_name, model.frame, model.groups[self.effector.group].joints)]
 
-    def _candidate(self, one, name, scene):
+    def _candidate(self, one: Grasp, name: str, scene: Scene) -> Candidate:
         found = grasp_candidate(one, name, scene, self.context.monitor.reader, self.link)
         return _touching(found, self.goal.allowed_touch_objects)
 
-    def choose(self, result, candidate):
+    def choose(self, result: PickupResult, candidate: Candidate) -> None:
         result.grasp = self.chosen(candidate)
 
-    def posture(self, candidate, stage):
+    def posture(self, candidate: Candidate, stage: str) -> tuple[JointTrajectory, float]:
         """(JointTrajectory of the hand in a stage, force)."""
         grasp = self.chosen(candidate)
         if stage == "pre_grasp":
             return grasp.pre_grasp_posture, 0.0
         return grasp.grasp_posture, grasp.max_contact_force
 
-    def hand_over(self, candidate):
+    def hand_over(self, candidate: Candidate) -> None:
         """The object is in the hand."""
         task, opened = self.task, self.chosen(candidate).pre_grasp_posture
         links = task.touch_links or task.hand
@@ -311,7 +348,7 @@ class _Pick(_Job):
 class _Place(_Job):
     name, one, action, result, feedback = "place", "place", PlaceAction, PlaceResult, PlaceFeedback
 
-    def _effector(self, scene):
+    def _effector(self, scene: Scene) -> EndEffector:
         """The one whose hand holds the object."""
         found, held = self._effectors(), scene.state.attached
         if self.goal.attached_object_name in held:
@@ -320,7 +357,7 @@ class _Place(_Job):
                 self.context.model, one)), found[0])
         return found[0]
 
-    def _task(self, scene):
+    def _task(self, scene: Scene) -> PlaceTask:
         name = self.goal.attached_object_name
         if not name:
             names = [one for one, body in scene.state.attached.items()
@@ -330,7 +367,7 @@ class _Place(_Job):
             name = names[0]
         return PlaceTask(scene, target=name, **self.common())
 
-    def _list(self, scene):
+    def _list(self, scene: Scene) -> list[PlaceLocation]:
         goal = self.goal
         if goal.place_locations or not goal.support_surface_name:
             return list(goal.place_locations)
@@ -341,7 +378,7 @@ class _Place(_Job):
             raise RequestError(MoveItErrorCodes.INVALID_OBJECT_NAME, str(error)) from None
         return [self._from_above(one) for one in poses]
 
-    def _from_above(self, pose):
+    def _from_above(self, pose: np.ndarray) -> PlaceLocation:
         place = PlaceLocation(place_pose=stamped(pose, self.context.model.frame, rospy.Time()))
         for way, direction in ((place.pre_place_approach, -1.0), (place.post_place_retreat, 1.0)):
             way.direction.header.frame_id = self.context.model.frame
@@ -349,36 +386,36 @@ class _Place(_Job):
             way.desired_distance, way.min_distance = _WAY_M, _MIN_WAY_M
         return place
 
-    def _candidate(self, one, name, scene):
+    def _candidate(self, one: PlaceLocation, name: str, scene: Scene) -> Candidate:
         found = place_candidate(one, name, self.context.monitor.reader, self.task, self.goal.place_eef)
         return _touching(found, self.goal.allowed_touch_objects)
 
-    def choose(self, result, candidate):
+    def choose(self, result: PlaceResult, candidate: Candidate) -> None:
         result.place_location = self.chosen(candidate)
 
-    def posture(self, candidate, stage):
+    def posture(self, candidate: Candidate, stage: str) -> tuple[JointTrajectory, float]:
         """(JointTrajectory of the hand in a stage, force)."""
         place = self.chosen(candidate)
         held = self.task.scene.state.attached[self.task.target].detach_posture
         return place.post_place_posture if place.post_place_posture.points or not held else held, 0.0
 
-    def hand_over(self, candidate):
+    def hand_over(self, candidate: Candidate) -> None:
         """The object stands where it was put."""
         monitor = self.context.monitor
         monitor.change(lambda _: monitor.scene().detach(self.task.target), self.name)
 
 
-def _touching(candidate, names):
+def _touching(candidate: Candidate, names: Iterable[str]) -> Candidate:
     return replace(candidate, touch=candidate.touch | set(names))
 
 
-def _unique(names):
+def _unique(names: Sequence[str]) -> list[str]:
     """The names, with a number where one comes more than once."""
     count = Counter(names)
     return [name if count[name] == 1 else "%s (%d)" % (name, number) for number, name in enumerate(names, 1)]
 
 
-def _share(parameter):
+def _share(parameter: str) -> float:
     value = rospy.get_param(parameter, 1.0)
     if isinstance(value, (int, float)) and 0.0 < value <= 1.0:
         return float(value)

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Services about the planning scene."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import rospy
 from moveit_msgs.msg import ConstraintEvalResult
 from moveit_msgs.srv import (
@@ -17,16 +21,22 @@ from moveit_ros_move_group.convert.constraints import constraint_set_of
 from moveit_ros_move_group.convert.scene_out import scene_message
 from moveit_ros_move_group.failures import contact_message
 
+if TYPE_CHECKING:
+    from moveit_msgs.srv import ApplyPlanningSceneRequest, GetPlanningSceneRequest, GetStateValidityRequest
+    from std_srvs.srv import EmptyRequest
+
+    from moveit_ros_move_group.context import Context
+
 
 class GetScene:
     """``get_planning_scene``"""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("get_planning_scene", GetPlanningScene, self._serve)
 
     @answered("get_planning_scene", GetPlanningSceneResponse)
-    def _serve(self, request, response):
+    def _serve(self, request: GetPlanningSceneRequest, response: GetPlanningSceneResponse) -> None:
         monitor = self.context.monitor
         response.scene = scene_message(monitor.scene(), request.components.components, monitor.octomap(),
                                        monitor.state_stamp())
@@ -35,23 +45,23 @@ class GetScene:
 class ApplyScene:
     """``apply_planning_scene``: done when it answers."""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("apply_planning_scene", ApplyPlanningScene, self._serve)
 
     @answered("apply_planning_scene", ApplyPlanningSceneResponse)
-    def _serve(self, request, response):
+    def _serve(self, request: ApplyPlanningSceneRequest, response: ApplyPlanningSceneResponse) -> None:
         response.success = not self.context.monitor.apply(request.scene, "apply_planning_scene")
 
 
 class ClearOctomap:
     """``clear_octomap``"""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("clear_octomap", Empty, self._serve)
 
-    def _serve(self, _):
+    def _serve(self, _: EmptyRequest) -> EmptyResponse:
         self.context.monitor.clear_octomap()
         return EmptyResponse()
 
@@ -59,12 +69,12 @@ class ClearOctomap:
 class StateValidity:
     """``check_state_validity``: all contacts, and how far each constraint is met."""
 
-    def __init__(self, context):
+    def __init__(self, context: Context) -> None:
         self.context = context
         self._service = rospy.Service("check_state_validity", GetStateValidity, self._serve)
 
     @answered("check_state_validity", GetStateValidityResponse)
-    def _serve(self, request, response):
+    def _serve(self, request: GetStateValidityRequest, response: GetStateValidityResponse) -> None:
         context, model = self.context, self.context.model
         group = context.group(request.group_name) if request.group_name else None
         scene = context.scene_from(request.robot_state, "check_state_validity")

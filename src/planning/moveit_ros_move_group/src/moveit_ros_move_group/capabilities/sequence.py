@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """plan_sequence_path, and the action sequence_move_group."""
+from __future__ import annotations
+
 import threading
 import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import actionlib
 import rospy
@@ -21,6 +25,15 @@ from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import MotionSequenceItem, MoveGroupSequenceGoal, PlanningOptions
+    from moveit_msgs.srv import GetMotionSequenceRequest
+
+    from motion_planning.pipeline import Plan
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.context import Context
+    from moveit_ros_move_group.planning import Planner
+
 # Time limit [s] for a joint state newer than the goal.
 _STATE_TIMEOUT_S = 1.0
 
@@ -28,11 +41,11 @@ _STATE_TIMEOUT_S = 1.0
 class SequenceService:
     """``plan_sequence_path``"""
 
-    def __init__(self, context, planner):
+    def __init__(self, context: Context, planner: Planner) -> None:
         self.context, self._planner = context, planner
         self._service = rospy.Service("plan_sequence_path", GetMotionSequence, self._serve)
 
-    def _serve(self, request):
+    def _serve(self, request: GetMotionSequenceRequest) -> GetMotionSequenceResponse:
         response, begin = MotionSequenceResponse(), time.monotonic()
         try:
             items = request.request.items
@@ -48,7 +61,7 @@ class SequenceService:
 class SequenceAction:
     """The action ``sequence_move_group``: plan a sequence, or plan and execute it."""
 
-    def __init__(self, context, planner, may_execute):
+    def __init__(self, context: Context, planner: Planner, may_execute: bool) -> None:
         self.context, self._planner, self._may_execute = context, planner, may_execute
         self._changed = threading.Event()
         context.monitor.on_change(self._changed.set)
@@ -56,7 +69,7 @@ class SequenceAction:
                                                     auto_start=False)
         self._server.start()
 
-    def _run(self, goal):
+    def _run(self, goal: MoveGroupSequenceGoal) -> None:
         result, begin, reason = MoveGroupSequenceResult(), time.monotonic(), ""
         response = result.response
         plan_only = goal.planning_options.plan_only or not self._may_execute or self.context.executor is None
@@ -72,7 +85,7 @@ class SequenceAction:
         finish(self._server, result, result_text(code, reason, empty=empty and not (
             plan_only and code == MoveItErrorCodes.SUCCESS), plan_only=plan_only), code)
 
-    def _done(self, goal, plan_only, response):
+    def _done(self, goal: MoveGroupSequenceGoal, plan_only: bool, response: MotionSequenceResponse) -> str:
         """Fill the response; return the reason if it fails."""
         context, options, items = self.context, goal.planning_options, goal.request.items
         begin = time.monotonic()
@@ -96,14 +109,15 @@ class SequenceAction:
         response.error_code.val = MoveItErrorCodes.SUCCESS
         return "" if plan_only else self._execute(plans, response, options)
 
-    def _execute(self, plans, response, options):
+    def _execute(self, plans: Sequence[tuple[str, Plan]], response: MotionSequenceResponse,
+                 options: PlanningOptions) -> str:
         context = self.context
         self._server.publish_feedback(MoveGroupSequenceFeedback("MONITOR"))
         for (group, plan), trajectory in zip(plans, response.planned_trajectories, strict=True):
             if len(plan.timed.times) < 2:
                 continue
             watch = RestOfTheWay(context.exact, context.model.groups[group], plan.timed, lambda: self._news(options))
-            outcome = context.executor.execute(trajectory, self._server.is_preempt_requested, watch.hit)
+            outcome = context.require_executor().execute(trajectory, self._server.is_preempt_requested, watch.hit)
             if outcome.code != MoveItErrorCodes.SUCCESS:
                 response.error_code.val = outcome.code
                 context.failures.tell("sequence_move_group", outcome.code, outcome.text, group, watch.contacts,
@@ -111,7 +125,7 @@ class SequenceAction:
                 return outcome.text
         return ""
 
-    def _news(self, options):
+    def _news(self, options: PlanningOptions) -> Scene | None:
         """The scene if it has changed since the last call, else None."""
         if not self._changed.is_set():
             return None
@@ -120,7 +134,8 @@ class SequenceAction:
                                "sequence_move_group", keep_robot=True)
 
 
-def _planned(context, planner, items, scene, response, stop=lambda: False):
+def _planned(context: Context, planner: Planner, items: Sequence[MotionSequenceItem], scene: Scene | None,
+             response: MotionSequenceResponse, stop: Callable[[], bool] = lambda: False) -> list[tuple[str, Plan]]:
     """Return [(group name, Plan), ...] of MotionSequenceItems from the state of ``scene``; fill the response."""
     if not items:
         raise RequestError(MoveItErrorCodes.INVALID_MOTION_PLAN, "the sequence has no items")

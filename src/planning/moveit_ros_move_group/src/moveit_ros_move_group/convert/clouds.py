@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Clouds of points and depth images as arrays, and back."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 
 from moveit_ros_move_group.convert.geometry import MessageError
 
+if TYPE_CHECKING:
+    from sensor_msgs.msg import CameraInfo, Image
+    from std_msgs.msg import Header
 
-def points_of(message):
+
+def points_of(message: PointCloud2) -> np.ndarray:
     """Return the points (n, 3), float32, of a PointCloud2, row after row. Raises MessageError."""
     fields = {field.name: field for field in message.fields}
     missing = [name for name in "xyz" if name not in fields or fields[name].datatype != PointField.FLOAT32]
@@ -25,7 +33,7 @@ def points_of(message):
     return np.stack(parts, axis=1).astype(np.float32, copy=False)
 
 
-def points_of_depth(image, info, near, far):
+def points_of_depth(image: Image, info: CameraInfo, near: float, far: float) -> np.ndarray:
     """Return the points (n, 3), float32, of a depth Image (32FC1 [m] or 16UC1 [mm]) and its CameraInfo.
 
     NaN where the depth [m] is not between ``near`` and ``far``. Raises MessageError.
@@ -49,7 +57,7 @@ def points_of_depth(image, info, near, far):
     return np.stack([depth * across, depth * down[:, None], depth], axis=-1).reshape(-1, 3).astype(np.float32)
 
 
-def cloud_of(points, header):
+def cloud_of(points: np.ndarray, header: Header) -> PointCloud2:
     """Return the PointCloud2 of points (n, 3)."""
     names = [PointField(name, 4 * i, PointField.FLOAT32, 1) for i, name in enumerate("xyz")]
     data = np.ascontiguousarray(points, dtype="<f4").tobytes()

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Constraints of goals and paths."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import Pose, Quaternion
 from moveit_msgs.msg import OrientationConstraint
@@ -16,13 +19,20 @@ from motion_planning.constraints import (
 from motion_planning.scene import like
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of, mesh_shape_of, shape_of
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import Constraints, JointConstraint, PositionConstraint, VisibilityConstraint
+
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.convert.scene_in import SceneReader
+
 # Least and greatest number of corners of a cone of sight; least radius of a target [m].
 _MIN_SIDES, _MAX_SIDES, _NO_RADIUS = 3, 100, 1e-12
 # The quaternion of an orientation may be off by this much, as in MoveIt.
 _ROUNDED = 1e-3
 
 
-def constraint_set_of(message, scene, reader, remarks):
+def constraint_set_of(message: Constraints, scene: Scene, reader: SceneReader,
+                      remarks: list[str]) -> ConstraintSet | None:
     """Return the ConstraintSet of a Constraints message, None for one without any constraint.
 
     What MoveIt leaves out or changes with a warning is so here; ``remarks`` (list) gets the sentences. Frames are
@@ -47,12 +57,12 @@ class _LeftOut(Exception):
     """A constraint that says nothing; the text tells why."""
 
 
-def _weight(message):
+def _weight(message: JointConstraint | PositionConstraint | OrientationConstraint | VisibilityConstraint) -> float:
     # A weight that was not filled in counts as 1, as in MoveIt.
     return message.weight if message.weight > 0.0 else 1.0
 
 
-def _joint(message, scene, reader, remarks):
+def _joint(message: JointConstraint, scene: Scene, reader: SceneReader, remarks: list[str]) -> JointTarget:
     """Of a joint that mimics another: what it means for that one. MoveIt's clients name both."""
     model = scene.model
     joint, multiplier, offset = model.mimics.get(message.joint_name, (message.joint_name, 1.0, 0.0))
@@ -78,7 +88,7 @@ def _joint(message, scene, reader, remarks):
     return JointTarget(joint, position, above, below, _weight(message))
 
 
-def _link(message, scene):
+def _link(message: PositionConstraint | OrientationConstraint, scene: Scene) -> str:
     name = message.link_name
     if not (name in scene.model.link_index or name and scene.has_frame(name)):
         raise _LeftOut("a constraint is on link '%s', which is neither a link nor attached%s"
@@ -86,7 +96,7 @@ def _link(message, scene):
     return name
 
 
-def _position(message, scene, reader, remarks):
+def _position(message: PositionConstraint, scene: Scene, reader: SceneReader, remarks: list[str]) -> PositionTarget:
     link, frame = _link(message, scene), reader.frame(scene, message.header.frame_id)
     region, offset = message.constraint_region, message.target_point_offset
     what = "the region of link '%s'" % link
@@ -108,7 +118,8 @@ def _position(message, scene, reader, remarks):
     return PositionTarget(link, shapes, (offset.x, offset.y, offset.z), weight=_weight(message))
 
 
-def _orientation(message, scene, reader, remarks):
+def _orientation(message: OrientationConstraint, scene: Scene, reader: SceneReader,
+                 remarks: list[str]) -> OrientationTarget:
     link, frame = _link(message, scene), reader.frame(scene, message.header.frame_id)
     turn = message.orientation
     length = math.sqrt(turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2)
@@ -131,7 +142,8 @@ def _orientation(message, scene, reader, remarks):
                              weight=_weight(message))
 
 
-def _visibility(message, scene, reader, remarks):
+def _visibility(message: VisibilityConstraint, scene: Scene, reader: SceneReader,
+                remarks: list[str]) -> VisibilityTarget:
     target, sensor = message.target_pose, message.sensor_pose
     if abs(message.target_radius) <= _NO_RADIUS:
         raise _LeftOut("a visibility constraint has a target without radius")

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Poses and shapes."""
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, Vector3
@@ -13,6 +17,12 @@ from urdf_model import Box, Cylinder, Sphere
 from urdf_model import Plane as PlaneShape
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, quaternion_from_matrix, rigid
 
+if TYPE_CHECKING:
+    import rospy
+    from moveit_msgs.msg import CollisionObject
+
+    from motion_planning.shapes import Geometry, Placed
+
 # The quaternion's length may be off by this much; clients round.
 _ROUNDED = 0.1
 
@@ -21,7 +31,7 @@ class MessageError(PlanningError):
     """A message that cannot be understood, with the reason."""
 
 
-def matrix_of(pose, what="pose"):
+def matrix_of(pose: Pose | Transform, what: str = "pose") -> np.ndarray:
     """Return the (4, 4) of a Pose or a Transform. A quaternion of zeros is taken for the identity, as MoveIt does.
 
     Raises MessageError for numbers that are not finite and for a quaternion that is not a rotation; ``what`` names it.
@@ -44,24 +54,24 @@ def matrix_of(pose, what="pose"):
     return rigid(matrix_from_quaternion(quaternion), position)
 
 
-def pose_of(matrix):
+def pose_of(matrix: np.ndarray) -> Pose:
     """Return the Pose of a (4, 4)."""
     return Pose(Point(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
 
 
-def transform_of(matrix):
+def transform_of(matrix: np.ndarray) -> Transform:
     """Return the Transform of a (4, 4)."""
     return Transform(Vector3(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
 
 
-def stamped(matrix, frame, stamp):
+def stamped(matrix: np.ndarray, frame: str, stamp: rospy.Time) -> PoseStamped:
     """Return the PoseStamped of a (4, 4)."""
     message = PoseStamped(pose=pose_of(matrix))
     message.header.frame_id, message.header.stamp = frame, stamp
     return message
 
 
-def shape_of(primitive):
+def shape_of(primitive: SolidPrimitive) -> Box | Sphere | Cylinder | Cone:
     """Return the shape of a SolidPrimitive. Raises MessageError for an unknown kind, and missing or bad dimensions."""
     kind, sizes = primitive.type, list(primitive.dimensions)
     needed = {SolidPrimitive.BOX: 3, SolidPrimitive.SPHERE: 1, SolidPrimitive.CYLINDER: 2, SolidPrimitive.CONE: 2}
@@ -73,14 +83,14 @@ def shape_of(primitive):
         raise MessageError("a solid primitive of type %d needs %s above 0, got %s"
                            % (kind, counted(needed[kind], "size"), list(primitive.dimensions)))
     if kind == SolidPrimitive.BOX:
-        return Box(tuple(sizes))
+        return Box((sizes[0], sizes[1], sizes[2]))
     if kind == SolidPrimitive.SPHERE:
         return Sphere(sizes[0])
     height, radius = sizes[SolidPrimitive.CYLINDER_HEIGHT], sizes[SolidPrimitive.CYLINDER_RADIUS]
     return Cylinder(radius, height) if kind == SolidPrimitive.CYLINDER else Cone(radius, height)
 
 
-def mesh_shape_of(mesh):
+def mesh_shape_of(mesh: Mesh) -> TriangleMesh:
     """Return the TriangleMesh of a Mesh message. Raises MessageError."""
     try:
         return TriangleMesh(np.array([(v.x, v.y, v.z) for v in mesh.vertices], dtype=float).reshape(-1, 3),
@@ -90,7 +100,7 @@ def mesh_shape_of(mesh):
         raise MessageError(str(error)) from None
 
 
-def plane_shape_of(plane):
+def plane_shape_of(plane: Plane) -> tuple[PlaneShape, np.ndarray]:
     """Return (shape, pose (4, 4)) of a Plane message: a x + b y + c z + d = 0. Raises MessageError."""
     normal, offset = np.array(plane.coef[:3]), plane.coef[3]
     length = float(np.linalg.norm(normal))
@@ -107,7 +117,7 @@ def plane_shape_of(plane):
     return PlaneShape(), rigid(rotation, -offset / length * normal)
 
 
-def add_shapes(message, shapes):
+def add_shapes(message: CollisionObject, shapes: Iterable[Placed]) -> None:
     """Append shapes ((shape, pose (4, 4)), ...) to a message with primitives, meshes, planes and their poses.
 
     An octree is left out: it has no message type there.
@@ -130,7 +140,7 @@ def add_shapes(message, shapes):
                 message.primitive_poses.append(pose_of(pose))
 
 
-def _primitive(shape):
+def _primitive(shape: Geometry) -> SolidPrimitive | None:
     if isinstance(shape, Box):
         return SolidPrimitive(SolidPrimitive.BOX, list(shape.size))
     if isinstance(shape, Sphere):

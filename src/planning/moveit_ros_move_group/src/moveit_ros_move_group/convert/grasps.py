@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Grasps, places and postures of hands."""
+from __future__ import annotations
+
 import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -11,6 +15,14 @@ from command_line.options import counted
 from motion_planning.manipulation import Candidate, Translation
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
 
+if TYPE_CHECKING:
+    from moveit_msgs.msg import GripperTranslation, PlaceLocation
+
+    from motion_planning.manipulation import PlaceTask
+    from motion_planning.model import PlanningModel
+    from motion_planning.scene import Scene
+    from moveit_ros_move_group.convert.scene_in import SceneReader
+
 # Least duration of a hand's posture without a time [s].
 _POSTURE_S = 0.5
 # The grasp for a goal without grasps: distance in front of the object's origin along x [m], and the length of approach
@@ -18,7 +30,7 @@ _POSTURE_S = 0.5
 _IN_FRONT_M, _WAY_M, _MIN_WAY_M = 0.2, 0.2, 0.1
 
 
-def grasp_candidate(grasp, name, scene, reader, link):
+def grasp_candidate(grasp: Grasp, name: str, scene: Scene, reader: SceneReader, link: str) -> Candidate:
     """Return the Candidate of a Grasp for ``link``. Raises PlanningError, MessageError among them."""
     what = "grasp '%s'" % name
     pose = reader.frame(scene, grasp.grasp_pose.header.frame_id) @ matrix_of(grasp.grasp_pose.pose, what)
@@ -29,7 +41,8 @@ def grasp_candidate(grasp, name, scene, reader, link):
         frozenset(grasp.allowed_touch_objects))
 
 
-def place_candidate(place, name, reader, task, of_hand=False):
+def place_candidate(place: PlaceLocation, name: str, reader: SceneReader, task: PlaceTask,
+                    of_hand: bool = False) -> Candidate:
     """Return the Candidate of a PlaceLocation for a PlaceTask; its pose is the object's, or the hand's (``of_hand``).
 
     Without a posture of the hand, it opens as before the object was grasped. Raises PlanningError.
@@ -46,7 +59,7 @@ def place_candidate(place, name, reader, task, of_hand=False):
         {}, posture_of(opened, scene.model, what), frozenset(place.allowed_touch_objects))
 
 
-def usual_grasp(target, frame, hand):
+def usual_grasp(target: str, frame: str, hand: Sequence[str]) -> Grasp:
     """The Grasp that stands for an empty list: along x to the object's origin, then up.
 
     frame: the planning frame; hand: names of the hand's joints, which open as wide as they can and close.
@@ -67,7 +80,7 @@ def usual_grasp(target, frame, hand):
     return grasp
 
 
-def posture_of(trajectory, model, what):
+def posture_of(trajectory: JointTrajectory, model: PlanningModel, what: str) -> dict[str, float]:
     """Return {joint: value} at the end of a hand's JointTrajectory, joints that mimic others left out.
 
     Raises MessageError for unknown joints, and values that are missing or not numbers.
@@ -86,7 +99,8 @@ def posture_of(trajectory, model, what):
     return {name: value for name, value in zip(trajectory.joint_names, end, strict=True) if name in model.index}
 
 
-def hand_trajectory(posture, values, model, force=0.0):
+def hand_trajectory(posture: JointTrajectory, values: Mapping[str, float], model: PlanningModel,
+                    force: float = 0.0) -> RobotTrajectory:
     """Return the RobotTrajectory that brings a hand from ``values`` {joint: value} to a posture (JointTrajectory).
 
     Values beyond a joint's limits are clamped. A posture without times lasts as long as its joints need.
@@ -117,17 +131,17 @@ def hand_trajectory(posture, values, model, force=0.0):
     return message
 
 
-def _limits(model, joint):
+def _limits(model: PlanningModel, joint: str) -> np.ndarray | tuple[float, float]:
     return model.bounds[model.index[joint]] if joint in model.index else (-math.inf, math.inf)
 
 
-def _number(value, what):
+def _number(value: float, what: str) -> float:
     if not math.isfinite(value):
         raise MessageError("%s: its quality is %s; expected a finite number" % (what, value))
     return value
 
 
-def _way(message, what, scene, reader, link):
+def _way(message: GripperTranslation, what: str, scene: Scene, reader: SceneReader, link: str) -> Translation:
     """The Translation of a GripperTranslation. Directions in a frame that the hand carries along turn with it."""
     vector = message.direction.vector
     direction = np.array([vector.x, vector.y, vector.z])
@@ -148,7 +162,7 @@ def _way(message, what, scene, reader, link):
     return Translation(turn @ direction / length, carried, desired, least)
 
 
-def _carried(scene, frame, link):
+def _carried(scene: Scene, frame: str, link: str) -> bool:
     """Whether ``frame`` moves with ``link`` as one piece: a link fixed to it, or something that such a link holds."""
     model = scene.model
     body = scene.state.attached.get(frame.partition("/")[0])

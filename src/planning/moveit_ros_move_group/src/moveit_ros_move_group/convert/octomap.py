@@ -4,8 +4,11 @@
 Format: A. Hornung et al., OctoMap (Autonomous Robots 2013), section 3.4: depth first, eight children of each node in
 two bits each (binary), or an occupancy of four bytes and a byte of flags (full).
 """
+from __future__ import annotations
+
 import math
 import struct
+from typing import TYPE_CHECKING
 
 import numpy as np
 from octomap_msgs.msg import OctomapWithPose
@@ -14,11 +17,19 @@ from motion_planning.exact.octree import occupied_tree
 from motion_planning.shapes import Octree
 from moveit_ros_move_group.convert.geometry import MessageError, pose_of
 
+if TYPE_CHECKING:
+    import rospy
+    from octomap_msgs.msg import Octomap
+
+    Triple = tuple[float, float, float]
+    #: Centre and side.
+    Cube = tuple[float, float, float, float]
+
 _LEVELS = 16
 _FREE, _OCCUPIED, _INNER = 1, 2, 3
 
 
-def octree_of(message):
+def octree_of(message: Octomap) -> Octree | None:
     """Return the Octree of an octomap_msgs/Octomap, or None if it is empty.
 
     Raises MessageError for a tree of another kind than OcTree and for data that end too early.
@@ -40,7 +51,7 @@ def octree_of(message):
         raise MessageError(str(error)) from None
 
 
-def octomap_message(octree, pose, frame, stamp):
+def octomap_message(octree: Octree, pose: np.ndarray, frame: str, stamp: rospy.Time) -> OctomapWithPose:
     """Return the OctomapWithPose, binary, of an Octree at ``pose`` (4, 4) in ``frame``.
 
     Cells that are not occupied are unknown in it.
@@ -53,14 +64,14 @@ def octomap_message(octree, pose, frame, stamp):
     return message
 
 
-def _children(centre, size):
+def _children(centre: Triple, size: float) -> list[Triple]:
     """Centres of the eight halves of a cube, x fastest."""
     quarter = 0.25 * size
     return [(centre[0] + (quarter if i & 1 else -quarter), centre[1] + (quarter if i & 2 else -quarter),
              centre[2] + (quarter if i & 4 else -quarter)) for i in range(8)]
 
 
-def _binary(data, resolution):
+def _binary(data: bytes, resolution: float) -> list[Cube]:
     boxes, place = [], 0
     stack = [((0.0, 0.0, 0.0), resolution * 2**_LEVELS)]
     while stack:
@@ -78,7 +89,7 @@ def _binary(data, resolution):
     return boxes
 
 
-def _full(data, resolution):
+def _full(data: bytes, resolution: float) -> list[Cube]:
     boxes, place = [], 0
     stack = [((0.0, 0.0, 0.0), resolution * 2**_LEVELS)]
     while stack:

@@ -3,6 +3,10 @@
 
 Format: a head of lines, its last one "data", then the stream of binary octomap messages (octomap.py).
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from octomap_msgs.msg import Octomap
 
@@ -10,13 +14,16 @@ from motion_planning.exact.octree import occupied_tree
 from moveit_ros_move_group.convert.geometry import MessageError
 from moveit_ros_move_group.convert.octomap import octree_of
 
+if TYPE_CHECKING:
+    from motion_planning.scene import Octree
+
 _FIRST = b"# Octomap OcTree binary file"
 _DATA = b"\ndata\n"
 # Occupied children in all values of a byte of the stream: the pairs of bits that are 2.
 _OCCUPIED = np.array([sum((value >> shift & 3) == 2 for shift in (0, 2, 4, 6)) for value in range(256)])
 
 
-def file_of(octree, resolution):
+def file_of(octree: Octree | None, resolution: float) -> bytes:
     """Return the content (bytes) of a file with an Octree, or with an empty one of ``resolution`` [m] for None."""
     data = b"" if octree is None else occupied_tree(octree).tobytes()
     # Two bytes for each inner node; leaves are told by their parents.
@@ -25,7 +32,7 @@ def file_of(octree, resolution):
     return head + _DATA + data
 
 
-def octree_of_file(content):
+def octree_of_file(content: bytes) -> Octree | None:
     """Return the Octree in the content (bytes) of a file, None for an empty one. Raises MessageError."""
     if not content.startswith(_FIRST):
         raise MessageError("it does not begin with '%s'" % _FIRST.decode())

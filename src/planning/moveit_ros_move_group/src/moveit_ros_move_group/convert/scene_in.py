@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Applies messages to a scene, with MoveIt's meaning of each."""
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Callable, Container, Iterable
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from moveit_msgs.msg import CollisionObject
@@ -21,12 +25,21 @@ from moveit_ros_move_group.convert.geometry import (
 from moveit_ros_move_group.convert.octomap import octree_of
 from urdf_model.transforms import inverse
 
+if TYPE_CHECKING:
+    from geometry_msgs.msg import Pose, TransformStamped
+    from moveit_msgs.msg import AttachedCollisionObject, PlanningScene, PlanningSceneWorld, RobotState
+
+    from motion_planning.model import State
+
 _OPERATIONS = {CollisionObject.ADD: "ADD", CollisionObject.REMOVE: "REMOVE", CollisionObject.APPEND: "APPEND",
                CollisionObject.MOVE: "MOVE"}
 
 
 # Number of refused parts of a message after which its rest is left out.
 _MAX_ERRORS = 1000
+
+M = TypeVar("M")
+T = TypeVar("T")
 
 
 class SceneReader:
@@ -35,10 +48,10 @@ class SceneReader:
     find_frame(name): pose (4, 4) in the planning frame; raises PlanningError if there is none.
     """
 
-    def __init__(self, find_frame=None):
+    def __init__(self, find_frame: Callable[[str], np.ndarray] | None = None) -> None:
         self._find_frame = find_frame
 
-    def frame(self, scene, name):
+    def frame(self, scene: Scene, name: str) -> np.ndarray:
         """Return the pose (4, 4) of a frame in the planning frame, which an empty name means. Raises PlanningError."""
         name = name.lstrip("/")
         if not name or name == scene.model.frame:
@@ -49,7 +62,7 @@ class SceneReader:
 
     # -- objects ------------------------------------------------------------------------------------------------
 
-    def with_collision_object(self, scene, message):
+    def with_collision_object(self, scene: Scene, message: CollisionObject) -> Scene:
         """Return the scene after a CollisionObject. Raises PlanningError; the sentence names the object."""
         operation = _operation(message)
         try:
@@ -63,7 +76,7 @@ class SceneReader:
         except PlanningError as error:
             raise type(error)(_about("collision object", _OPERATIONS[operation], message.id, error)) from None
 
-    def with_attached_object(self, scene, message):
+    def with_attached_object(self, scene: Scene, message: AttachedCollisionObject) -> Scene:
         """Return the scene after an AttachedCollisionObject. Raises PlanningError; the sentence names the object."""
         what = message.object
         operation = _operation(what)
@@ -89,7 +102,7 @@ class SceneReader:
 
     # -- states -------------------------------------------------------------------------------------------------
 
-    def with_robot_state(self, scene, message, errors):
+    def with_robot_state(self, scene: Scene, message: RobotState, errors: list[str]) -> Scene:
         """Return the scene after a RobotState: over what is there if it is a diff, else without what the robot held.
 
         Joints that the model does not have are ignored. ``errors`` (list) gets the reasons for refused parts.
@@ -102,7 +115,7 @@ class SceneReader:
             scene = scene.with_state(scene.state.with_attached({}))
         return self._each(scene, message.attached_collision_objects, self.with_attached_object, errors)
 
-    def with_planning_scene(self, scene, message):
+    def with_planning_scene(self, scene: Scene, message: PlanningScene) -> tuple[Scene, list[str]]:
         """Return (scene after a PlanningScene message, list of sentences on what could not be applied)."""
         errors = []
         if not message.is_diff:
@@ -135,12 +148,13 @@ class SceneReader:
                                         for entry in message.object_colors})
         return scene, errors
 
-    def with_world(self, scene, message):
+    def with_world(self, scene: Scene, message: PlanningSceneWorld) -> tuple[Scene, list[str]]:
         """Return (scene after a PlanningSceneWorld, which replaces the world, errors)."""
         errors = []
         return self._with_world(scene.without_object("").with_octomap(None), message, set(), errors), errors
 
-    def _with_world(self, scene, message, held_before, errors):
+    def _with_world(self, scene: Scene, message: PlanningSceneWorld, held_before: Container[str],
+                    errors: list[str]) -> Scene:
         # Clients that attach an object often remove it from the world in the same message; by then it is no longer
         # there.
         taken = {name for name in scene.state.attached if name not in held_before and name not in scene.objects}
@@ -156,12 +170,12 @@ class SceneReader:
                 errors.append("octomap: %s" % error)
         return scene
 
-    def _with_objects(self, scene, messages, errors):
+    def _with_objects(self, scene: Scene, messages: Iterable[CollisionObject], errors: list[str]) -> Scene:
         """The scene after CollisionObjects. A message may bring or remove 100,000 of them: they are put in or taken out
         together."""
         own_frames = {"", scene.model.frame, *scene.model.links}
 
-        def kind(message):
+        def kind(message: CollisionObject) -> str:
             adds = message.operation == CollisionObject.ADD and message.header.frame_id.lstrip("/") in own_frames
             return "add" if adds else "remove" if message.operation == CollisionObject.REMOVE and message.id else ""
 
@@ -174,13 +188,13 @@ class SceneReader:
                 scene = self._each(scene, some, self.with_collision_object, errors)
         return scene
 
-    def _gone(self, scene, message):
+    def _gone(self, scene: Scene, message: CollisionObject) -> str:
         """The name of the object that a CollisionObject removes. Raises PlanningError where it is not there."""
         if message.id not in scene.objects:
             self.with_collision_object(scene, message)
         return message.id
 
-    def _added(self, scene, message):
+    def _added(self, scene: Scene, message: CollisionObject) -> WorldObject:
         """The WorldObject that a CollisionObject adds. Raises PlanningError; the sentence names the object."""
         try:
             new = _object_of(message, self.frame(scene, message.header.frame_id))
@@ -189,7 +203,7 @@ class SceneReader:
         except PlanningError as error:
             raise type(error)(_about("collision object", "ADD", message.id, error)) from None
 
-    def _with_transforms(self, scene, transforms, errors):
+    def _with_transforms(self, scene: Scene, transforms: Iterable[TransformStamped], errors: list[str]) -> Scene:
         known = {}
         for entry in transforms:
             name, parent = entry.child_frame_id.lstrip("/"), entry.header.frame_id
@@ -203,15 +217,16 @@ class SceneReader:
                 errors.append("fixed frame '%s': %s" % (entry.child_frame_id, error))
         return scene.with_transforms({**scene.transforms, **known})
 
-    def _each(self, scene, messages, apply, errors):
-        def step(message):
+    def _each(self, scene: Scene, messages: Iterable[M], apply: Callable[[Scene, M], Scene],
+              errors: list[str]) -> Scene:
+        def step(message: M) -> None:
             nonlocal scene
             scene = apply(scene, message)
 
         self._made(messages, step, errors)
         return scene
 
-    def _made(self, messages, make, errors):
+    def _made(self, messages: Iterable[M], make: Callable[[M], T], errors: list[str]) -> list[T]:
         """[make(message), ...] of the valid ones; ``errors`` gets the reasons for the others."""
         made = []
         for message in messages:
@@ -225,7 +240,7 @@ class SceneReader:
         return made
 
 
-def state_over(scene, message, reader):
+def state_over(scene: Scene, message: RobotState, reader: SceneReader) -> State:
     """Return the scene's State with the joints and the base of a RobotState message in place.
 
     Raises MessageError for lists of different lengths and values that are not finite.
@@ -251,7 +266,7 @@ def state_over(scene, message, reader):
     return state
 
 
-def _operation(message):
+def _operation(message: CollisionObject) -> int:
     value = message.operation
     # rospy reads a byte as a number, but clients in Python may set any type.
     value = value[0] if isinstance(value, bytes) and value else value
@@ -261,16 +276,16 @@ def _operation(message):
     return value
 
 
-def _about(kind, operation, name, error):
+def _about(kind: str, operation: str, name: str, error: PlanningError) -> str:
     return "%s of %s '%s' refused: %s" % (operation, kind, name, error)
 
 
-def _is_unset(pose):
+def _is_unset(pose: Pose) -> bool:
     return not any((pose.position.x, pose.position.y, pose.position.z, pose.orientation.x, pose.orientation.y,
                     pose.orientation.z, pose.orientation.w))
 
 
-def _object_of(message, frame):
+def _object_of(message: CollisionObject, frame: np.ndarray) -> WorldObject:
     """The WorldObject of a CollisionObject's shapes; ``frame`` (4, 4): its header's, in which the poses are
     returned."""
     shapes = []
@@ -298,7 +313,7 @@ def _object_of(message, frame):
     return WorldObject(message.id, frame @ pose, tuple(shapes), subframes, (message.type.key, message.type.db))
 
 
-def _moved(scene, message, frame):
+def _moved(scene: Scene, message: CollisionObject, frame: np.ndarray) -> Scene:
     if message.primitives or message.meshes or message.planes:
         raise MessageError("a MOVE carries poses only, this one has shapes too; ADD replaces an object")
     poses = [matrix_of(pose, "the pose of a shape")

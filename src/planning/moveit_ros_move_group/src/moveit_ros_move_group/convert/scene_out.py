@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes, states and trajectories as messages."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -21,10 +26,18 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from moveit_ros_move_group.convert.geometry import add_shapes, pose_of, transform_of
 
+if TYPE_CHECKING:
+    from octomap_msgs.msg import OctomapWithPose
+
+    from motion_planning.model import PlanningModel, State
+    from motion_planning.scene import AllowedCollisions, AttachedBody, Scene, WorldObject
+    from motion_planning.timing import Timed
+
 EVERYTHING = 1023
 
 
-def object_message(thing, frame, stamp=None, geometry=True):
+def object_message(thing: WorldObject, frame: str, stamp: rospy.Time | None = None,
+                   geometry: bool = True) -> CollisionObject:
     """Return the CollisionObject of a WorldObject whose pose is given in ``frame``."""
     message = CollisionObject(id=thing.id, operation=CollisionObject.ADD)
     message.header.frame_id = frame
@@ -38,7 +51,7 @@ def object_message(thing, frame, stamp=None, geometry=True):
     return message
 
 
-def attached_message(body):
+def attached_message(body: AttachedBody) -> AttachedCollisionObject:
     """Return the AttachedCollisionObject of an AttachedBody."""
     message = AttachedCollisionObject(link_name=body.link, object=object_message(body.object, body.link),
                                       touch_links=sorted(body.touch_links))
@@ -47,7 +60,8 @@ def attached_message(body):
     return message
 
 
-def state_message(model, state, stamp=None, attached=True, is_diff=False):
+def state_message(model: PlanningModel, state: State, stamp: rospy.Time | None = None, attached: bool = True,
+                  is_diff: bool = False) -> RobotState:
     """Return the RobotState of a State: all joints, mimic ones too, and the base where a virtual joint moves it."""
     message = RobotState(is_diff=is_diff)
     stamp = stamp or rospy.Time()
@@ -65,7 +79,8 @@ def state_message(model, state, stamp=None, attached=True, is_diff=False):
     return message
 
 
-def scene_message(scene, components=EVERYTHING, octomap=None, stamp=None):
+def scene_message(scene: Scene, components: int = EVERYTHING, octomap: OctomapWithPose | None = None,
+                  stamp: rospy.Time | None = None) -> PlanningScene:
     """Return the parts of a scene that ``components`` (bits of PlanningSceneComponents; 0 for all) asks for.
 
     octomap: the OctomapWithPose that the scene's octomap came with, or None.
@@ -100,7 +115,8 @@ def scene_message(scene, components=EVERYTHING, octomap=None, stamp=None):
     return message
 
 
-def scene_diff(before, after, stamp=None, octomap=None):
+def scene_diff(before: Scene, after: Scene, stamp: rospy.Time | None = None,
+               octomap: OctomapWithPose | None = None) -> PlanningScene:
     """Return the PlanningScene diff that leads from one scene to another."""
     model = after.model
     message = PlanningScene(is_diff=True, name=after.name, robot_model_name=model.name)
@@ -133,14 +149,15 @@ def scene_diff(before, after, stamp=None, octomap=None):
     return message
 
 
-def matrix_message(allowed):
+def matrix_message(allowed: AllowedCollisions) -> AllowedCollisionMatrix:
     """Return the AllowedCollisionMatrix of an AllowedCollisions."""
     names, matrix, default_names, default_values = allowed.as_matrix()
     return AllowedCollisionMatrix(names, [AllowedCollisionEntry(row.tolist()) for row in matrix], default_names,
                                   default_values)
 
 
-def trajectory_message(names, timed, frame, stamp=None):
+def trajectory_message(names: Sequence[str], timed: Timed, frame: str,
+                       stamp: rospy.Time | None = None) -> RobotTrajectory:
     """Return the RobotTrajectory of a timing.Timed for joints ``names``."""
     message = RobotTrajectory()
     message.joint_trajectory.header.frame_id = frame
