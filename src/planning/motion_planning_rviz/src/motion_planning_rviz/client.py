@@ -19,7 +19,6 @@ from motion_planning_rviz.interaction import group_values
 from motion_planning_rviz.messages import code_name, goal_constraints, pose_message, state_message, state_values
 
 if TYPE_CHECKING:
-    import genpy
     from actionlib import ClientGoalHandle
 
     from motion_planning.model import PlanningModel, State
@@ -214,7 +213,7 @@ class MoveGroupClient:
             handle.cancel()
         self._event.publish("stop")
 
-    def _send(self, name: str, goal: genpy.Message, done: Callable[[Outcome], None]) -> None:
+    def _send(self, name: str, goal: rospy.Message, done: Callable[[Outcome], None]) -> None:
         client = self._clients[name]
         # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
         if not client.wait_for_server(rospy.Duration(0, -1)):

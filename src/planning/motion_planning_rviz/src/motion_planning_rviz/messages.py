@@ -172,7 +172,7 @@ def text_marker(text: str, position: Iterable[float], frame: str, height: float)
     return marker
 
 
-def line_marker(name: str, points: np.ndarray, frame: str, colour: Colour, width: float) -> Marker:
+def line_marker(name: str, points: Iterable[np.ndarray], frame: str, colour: Colour, width: float) -> Marker:
     """Return a Marker with a line through ``points`` (m, 3), ``width`` [m]."""
     marker = Marker(ns=name, type=Marker.LINE_STRIP, action=Marker.ADD, scale=Vector3(width, 0.0, 0.0),
                     pose=Pose(Point(), Quaternion(0.0, 0.0, 0.0, 1.0)), color=ColorRGBA(*colour),

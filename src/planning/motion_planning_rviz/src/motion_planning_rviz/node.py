@@ -29,7 +29,6 @@ from motion_planning_rviz.worker import Worker
 from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
 if TYPE_CHECKING:
-    import genpy
     from std_msgs.msg import Header
 
     from motion_planning_rviz.interaction import Handle
@@ -107,7 +106,7 @@ class PanelNode:
                      lambda message: self._put(lambda: self._view.path(message)))
         self._listen("move_group/monitored_planning_scene", PlanningScene, self._on_scene)
 
-    def _listen(self, name: str, kind: type[genpy.Message], callback: Callable[[Any], None]) -> None:
+    def _listen(self, name: str, kind: type[rospy.Message], callback: Callable[[Any], None]) -> None:
         self._subscribers.append(rospy.Subscriber(name, kind, callback, queue_size=10))
 
     def _put(self, function: Callable[[], None], key: Hashable = None) -> None:

@@ -14,7 +14,6 @@ from .exception import MoveItCommanderException
 
 if TYPE_CHECKING:
     from numpy.random import Generator
-    from numpy.typing import ArrayLike
 
     from motion_planning.model import Group, PlanningModel
 
@@ -44,7 +43,7 @@ class JointTarget:
         """The values of the group's ``joints``, those that can be moved."""
         return self._state.q[self._group.indices].tolist()
 
-    def set_values(self, values: ArrayLike, tolerance: float) -> None:
+    def set_values(self, values: Sequence[float] | np.ndarray, tolerance: float) -> None:
         """Set all values of the group, given in the order of its ``valued_joints``, or of its ``joints``."""
         names, values = self._group.valued_joints, [float(value) for value in values]
         if len(values) != len(names):

@@ -14,7 +14,7 @@ from .requests import RequestSettings
 class Tunable:
     """Something with settings for planning. Angles in rad, positions in m, times in s."""
 
-    def __init__(self, settings: RequestSettings = None) -> None:
+    def __init__(self, settings: RequestSettings | None = None) -> None:
         self._settings = settings or RequestSettings()
 
     def get_goal_tolerance(self) -> tuple[float, float, float]:
