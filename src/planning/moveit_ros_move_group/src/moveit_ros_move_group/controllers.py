@@ -111,13 +111,13 @@ def choose(controllers: Sequence[Controller], joints: Iterable[str],
 
     if len(useful) > _MAX_TO_COMBINE:
         return _greedy(useful, joints)
-    best = None
+    best: tuple[Controller, ...] | None = None
     for size in range(1, len(useful) + 1):
         for chosen in itertools.combinations(useful, size):
             moved = {joint for controller in chosen for joint in controller.joints}
             if joints <= moved and (best is None or cost(chosen) < cost(best)):
                 best = chosen
-    return list(best)
+    return list(best or ())
 
 
 def _greedy(useful: Sequence[Controller], joints: Iterable[str]) -> list[Controller]:

@@ -79,6 +79,10 @@ def test_joints_without_a_controller_are_named():
         choose([], ["l0"])
 
 
+def test_no_joints_need_no_controller():
+    assert choose([], []) == []
+
+
 def test_many_controllers_are_combined_too():
     controllers, _ = read_list([entry("c%d" % i, ["j%d" % i]) for i in range(30)])
     assert len(choose(controllers, ["j%d" % i for i in range(30)])) == 30
