@@ -16,7 +16,10 @@ Array = NDArray[np.float64]
 Errors = Callable[[Array], Array]
 
 BLOCKS = 10
-MAX_ROUNDS = 12
+MAX_ROUNDS = 16
+TRIES = 5
+#: By how much of itself a number is changed where no step makes the cost less.
+SHARES = (0.05, 0.15)
 #: A round that makes the cost less by a smaller share is the last one.
 ENOUGH = 1e-4
 MIN_EIGENVALUE = 1e-9  # of the slopes' correlation
@@ -49,20 +52,38 @@ def least_squares(errors: Errors, start: Array, bounds: Bounds, rows: NDArray[np
     damping, slopes = 1e-3, slopes_of(errors, numbers, error, bounds)
     for _ in range(rounds):
         before = _cost(error[counts])
-        for _ in range(5):
+        for _ in range(TRIES):
             tried = np.clip(numbers - _step(slopes[:, counts], error[counts], damping, _pressed(
                 numbers, slopes[:, counts], error[counts], bounds)), bounds.least, bounds.most)
             new = errors(tried)
             if _cost(new[counts]) < before:
+                numbers, error, damping = tried, new, max(damping / 10.0, 1e-9)
                 break
             damping *= 10.0
-        else:
-            break
-        numbers, error, damping = tried, new, max(damping / 10.0, 1e-9)
-        slopes = slopes_of(errors, numbers, error, bounds)
         if before - _cost(error[counts]) < ENOUGH * before:
-            break
+            # Friction makes corners, at which slopes mislead.
+            numbers, error, damping = *_one_by_one(errors, numbers, error, counts, bounds), 1e-3
+            if before - _cost(error[counts]) < ENOUGH * before:
+                break
+        slopes = slopes_of(errors, numbers, error, bounds)
     return Fit(numbers, error, slopes, deviations(slopes[:, counts], error[counts]))
+
+
+def _one_by_one(errors: Errors, numbers: Array, error: Array, counts: NDArray[np.bool_],
+                bounds: Bounds) -> tuple[Array, Array]:
+    """Change each number by itself, by a step or by a share of itself, and by twice as much each time, as long as the
+    cost becomes less."""
+    for index in range(len(numbers)):
+        for by in (sign * size for size in (bounds.step[index], *(share * abs(numbers[index]) for share in SHARES))
+                   for sign in (1.0, -1.0)):
+            while True:
+                tried = numbers.copy()
+                tried[index] = np.clip(tried[index] + by, bounds.least[index], bounds.most[index])
+                new = errors(tried)
+                if not _cost(new[counts]) < _cost(error[counts]):
+                    break
+                numbers, error, by = tried, new, 2.0 * by
+    return numbers, error
 
 
 def slopes_of(errors: Errors, numbers: Array, error: Array, bounds: Bounds) -> Array:
