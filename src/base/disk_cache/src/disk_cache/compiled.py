@@ -72,9 +72,9 @@ def _without_its_library() -> Iterator[None]:
     """
     from numba.core import environment as parts
 
-    names = ("_rebuild_env", "lookup_environment", "Environment")
-    original = getattr(parts, names[0], None)
-    if not all(hasattr(parts, name) for name in names) or not hasattr(parts.Environment, "_memo"):
+    original = getattr(parts, "_rebuild_env", None)
+    if original is None or not hasattr(parts, "lookup_environment") or not hasattr(
+            getattr(parts, "Environment", None), "_memo"):
         yield  # numba has changed inside
         return
 

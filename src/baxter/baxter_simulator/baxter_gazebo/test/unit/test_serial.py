@@ -10,7 +10,8 @@ LAUNCH = Path(__file__).parents[2] / "launch/baxter_world.launch"
 
 
 @pytest.mark.parametrize(("serial", "name"), [
-    ("0", "SIM-BAXTER"), ("3", "SIM-BAXTER-3"), ("/home/me/own.yaml", "SIM-BAXTER-own"), ("own.yaml", "SIM-BAXTER-own")])
+    ("0", "SIM-BAXTER"), ("3", "SIM-BAXTER-3"), ("/home/me/own.yaml", "SIM-BAXTER-own"),
+    ("own.yaml", "SIM-BAXTER-own")])
 def test_the_manifest_names_the_robot(serial, name):
     parameter = ElementTree.parse(LAUNCH).find("param[@name='manifest/robot_serial']")
     assert resolve_args(parameter.get("value"), context={"arg": {"serial": serial}}) == name
