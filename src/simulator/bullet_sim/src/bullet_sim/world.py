@@ -8,7 +8,6 @@ import numpy as np
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
-from . import client_memory
 from .builder import Blueprint, build, is_wheel, link_collisions
 from .contact import Contact
 from .errors import LOG, BulletSimError, within
@@ -93,11 +92,9 @@ class World:
         self.models = {}
         self.random = np.random.default_rng(seed)
         self._warn = warn
-        before = client_memory.taken()
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise BulletSimError("PyBullet gave no physics client; are too many worlds open in this process?")
-        client_memory.give_back(before)
         #: MeshFiles, which any thread may ask.
         self.mesh_files = MeshFiles(find_mesh, MeshCache(warn=warn))
         self._shapes = ShapeStore(self._client, self.mesh_files)
