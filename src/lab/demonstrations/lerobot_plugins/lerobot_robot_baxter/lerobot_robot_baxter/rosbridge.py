@@ -114,7 +114,7 @@ class Bridge:
                 said = json.loads(text)
                 if said.get("op") == "publish":
                     self._take(said["topic"], said["msg"])
-        except (OSError, ValueError, KeyError, websocket.WebSocketException) as error:
+        except Exception as error:  # whoever waits must hear of it, whatever the server sent
             with self._came:
                 self._end = self._end or str(error) or type(error).__name__
                 self._came.notify_all()
