@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The links of a model in the world: poses, applied wrenches, masses, contacts."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,17 @@ from .parts import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from urdf_model import MergedFrame, MergedLink
+
+    from .builder import Blueprint
+    from .parts import Motion, Parts
+    from .world import World
+
 BASE = -1  # PyBullet's index of the root link
 _SLOW = 0.01  # slower links keep their velocity, as in ODE [m/s, rad/s]
 
@@ -24,7 +38,8 @@ class Body:
     #: For how many checks of ``StateWatch`` the base has not moved.
     still_for = 0
 
-    def __init__(self, client, world, blueprint, parts, root_offsets):
+    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Parts,
+                 root_offsets: list[np.ndarray]) -> None:
         """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``parts``, ``root_offsets``:
         what ``builder.build`` returned for it."""
         #: The blueprint that the body is made from; its collision pairs may change.
@@ -67,38 +82,38 @@ class Body:
                 self.set_weight(link.name, False)
 
     @property
-    def body(self):
+    def body(self) -> int:
         """PyBullet's number of the multibody that has the root's shape; the only one of most models."""
         return self.parts.bodies[0]
 
     # -- links --------------------------------------------------------------------------------------------------
 
     @property
-    def link_names(self):
+    def link_names(self) -> tuple[str, ...]:
         """The links of the description, including merged ones."""
         return tuple(self.merged.frames)
 
-    def link_pose(self, link):
+    def link_pose(self, link: str) -> Pose:
         """Return the pose of a link's frame in the world. Raises BulletSimError for an unknown link."""
         return Pose.from_matrix(self._link_matrix(link))
 
-    def body_frame(self, body):
+    def body_frame(self, body: str) -> np.ndarray:
         """Return the frame (4, 4) of a body, a link with what is fixed to it, in the world."""
         return self._body_matrix(self._link_index[body])
 
-    def link_twist(self, link):
+    def link_twist(self, link: str) -> tuple[np.ndarray, np.ndarray]:
         """Return (linear (3,), angular (3,)) velocity of a link's frame, in world axes [m/s, rad/s]."""
         frame = self._frame(link)
         index = self._link_index[frame.link]
         return self._twist(index, (self._body_matrix(index) @ frame.offset)[:3, 3])
 
-    def base_pose(self):
+    def base_pose(self) -> Pose:
         """Return the pose of the model's frame in the world; for a URDF that is the root link's."""
         if self._root_is_centre:
             return Pose(*pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client))
         return Pose.from_matrix(self._body_matrix(BASE))
 
-    def set_base_pose(self, pose):
+    def set_base_pose(self, pose: Pose) -> None:
         """Put the model's frame at ``pose``, at rest if it is free; joints keep their positions, and loose links their
         places to it."""
         wanted = pose.checked().matrix()
@@ -111,39 +126,39 @@ class Body:
             self._put_root(index, frame)
         self._was_placed()
 
-    def loose_poses(self):
+    def loose_poses(self) -> list[Pose]:
         """Return the poses of the frames of the loose bodies, in the order of ``merged.loose``."""
         return [Pose.from_matrix(self._body_matrix(index)) for index in self.loose]
 
-    def root_of(self, link):
+    def root_of(self, link: str) -> str:
         """Return the root of the tree that a link is in, one of ``merged.roots``."""
         return self._link_names[self.parts.root_of(self._link_index[self._frame(link).link])]
 
-    def set_root_pose(self, root, pose):
+    def set_root_pose(self, root: str, pose: Pose) -> None:
         """Put the frame of a free body of ``merged.roots`` at ``pose``, at rest, with the links that joints hold on it,
         but not the other roots."""
         self._put_root(self._link_index[root], pose.checked().matrix())
         self._was_placed()
 
-    def set_root_twist(self, root, linear, angular):
+    def set_root_twist(self, root: str, linear: Sequence[float] | np.ndarray, angular: Sequence[float] | np.ndarray) -> None:
         """Set the velocity of a free body of ``merged.roots`` [m/s, rad/s, world axes]: that of the model's frame for
         the first one, else that of its link's. Raises BulletSimError out of bounds."""
         self._set_root_twist(self._link_index[root], linear, angular)
         self.wake()
 
-    def _put_root(self, index, frame):
+    def _put_root(self, index: int, frame: np.ndarray) -> tuple:
         """Put the frame of a root at ``frame`` (4, 4); returns the quaternion that PyBullet has for it."""
         centre = Pose.from_matrix(frame @ self._offsets[index][0])
         self.parts.set_root(index, centre.position, centre.quaternion)
         return centre.quaternion
 
-    def _was_placed(self):
+    def _was_placed(self) -> None:
         self._late_twists = {}
         if self.free:
             self._world.note_placed(self)
         self._world.wake_all()
 
-    def model_pose(self):
+    def model_pose(self) -> Pose:
         """Return the pose of the model as Gazebo tells it: its frame goes with its first link. That is the pose of
         :meth:`base_pose` but for models that joints hold on the world."""
         if self._canonical is None:
@@ -151,7 +166,7 @@ class Body:
         link, to_model = self._canonical
         return Pose.from_matrix(self._link_matrix(link) @ to_model)
 
-    def model_twist(self):
+    def model_twist(self) -> tuple[np.ndarray, np.ndarray]:
         """Return (linear (3,), angular (3,)) velocity of the frame of :meth:`model_pose`, in world axes."""
         if self._canonical is None:
             return self.base_twist()
@@ -159,18 +174,18 @@ class Body:
         index, matrix = self._link_index[self._frame(link).link], self._link_matrix(link)
         return self._twist(index, (matrix @ to_model)[:3, 3])
 
-    def base_twist(self):
+    def base_twist(self) -> tuple[np.ndarray, np.ndarray]:
         """Return (linear (3,), angular (3,)) velocity of the model's frame, in world axes."""
         return self._twist(BASE, self._body_matrix(BASE)[:3, 3])
 
-    def set_base_twist(self, linear, angular):
+    def set_base_twist(self, linear: Sequence[float] | np.ndarray, angular: Sequence[float] | np.ndarray) -> None:
         """Set the velocity of a free model's frame, in world axes [m/s, rad/s], and as in Gazebo that of each loose
         link. Raises BulletSimError out of bounds."""
         for index in self.free:
             self._set_root_twist(index, linear, angular)
         self.wake()
 
-    def _set_root_twist(self, index, linear, angular):
+    def _set_root_twist(self, index: int, linear: Sequence[float] | np.ndarray, angular: Sequence[float] | np.ndarray) -> None:
         within(bounds.SPEED, linear, "the linear velocity")
         angular = np.asarray(within(bounds.TURN_RATE, angular, "the angular velocity"), dtype=float)
         # The frame moves at `linear`; Bullet wants the velocity of the centre of mass.
@@ -183,7 +198,9 @@ class Body:
         pybullet.resetBaseVelocity(self.parts.places[index].body, *self._late_twists[index],
                                    physicsClientId=self._client)
 
-    def apply_wrench(self, link, force, torque=(0.0, 0.0, 0.0), position=None):
+    def apply_wrench(self, link: str, force: Sequence[float] | np.ndarray,
+                     torque: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+                     position: Sequence[float] | np.ndarray | None = None) -> None:
         """Push a link during the next step: ``force`` [N] and ``torque`` [Nm] in world axes.
 
         The force acts at ``position`` (world, m), by default at the centre of mass of the link's body.
@@ -201,12 +218,12 @@ class Body:
         self.wake()
         self._push(*push)
 
-    def pushes(self):
+    def pushes(self) -> list[tuple]:
         """Return the wrenches of :meth:`apply_wrench` in the last step: a list of (body, force, torque, position or
         None)."""
         return self._pushes if self._pushed_at == self._world.steps - 1 else []
 
-    def wake(self):
+    def wake(self) -> None:
         """Wake the model up if Bullet has put it to sleep."""
         for index in self.free:
             pybullet.changeDynamics(*self.parts.places[index], physicsClientId=self._client,
@@ -214,7 +231,7 @@ class Body:
         if self.free:
             self._world.note_touched(self)
 
-    def reapply_wrenches(self):
+    def reapply_wrenches(self) -> None:
         """For World, after a step: apply again what was applied to the model while it slept.
 
         Bullet wakes a body at the end of a step, so the body ignores forces in that step: its velocity is then exactly
@@ -235,7 +252,7 @@ class Body:
                 if self.parts.root_of(push[0]) == index:
                     self._push(*push)
 
-    def contact_force(self, link):
+    def contact_force(self, link: str) -> np.ndarray:
         """Return the force (3,) [N, world axes] with which others pressed on a link's body in the last step.
 
         Without friction.
@@ -248,19 +265,19 @@ class Body:
             total += point[9] * np.array(point[7])
         return total
 
-    def grip_firmly(self, link):
+    def grip_firmly(self, link: str) -> None:
         """Make friction at a link's body hold without creeping: by default it creeps by 0.3 mm/s under load."""
         index = self._link_index[self._frame(link).link]
         pybullet.changeDynamics(*self.parts.places[index], frictionAnchor=1, physicsClientId=self._client)
         self._firm.add(index)
 
-    def soften(self, link, stiffness, damping):
+    def soften(self, link: str, stiffness: float, damping: float) -> None:
         """Make the surface of a link's body yield in contacts: stiffness [N/m], damping [N s/m]."""
         index = self._link_index[self._frame(link).link]
         pybullet.changeDynamics(*self.parts.places[index], contactStiffness=stiffness, contactDamping=damping,
                                 physicsClientId=self._client)
 
-    def renew_contacts(self, link):
+    def renew_contacts(self, link: str) -> None:
         """Forget the contacts of a link's body; the next step detects them again.
 
         Bullet keeps contacts from step to step, and sometimes a false one: its normal comes from two nearly parallel
@@ -272,7 +289,7 @@ class Body:
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
 
-    def inertial(self, body):
+    def inertial(self, body: str) -> Inertial:
         """Return the urdf_model.Inertial of the body ``body``, in its link's frame. Raises BulletSimError."""
         link = self._body(body)
         offset = self.merged.frames[body].offset
@@ -280,7 +297,7 @@ class Body:
         return Inertial(link.inertial.mass, rotation.T @ (link.inertial.centre - offset[:3, 3]),
                         rotation.T @ link.inertial.inertia @ rotation)
 
-    def set_inertial(self, body, mass, inertia, centre=None):
+    def set_inertial(self, body: str, mass: float, inertia: ArrayLike, centre: ArrayLike | None = None) -> None:
         """Set mass [kg] and inertia (3, 3) about the centre of mass [kg m^2, axes of the link's frame] of a body, and
         that ``centre`` (3,) [m, link's frame] if it is given.
 
@@ -331,7 +348,7 @@ class Body:
             self._weightless[body] = mass
         self.wake()
 
-    def _rebuild_with(self, link, inertial):
+    def _rebuild_with(self, link: MergedLink, inertial: Inertial) -> None:
         """Rebuild the multibodies with another inertial of a link; poses and velocities stay."""
         motion, index = self.motion(), self._link_index[link.name]
         link.inertial = inertial
@@ -351,17 +368,17 @@ class Body:
                 motion.loose[index] = base, twist
         self._world.rebuild([self], {self: motion})
 
-    def _set_root_offset(self, index, offset):
+    def _set_root_offset(self, index: int, offset: np.ndarray) -> None:
         self._offsets[index] = offset, inverse(offset)
         if index == BASE:
             self._root_is_centre = bool(np.array_equal(offset, np.eye(4)))
 
-    def has_weight(self, body):
+    def has_weight(self, body: str) -> bool:
         """Whether gravity acts on the body ``body``."""
         self._body(body)
         return body not in self._weightless
 
-    def set_weight(self, body, wanted):
+    def set_weight(self, body: str, wanted: bool) -> None:
         """Switch gravity on the body ``body`` on or off."""
         mass = self._body(body).inertial.mass
         self._weightless.pop(body, None)
@@ -370,13 +387,13 @@ class Body:
         self._world.note_weightless(self, bool(self._weightless))
         self.wake()
 
-    def cancel_weight(self):
+    def cancel_weight(self) -> None:
         """For World: cancel gravity on the weightless bodies in the next step."""
         gravity = np.array(self._world.gravity)
         for body, mass in self._weightless.items():
             self._push(self._link_index[body], -mass * gravity)
 
-    def slow_down(self):
+    def slow_down(self) -> None:
         """For World: take away what the velocities of links lose in the next step (SDF's <velocity_decay>, as ODE)."""
         dt = self._world.time_step_s
         for body, (linear_part, angular_part) in self.decaying.items():
@@ -393,7 +410,7 @@ class Body:
 
     # -- collisions ---------------------------------------------------------------------------------------------
 
-    def set_self_collision_pairs(self, pairs):
+    def set_self_collision_pairs(self, pairs: Iterable[tuple[str, str]]) -> None:
         """Let exactly these ``pairs`` of links collide with each other; at the start none do, as in Gazebo.
 
         Two links with one joint between them never collide."""
@@ -418,16 +435,16 @@ class Body:
                     physicsClientId=self._client
                 )
 
-    def link_name(self, body, index):
+    def link_name(self, body: int, index: int) -> str:
         """Return the merged name of the link that PyBullet numbers ``index`` (-1 is the root) in the multibody
         ``body``."""
         return self._link_names[self.parts.index(body, index)]
 
-    def frame_of(self, motion):
+    def frame_of(self, motion: Motion) -> Pose:
         """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
         return Pose.from_matrix(Pose(*motion.base).matrix() @ self._offsets[BASE][1])
 
-    def _restore_collisions(self):
+    def _restore_collisions(self) -> None:
         """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
         pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
         self.set_self_collision_pairs([tuple(pair) for pair in pairs])
@@ -436,7 +453,7 @@ class Body:
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _frame(self, link):
+    def _frame(self, link: str) -> MergedFrame:
         try:
             return self.merged.frames[link]
         except KeyError:
@@ -444,7 +461,7 @@ class Body:
                 "model '%s' has no link '%s'; its links are %s" % (self.name, link, ", ".join(self.link_names))
             ) from None
 
-    def _body(self, body):
+    def _body(self, body: str) -> MergedLink:
         """Return the MergedLink ``body``; raises BulletSimError, which names the body for a link that was merged."""
         if body not in self.merged.links:
             frame = self._frame(body)
@@ -452,7 +469,7 @@ class Body:
                                  % (body, self.name, frame.link))
         return self.merged.links[body]
 
-    def _find_canonical(self):
+    def _find_canonical(self) -> tuple[str, np.ndarray] | None:
         """(Gazebo's first link, the model's frame in its (4, 4)) where joints carry it, or None; before any joint has
         moved."""
         first = next(iter(self.gazebo_links), self.merged.root)
@@ -460,11 +477,11 @@ class Body:
             return None
         return first, inverse(self._link_matrix(first)) @ self._body_matrix(BASE)
 
-    def _link_matrix(self, link):
+    def _link_matrix(self, link: str) -> np.ndarray:
         frame = self._frame(link)
         return self._body_matrix(self._link_index[frame.link]) @ frame.offset
 
-    def _body_matrix(self, index):
+    def _body_matrix(self, index: int) -> np.ndarray:
         if index < 0:
             body = self.parts.places[index].body
             centre = Pose(*pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client))
@@ -473,7 +490,7 @@ class Body:
                                       physicsClientId=self._client)
         return Pose(state[4], state[5]).matrix()
 
-    def _twist(self, index, point):
+    def _twist(self, index: int, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (linear, angular) velocity of ``point`` (3,) (world) of a body, in world axes."""
         if index < 0:
             body = self.parts.places[index].body
@@ -485,7 +502,9 @@ class Body:
             centre, linear, angular = np.array(state[0]), np.array(state[6]), np.array(state[7])
         return linear + np.cross(angular, point - centre), angular
 
-    def _push(self, index, force, torque=(0.0, 0.0, 0.0), position=None):
+    def _push(self, index: int, force: Sequence[float] | np.ndarray,
+              torque: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+              position: Sequence[float] | np.ndarray | None = None) -> None:
         place = self.parts.places[index]
         if position is None:
             if index < 0:

@@ -5,8 +5,10 @@ A body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary fi
 copies, the inertia exactly as merged, and 10 ms where loading the same robot from a file takes 60.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +21,14 @@ from .parts import Parts, Place, limbs
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from urdf_model import Joint, MergedLink, Shape
+
+    from .parts import Limb
+    from .shapes import ShapeStore
 
 _JOINT_TYPES = {
     "revolute": pybullet.JOINT_REVOLUTE,
@@ -64,7 +74,8 @@ class Blueprint(NamedTuple):
     in_limbs: bool = True
 
 
-def build(client, blueprint, pose, shapes, warn):
+def build(client: int, blueprint: Blueprint, pose: Pose, shapes: ShapeStore,
+          warn: Callable[[str], None]) -> tuple[Parts, list[np.ndarray]]:
     """Create the multibodies of a :class:`Blueprint` with its root bodies at ``pose``, its shapes from a ShapeStore.
 
     Returns (Parts, [inertial offset (4, 4) of each root]). ``warn(text)`` is called for missing masses.
@@ -79,7 +90,8 @@ def build(client, blueprint, pose, shapes, warn):
     return Parts(client, bodies, merged, found), offsets
 
 
-def _build_tree(client, blueprint, own, start, shapes, warn):
+def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose, shapes: ShapeStore,
+                warn: Callable[[str], None]) -> tuple[list[int], np.ndarray]:
     """Create the multibodies of the Limbs ``own``, which have one root, at Pose ``start``.
 
     Returns PyBullet's numbers of them and the root's inertial offset (4, 4).
@@ -115,7 +127,8 @@ def _build_tree(client, blueprint, own, start, shapes, warn):
     return bodies, root_offset
 
 
-def _build_limb(client, blueprint, limb, base, shapes, warn):
+def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, Any], shapes: ShapeStore,
+                warn: Callable[[str], None]) -> int:
     """Create the multibody of a Limb; ``base``: createMultiBody's arguments for the root.
 
     Returns PyBullet's number of it.
@@ -168,7 +181,7 @@ def _build_limb(client, blueprint, limb, base, shapes, warn):
     return body
 
 
-def link_collisions(merged, name, static):
+def link_collisions(merged: MergedRobot, name: str, static: bool) -> list[Shape]:
     """Return the collision shapes (urdf_model.Shape) of a link of ``merged`` as they are built: the places where
     wheels and casters touch the floor are determined. ``static``: whether the root is fixed.
     """
@@ -180,14 +193,14 @@ def link_collisions(merged, name, static):
     return [part for shape in shapes for part in (_as_wheel(shape, axes[0]) if axes else [shape])]
 
 
-def _as_caster(shape):
+def _as_caster(shape: Shape) -> Shape:
     if not isinstance(shape.geometry, Sphere):
         return shape
     radius = shape.geometry.radius
     return replace(shape, geometry=Sphere(radius - min(_GAP_M, _GAP_PART * radius)))
 
 
-def _as_wheel(shape, axis):
+def _as_wheel(shape: Shape, axis: np.ndarray) -> list[Shape]:
     """A cylinder around ``axis`` (3,) as two: one of its radius, but narrow, and one of its width."""
     if not isinstance(shape.geometry, Cylinder) or abs(shape.origin[:3, 2] @ axis) < _ALONG * np.linalg.norm(axis):
         return [shape]
@@ -197,12 +210,12 @@ def _as_wheel(shape, axis):
             replace(shape, geometry=Cylinder(radius - min(_GAP_M, _GAP_PART * radius), length))]
 
 
-def is_wheel(joint):
+def is_wheel(joint: Joint) -> bool:
     """Whether the link behind a joint can be a wheel: its radius decides how far it goes, its friction how it pulls."""
     return joint.type == "continuous"
 
 
-def set_collision_filter(client, place, surface, renew=False):
+def set_collision_filter(client: int, place: Place, surface: Surface | None, renew: bool = False) -> None:
     """Let the link at a Place collide with those that share a bit with it (``Surface.bitmask``); ``renew``: also where
     it collides with all, so that Bullet drops the link's contacts."""
     if surface is not None and surface.bitmask is not None:
@@ -213,19 +226,19 @@ def set_collision_filter(client, place, surface, renew=False):
         pybullet.setCollisionFilterGroupMask(*place, 1, -1, physicsClientId=client)
 
 
-def most_friction(joint):
+def most_friction(joint: Joint | None) -> float:
     """The largest coefficient of friction of the link behind a joint; None: of a root."""
     return _WHEEL_FRICTION if joint is not None and is_wheel(joint) else 1.0
 
 
-def directed_bodies(merged):
+def directed_bodies(merged: MergedRobot) -> frozenset[str]:
     """The bodies of a urdf_model.MergedRobot whose friction depends on the direction."""
     by_child = {joint.child: joint for joint in merged.joints.values()}
     return frozenset(link.name for link in merged.links.values()
                      if directed(link.surface, most_friction(by_child.get(link.name))) is not None)
 
 
-def _contact(surface, most, axes):
+def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str, Any]:
     """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one; ``axes`` (3, 3) of the
     inertial frame in the body's."""
     surface, ways = surface or Surface(), directed(surface, most)
@@ -249,7 +262,7 @@ def _contact(surface, most, axes):
     return arguments
 
 
-def is_rigid(stiffness):
+def is_rigid(stiffness: float | None) -> bool:
     """Whether contacts of a surface with a stiffness [N/m] are rigid; None: it is not given."""
     return stiffness is None or stiffness >= _RIGID_N_PER_M
 
@@ -268,12 +281,12 @@ _COLUMNS = (
 )
 
 
-def inertial_frame(link):
+def inertial_frame(link: MergedLink) -> np.ndarray:
     """Return the inertial frame (4, 4) of a link that moves, in its body's frame."""
     return _inertial(link, lambda text: None)[2]
 
 
-def _inertial(link, warn):
+def _inertial(link: MergedLink, warn: Callable[[str], None]) -> tuple[float, np.ndarray, np.ndarray]:
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     given = link.inertial.mass
     mass, moments, axes = moving_inertial(link.inertial)

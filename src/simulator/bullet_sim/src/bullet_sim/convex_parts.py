@@ -5,10 +5,17 @@ Bullet collides convex shapes quickly and robustly, but not moving or thin-walle
 where a shape is hollow and gives the planes; nothing is searched.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
 AXES = "xyz"
 
 
-def cut(triangles, planes):
+def cut(triangles: Iterable, planes: Iterable[Sequence]) -> list[list[tuple]]:
     """Return the parts of a mesh as lists of points (x, y, z), parts without points left out.
 
     triangles: sequence of (3, 3) corners; planes: sequence of (axis "x", "y" or "z", offset), each cutting all of the
@@ -29,12 +36,12 @@ def cut(triangles, planes):
     return [sorted({point for polygon in polygons for point in polygon}) for polygons in parts if polygons]
 
 
-def _lies_between(polygons, low, high):
+def _lies_between(polygons: Iterable[list[tuple]], low: float, high: float) -> bool:
     heights = [point[2] for polygon in polygons for point in polygon]
     return all(low <= height <= high for height in heights)
 
 
-def _clip(polygon, axis, offset, sign):
+def _clip(polygon: list[tuple], axis: int, offset: float, sign: float) -> list[tuple]:
     """Return the part of a convex polygon on one side of a plane; empty if that is only an edge.
 
     A polygon in the plane itself belongs to neither side: it would close the hollow side's hull with a lid.

@@ -6,13 +6,21 @@ It is not bounded where a description asks for implicit damping (Gazebo's ``impl
 a joint with more inertia: where the damping is too large for the links' own inertia, they get it.
 """
 
+from __future__ import annotations
+
 import math
 import weakref
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .mass_matrix import mass_matrix_of
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from .model import Model
 
 # Bullet applies joint damping explicitly: beyond inertia / time step it adds energy. Half of that is safe.
 _MARGIN = 0.5
@@ -21,7 +29,7 @@ _MARGIN = 0.5
 _OF_A_CHAIN = 4.0
 
 
-def largest_stable(felt_inertia, time_step_s):
+def largest_stable(felt_inertia: np.ndarray, time_step_s: float) -> np.ndarray:
     """(n,) The largest damping [Nm s/rad or N s/m] that is certainly stable for joints that feel `felt_inertia` (n,)
     [kg m^2 or kg] in ticks of time_step_s [s]."""
     return _MARGIN * felt_inertia / time_step_s
@@ -30,7 +38,7 @@ def largest_stable(felt_inertia, time_step_s):
 class JointDamping:
     """The damping of each joint of a :class:`Model`, bounded by the length of a tick."""
 
-    def __init__(self, model, client, time_step_s, wanted):
+    def __init__(self, model: Model, client: int, time_step_s: float, wanted: Mapping[int, float]) -> None:
         """``client``: PyBullet's; ``wanted``: {joint index: damping [Nm s/rad or N s/m]}; the others have none."""
         # Its owner: no cycle, so that a deleted model is freed at once, and not by a garbage collection, which leaves
         # out what /gazebo has frozen.
@@ -48,7 +56,7 @@ class JointDamping:
         for index, damping in wanted.items():
             self.set(index, damping)
 
-    def set(self, index, damping):
+    def set(self, index: int, damping: float) -> None:
         """Set the damping of joint ``index``, as far as it is stable."""
         self._wanted[index] = damping
         bound = self._stable()[index]
@@ -58,24 +66,24 @@ class JointDamping:
         self.values[index] = min(damping, bound)
         self._tell(index)
 
-    def step_changed(self, time_step_s):
+    def step_changed(self, time_step_s: float) -> None:
         """Adapt the bounds to a new length of a tick [s]."""
         self._time_step_s = time_step_s
         for index, damping in self._wanted.items():
             self.set(index, damping)
 
-    def restore(self):
+    def restore(self) -> None:
         """Set all damping again, on a rebuilt multibody."""
         for index in range(len(self.values)):
             self._tell(index)
             self.restore_inertia(index)
 
-    def restore_inertia(self, index):
+    def restore_inertia(self, index: int) -> None:
         """Add what implicit damping takes to the inertia of the link behind joint ``index``, which was set again."""
         added, self._added[index] = self._added[index], 0.0
         self._add_inertia(index, added)
 
-    def _add_inertia(self, index, added):
+    def _add_inertia(self, index: int, added: float) -> None:
         change, self._added[index] = added - self._added[index], added
         if change:
             place = self._model.parts.places[index]
@@ -83,11 +91,11 @@ class JointDamping:
             pybullet.changeDynamics(*place, localInertiaDiagonal=[m + change for m in moments],
                                     physicsClientId=self._client)
 
-    def _tell(self, index):
+    def _tell(self, index: int) -> None:
         pybullet.changeDynamics(*self._model.parts.places[index], jointDamping=self.values[index],
                                 physicsClientId=self._client)
 
-    def _inertia(self):
+    def _inertia(self) -> np.ndarray:
         """(m, m) The inertia at the present position, that of the joints first."""
         if not self._model.free:
             try:
@@ -97,13 +105,13 @@ class JointDamping:
                 pass
         return mass_matrix_of(self._model)
 
-    def felt_inertia(self):
+    def felt_inertia(self) -> np.ndarray:
         """(n,) The inertia that each joint feels when the others, and a free root, can give way, at the position of the
         first call [kg m^2 or kg]."""
         if self._felt is None:
             self._felt = 1.0 / np.diag(np.linalg.inv(self._inertia()))[:len(self.values)]
         return self._felt
 
-    def _stable(self):
+    def _stable(self) -> np.ndarray:
         """(n,) The largest damping of each joint that is certainly stable."""
         return largest_stable(self.felt_inertia(), self._time_step_s)

@@ -5,12 +5,17 @@ Bullet scales the friction of a body along the axes of its inertial frame. So th
 the moments of inertia leave that open, as those of wheels do.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from urdf_model import Surface
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 # Moments whose difference is at most this part of them are the same, and directions closer than this [rad].
 _SAME, _CLOSE = 1e-3, 1e-2
@@ -32,7 +37,7 @@ def directed(surface: Surface | None, most: float) -> Directed | None:
     return None if along == across else Directed(along, across, surface.direction)
 
 
-def turned(moments, axes, direction):
+def turned(moments: np.ndarray, axes: np.ndarray, direction: Sequence[float]) -> tuple[np.ndarray, np.ndarray, float]:
     """Return (moments (3,), axes (3, 3), [rad]) of an inertia, with an axis as near as possible to ``direction`` (3,),
     and the angle between them."""
     direction = np.asarray(direction, dtype=float)
@@ -53,7 +58,7 @@ def turned(moments, axes, direction):
     return moments, axes, math.acos(min(1.0, float(near.max())))
 
 
-def scales(found, axes):
+def scales(found: Directed, axes: np.ndarray) -> tuple[float, list[float]]:
     """Return (coefficient, scales of it along the three ``axes`` (3, 3)) for changeDynamics, of a Directed."""
     most = max(found.along, found.across)
     factors = [found.across / most] * 3
@@ -61,6 +66,6 @@ def scales(found, axes):
     return most, factors
 
 
-def is_off(angle):
+def is_off(angle: float) -> bool:
     """Whether an angle [rad] between a direction and its axis matters."""
     return angle > _CLOSE

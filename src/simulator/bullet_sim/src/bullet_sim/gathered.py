@@ -7,15 +7,21 @@ millimetre); cylinders and balls become bodies with flat faces, inside the round
 radius. As many of them as possible stay primitives.
 """
 
+from __future__ import annotations
+
 import itertools
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from urdf_model import Box, Cylinder, Mesh, Sphere
 
 from .mesh_loading import even_directions, parts_as_wavefront
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
 
 #: PyBullet's limit for one body (MAX_COMPOUND_COLLISION_SHAPES).
 MAX_SHAPES = 16
@@ -37,7 +43,7 @@ class Part(NamedTuple):
     hollow: bool  # triangles, instead of convex bodies
 
 
-def gathered(parts, keep):
+def gathered(parts: list[Part], keep: Callable[[bytes, Callable[[], list[str]]], str]) -> list[Part]:
     """Return a list of at most MAX_SHAPES Parts with the same collision geometry as ``parts``.
 
     ``keep(key, lines)`` returns the path of a file that holds the result of ``lines()``, cached under ``key``.
@@ -58,7 +64,7 @@ def gathered(parts, keep):
     return few
 
 
-def _bodies(parts):
+def _bodies(parts: Iterable[Part]) -> list[str]:
     """Return the lines of a Wavefront file with one object for each convex body."""
     return parts_as_wavefront(
         [
@@ -69,7 +75,7 @@ def _bodies(parts):
     )
 
 
-def _convex(part):
+def _convex(part: Part) -> list[np.ndarray]:
     """Return for each convex body of a Part its points (n, 3), in the Part's own axes."""
     geometry = part.geometry
     if isinstance(geometry, Mesh):
@@ -85,7 +91,7 @@ def _convex(part):
     return [_less(geometry.radius) * even_directions(_BALL_POINTS)]
 
 
-def without_margin(part):
+def without_margin(part: Part) -> Part:
     """Return a Part of a mesh that is as large with the margin that Bullet adds as ``part`` is without; any other part
     as it is."""
     if part.hollow or not isinstance(part.geometry, Mesh):
@@ -100,12 +106,12 @@ def without_margin(part):
     return part._replace(geometry=replace(part.geometry, scale=tuple((smaller * scale).tolist())), origin=origin)
 
 
-def _less(half_m):
+def _less(half_m: float) -> float:
     """Return half a size less the margin that Bullet adds; a thinner size stays as it is."""
     return half_m - _MARGIN_M if half_m > 2.0 * _MARGIN_M else half_m
 
 
-def _triangles(parts):
+def _triangles(parts: Iterable[Part]) -> list[str]:
     """Return the lines of a Wavefront file with all triangles of ``parts``."""
     vertices, faces, first = [], [], 1
     for part in parts:
@@ -117,12 +123,12 @@ def _triangles(parts):
     return ["o mesh", *vertices, *faces]
 
 
-def corners(path):
+def corners(path: str | Path) -> np.ndarray:
     """The corners (3 m, 3) of the triangles in a Wavefront file of ours. Raises OSError, ValueError."""
     return np.concatenate([points[triangles.ravel()] for points, triangles in _objects(path)])
 
 
-def _objects(path):
+def _objects(path: str | Path) -> list[list[np.ndarray]]:
     """Return (points (n, 3), triangles (m, 3) from 0) of each object of a Wavefront file of ours."""
     found, first = [], 1
     with open(path, encoding="ascii") as file:
@@ -136,5 +142,5 @@ def _objects(path):
     return found
 
 
-def _placed(points, origin):
+def _placed(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
     return points @ origin[:3, :3].T + origin[:3, 3]

@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A link that hangs on a frame of the world, which may be moved and let go."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from urdf_model.transforms import inverse
 
 from .parts import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from .model import Model
 
 
 class Hanging:
@@ -14,7 +21,7 @@ class Hanging:
     It goes on when the multibody is rebuilt, from the next call of :meth:`hold` on.
     """
 
-    def __init__(self, client, model, link, most_n):
+    def __init__(self, client: int, model: Model, link: str, most_n: float) -> None:
         """``client``: PyBullet's. Raises BulletSimError for an unknown link."""
         self._client, self._model, self._most = client, model, most_n
         here = model.link_pose(link)
@@ -23,7 +30,7 @@ class Hanging:
         self._parts = self._offset = self._constraint = None
         self.hold(here)
 
-    def hold(self, pose):
+    def hold(self, pose: Pose) -> None:
         """Hold the link at ``pose`` of its frame in the world."""
         if self._parts is not self._model.parts:  # as after the multibody was rebuilt
             self._parts = self._model.parts
@@ -37,7 +44,7 @@ class Hanging:
                                   physicsClientId=self._client)
         self._model.wake()
 
-    def let_go(self):
+    def let_go(self) -> None:
         """Let the link go, for ever."""
         if self._constraint is not None and self._parts is self._model.parts:
             pybullet.removeConstraint(self._constraint, physicsClientId=self._client)

@@ -5,6 +5,8 @@ process, and the interpreter lock stays free for the physics.
 The limit is processor time, not wall time: a busy machine gets the same result later.
 """
 
+from __future__ import annotations
+
 import importlib
 import json
 import os
@@ -15,8 +17,12 @@ import subprocess
 import sys
 import threading
 import time
+from typing import TYPE_CHECKING, Any
 
 from processes.priority import as_before, give_way
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: Limits of a call: processor time [s], additional memory [bytes], and the wall time in which it must get on [s].
 PROCESSOR_S = 4
@@ -42,13 +48,14 @@ class LimitedProcess:
     Any thread may call; calls run one at a time.
     """
 
-    def __init__(self, processor_s=PROCESSOR_S, memory_bytes=MEMORY_BYTES, waiting_s=WAITING_S):
+    def __init__(self, processor_s: int = PROCESSOR_S, memory_bytes: int = MEMORY_BYTES,
+                 waiting_s: float = WAITING_S) -> None:
         self._limits = processor_s, memory_bytes
         self._waiting_s = waiting_s
         self._lock = threading.Lock()
         self._process = None
 
-    def call(self, function, *arguments):
+    def call(self, function: Callable, *arguments: Any) -> Any:
         """Return ``function(*arguments)``: a function of a module, arguments and result as JSON has them.
 
         Raises LimitError with the text of the function's error, or with the limit that it exceeded.
@@ -61,12 +68,12 @@ class LimitedProcess:
             raise LimitError(answer["error"])
         return answer["result"]
 
-    def close(self):
+    def close(self) -> None:
         """End the process."""
         with self._lock:
             self._end()
 
-    def _ask(self, request):
+    def _ask(self, request: bytes) -> bytes:
         for _ in range(2):
             if self._process is None:
                 self._process = _start(*self._limits)
@@ -75,7 +82,7 @@ class LimitedProcess:
                 return line
         raise LimitError("the process for it cannot be started")
 
-    def _exchange(self, request):
+    def _exchange(self, request: bytes) -> bytes | None:
         """Return the answer's line, or None if the process had ended after its idle time."""
         process, line, gives_up_at = self._process, b"", time.monotonic() + self._waiting_s
         used_s = _processor_s(process)
@@ -100,7 +107,7 @@ class LimitedProcess:
             line += part
         return line
 
-    def _why(self, has_ended):
+    def _why(self, has_ended: bool) -> str:
         if not has_ended:
             self._end()
             return "it did nothing for %g s" % self._waiting_s
@@ -110,7 +117,7 @@ class LimitedProcess:
             return "it took more than %g s of processor time" % self._limits[0]
         return "the process that worked on it ended with code %d" % code
 
-    def _end(self):
+    def _end(self) -> None:
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -119,7 +126,7 @@ class LimitedProcess:
             process.stdout.close()
 
 
-def _processor_s(process):
+def _processor_s(process: subprocess.Popen) -> float:
     """Processor time that a process has used [s]; 0 after its end."""
     try:
         with open("/proc/%d/stat" % process.pid, "rb") as file:
@@ -129,7 +136,7 @@ def _processor_s(process):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def _start(processor_s, memory_bytes):
+def _start(processor_s: int, memory_bytes: int) -> subprocess.Popen:
     # One thread is enough, and each of a numerical library's own takes memory.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     return as_before(
@@ -139,7 +146,7 @@ def _start(processor_s, memory_bytes):
     )
 
 
-def serve():
+def serve() -> None:
     """Main function of the process: answer requests until the input ends, or until the idle time is over."""
     processor_s, memory_bytes = int(sys.argv[1]), int(sys.argv[2])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # at Ctrl-C it ends with the one that asks
@@ -161,7 +168,7 @@ def serve():
             answers.write(_answer(json.loads(line), processor_s, memory_bytes) + b"\n")
 
 
-def _answer(request, processor_s, memory_bytes):
+def _answer(request: dict[str, Any], processor_s: int, memory_bytes: int) -> bytes:
     used = resource.getrusage(resource.RUSAGE_SELF)
     limit = int(used.ru_utime + used.ru_stime + processor_s + 0.999)
     resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))

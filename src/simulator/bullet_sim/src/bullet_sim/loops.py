@@ -1,11 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints that close a loop of links, as Bullet's constraints: its multibodies are trees."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from urdf_model.transforms import inverse, quaternion_from_matrix
 
 from .parts import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from urdf_model import MergedRobot
+
+    from .parts import Parts, Place
 
 # A hinge is two points on its axis, so far from the joint [m].
 _HALF_HINGE_M = 0.05
@@ -13,7 +24,7 @@ _HALF_HINGE_M = 0.05
 _FORCE = 1e6
 
 
-def close_loops(client, merged, parts):
+def close_loops(client: int, merged: MergedRobot, parts: Parts) -> list[int]:
     """Create the constraints of a urdf_model.MergedRobot on its Parts, in a posture where the loops are closed.
 
     ``client``: PyBullet's. Returns PyBullet's numbers of them.
@@ -39,7 +50,7 @@ def close_loops(client, merged, parts):
     return found
 
 
-def _inertial(client, place):
+def _inertial(client: int, place: Place) -> np.ndarray:
     """The frame (4, 4) of a link in its inertial one, which Bullet's constraints refer to."""
     info = pybullet.getDynamicsInfo(*place, physicsClientId=client)
     return inverse(Pose(info[3], info[4]).matrix())

@@ -1,16 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The inertia of moving links, and the joint-space inertia from it where Bullet does not compute that."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from urdf_model import bounds
 
 from .shapes import principal_axes
 
+if TYPE_CHECKING:
+    from urdf_model import Inertial
+
+    from .model import Model
+
 # Mass of a moving body whose description gives none: a gram.
 ASSUMED_MASS_KG = 1e-3
 
 
-def moving_inertial(inertial):
+def moving_inertial(inertial: Inertial) -> tuple[float, np.ndarray, np.ndarray]:
     """Return mass [kg], principal moments (3,) [kg m^2] and their axes (3, 3) of a moving link as the physics uses it.
 
     A mass below ``bounds.MIN_MASS_KG`` becomes ASSUMED_MASS_KG, and a moment is at least
@@ -21,7 +31,7 @@ def moving_inertial(inertial):
     return mass, np.maximum(moments, bounds.MIN_INERTIA_PER_MASS_M2 * mass), axes
 
 
-def mass_matrix_of(model):
+def mass_matrix_of(model: Model) -> np.ndarray:
     """Return the inertia (m, m) of a :class:`Model` at its present position.
 
     In the order of its n joints; then of three translations and three rotations of each root that is free.

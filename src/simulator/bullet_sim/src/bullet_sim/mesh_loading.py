@@ -4,14 +4,23 @@
 Call it in a process with limits (``limited``): a hostile file can make a format's library do much work.
 """
 
+from __future__ import annotations
+
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urdf_model import bounds, read_file, refuse_entities
 
 from .thinning import outermost, thin_out
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import trimesh
+    from lxml import etree
 
 #: Limits of what is read.
 MAX_BYTES = 100_000_000
@@ -49,11 +58,11 @@ class MeshError(ValueError):
 class _Beside:
     """Resolver for trimesh: only files in the mesh's own folder, and only materials and buffers."""
 
-    def __init__(self, folder, textures):
+    def __init__(self, folder: Path, textures: bool) -> None:
         self._folder = folder
         self._textures = textures
 
-    def get(self, name):
+    def get(self, name: str) -> bytes:
         name = str(name)
         if self._textures and name.lower().endswith(PICTURES):
             return _picture_of(name)
@@ -64,11 +73,11 @@ class _Beside:
 
     __getitem__ = get
 
-    def keys(self):
+    def keys(self) -> tuple:
         return ()
 
 
-def load_scene(path, part=WHOLE, textures=False):
+def load_scene(path: str | Path, part: tuple[str, bool] = WHOLE, textures: bool = False) -> trimesh.Scene:
     """Return the trimesh.Scene in the file at ``path``; a picture is a terrain of 1 x 1 x 1 m, with its brightness as
     height. ``part``: (the name of the node of a Collada file, or of the group or object of a Wavefront file, that is
     wanted alone, or "" for all; whether its middle is at the origin). With ``textures``, for drawing, materials have
@@ -118,7 +127,7 @@ def load_scene(path, part=WHOLE, textures=False):
     return scene
 
 
-def _picture_of(name):
+def _picture_of(name: str) -> bytes:
     """A PNG file of one pixel that holds a name: what is made of a mesh does not depend on the pictures beside it."""
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
@@ -129,7 +138,7 @@ def _picture_of(name):
     return file.getvalue()
 
 
-def _heights(content):
+def _heights(content: bytes) -> np.ndarray:
     """The heights (rows, columns) in a picture, 0 to 1: the brightest point is the highest."""
     from PIL import Image
 
@@ -140,13 +149,13 @@ def _heights(content):
     return values / (values.max() or 1.0)
 
 
-def _with_fewer_rows(heights):
+def _with_fewer_rows(heights: np.ndarray) -> np.ndarray:
     """At most :data:`_MAX_DRAWN_ROWS` of the rows and columns, with the first and the last of them."""
     chosen = [np.linspace(0, count - 1, min(count, _MAX_DRAWN_ROWS)).round().astype(int) for count in heights.shape]
     return heights[np.ix_(*chosen)]
 
 
-def _terrain(heights):
+def _terrain(heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Corners (n, 3) and triangles (m, 3) of a square of side 1 about the origin, the first row of ``heights`` at its
     side of greatest y."""
     rows, columns = heights.shape
@@ -157,7 +166,7 @@ def _terrain(heights):
             np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]))
 
 
-def _collada(content, part):
+def _collada(content: bytes, part: str) -> tuple[bytes, float]:
     """(content, unit [m]) of a Collada file, with the geometry of the nodes named ``part`` alone; "" for all. Gazebo
     and rviz scale by the unit, and leave the direction of the axes as it is. Files with entities are refused. Geometry
     stays if its material is broken, as there."""
@@ -180,7 +189,7 @@ def _collada(content, part):
     return content, metres if 0.0 < metres < bounds.POSITION.high else 1.0
 
 
-def _mend_materials(root):
+def _mend_materials(root: etree._Element) -> bool:
     """Name a file for pictures of a Collada document that have none, and leave out references to materials that do not
     exist; pycollada would leave out the geometry. Returns whether there were any."""
     from lxml import etree
@@ -201,7 +210,7 @@ def _mend_materials(root):
     return bool(broken or lost)
 
 
-def _keep_part(root, part):
+def _keep_part(root: etree._Element, part: str) -> None:
     """Take from a Collada document the geometry of all nodes but those named ``part``. A node without a name has that
     of the one around it."""
     names = set()
@@ -215,7 +224,7 @@ def _keep_part(root, part):
         raise _no_part(part, names)
 
 
-def _group(content, part):
+def _group(content: bytes, part: str) -> bytes:
     """Take from a Wavefront file (bytes) the faces of all groups and objects but those named ``part``."""
     names, kept, is_wanted = set(), [], False
     for line in content.splitlines():
@@ -231,11 +240,11 @@ def _group(content, part):
     return b"\n".join(kept)
 
 
-def _no_part(part, names):
+def _no_part(part: str, names: Iterable[str]) -> MeshError:
     return MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MAX_NAMED]) or "none"))
 
 
-def to_wavefront(path, target, planes, part=WHOLE):
+def to_wavefront(path: str | Path, target: str, planes: Iterable[Sequence], part: tuple[str, bool] = WHOLE) -> str:
     """Write the mesh at ``path`` to the Wavefront file ``target``, as bodies collide with it, in metres, z up.
 
     ``part``: as for :func:`load_scene`; ``planes``: as for ``convex_parts.cut``; given, there is one object for each
@@ -271,7 +280,7 @@ def to_wavefront(path, target, planes, part=WHOLE):
     return remark
 
 
-def hull_points(points):
+def hull_points(points: np.ndarray) -> np.ndarray:
     """Return a subset of ``points`` (n, 3) with nearly the same convex hull; all if there are few."""
     points = np.asarray(points, dtype=float)
     if len(points) <= MAX_HULL_POINTS:
@@ -287,7 +296,7 @@ def hull_points(points):
     return points[np.unique(outermost)]
 
 
-def even_directions(count):
+def even_directions(count: int) -> np.ndarray:
     """Return ``count`` directions (count, 3) evenly over the sphere: a Fibonacci lattice."""
     k = np.arange(count) + 0.5
     height, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + 5.0**0.5) * k
@@ -295,7 +304,7 @@ def even_directions(count):
     return np.stack([level * np.cos(turn), level * np.sin(turn), height], axis=1)
 
 
-def parts_as_wavefront(parts):
+def parts_as_wavefront(parts: Iterable[Sequence]) -> list[str]:
     """Return the lines of a file with one object for each list of points; Bullet makes a convex hull of each."""
     lines, first = [], 1
     for number, points in enumerate(parts):
@@ -308,9 +317,9 @@ def parts_as_wavefront(parts):
     return lines
 
 
-def _cloud(points):
+def _cloud(points: np.ndarray) -> list[str]:
     return parts_as_wavefront([points])
 
 
-def _write(target, lines):
+def _write(target: str, lines: list[str]) -> None:
     Path(target).write_text("\n".join(lines) + "\n", encoding="ascii")

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One robot or object in the world: its joints as arrays, its links by name."""
 
+from __future__ import annotations
+
 import math
 import struct
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,17 @@ from .pose import Pose
 from .quiet_pybullet import pybullet
 from .springs import JointSprings
 from .state_watch import Fault, out_of_bounds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from urdf_model import Joint
+
+    from .builder import Blueprint
+    from .parts import Parts
+    from .world import World
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
 # 0.5 holds Baxter's arms within 5e-5 rad for 0.11 ms a step; the default of 0.1 sags by 2.4e-4 rad.
@@ -45,7 +59,8 @@ class Model(Body):
     A drive holds until another one replaces it, except efforts, which last one step.
     """
 
-    def __init__(self, client, world, blueprint, parts, root_offsets):
+    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Parts,
+                 root_offsets: list[np.ndarray]) -> None:
         super().__init__(client, world, blueprint, parts, root_offsets)
         self._gravity_key = None
         self._turned_gravity = None
@@ -82,7 +97,7 @@ class Model(Body):
 
     # -- joints -------------------------------------------------------------------------------------------------
 
-    def index(self, names):
+    def index(self, names: Iterable[str]) -> np.ndarray:
         """Return the indices (int array) of joints given by name. Raises BulletSimError that lists the known ones."""
         try:
             return np.array([self._index[name] for name in names], dtype=int)
@@ -91,7 +106,7 @@ class Model(Body):
                 "model '%s' has no joint %s; its joints are %s" % (self.name, error, ", ".join(self.joint_names))
             ) from None
 
-    def read_joints(self):
+    def read_joints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return positions, velocities and efforts, three (n,) read-only arrays, as they are after the last step.
 
         The effort is what the drive applied during the last step.
@@ -101,7 +116,7 @@ class Model(Body):
             self._reading, self._read_at = self._read(), self._world.steps
         return self._reading
 
-    def _read(self):
+    def _read(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if not self._all:
             return np.empty(0), np.empty(0), np.empty(0)
         position, velocity, _, effort = zip(*self.parts.joint_states(), strict=True)
@@ -115,7 +130,8 @@ class Model(Body):
             effort.setflags(write=False)
         return position, velocity, effort
 
-    def drive_position(self, index, position, max_effort, velocity=None):
+    def drive_position(self, index: np.ndarray, position: np.ndarray, max_effort: np.ndarray,
+                       velocity: np.ndarray | None = None) -> None:
         """Pull joints ``index`` (k,) to ``position`` (k,) with at most ``max_effort`` (k,).
 
         Bullet solves the motor with the other constraints (implicitly), so a stiff drive is stable.
@@ -144,7 +160,7 @@ class Model(Body):
         )
         self._told = told
 
-    def drive_velocity(self, index, velocity, max_effort):
+    def drive_velocity(self, index: np.ndarray, velocity: np.ndarray, max_effort: np.ndarray) -> None:
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
         self._told = None
         self._drive_otherwise(index)
@@ -152,7 +168,7 @@ class Model(Body):
         self._refuse_nan(index, velocity, "velocity")
         self.parts.command(index, pybullet.VELOCITY_CONTROL, targetVelocities=velocity, forces=max_effort.tolist())
 
-    def carry(self, index, position, velocity=None):
+    def carry(self, index: np.ndarray, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Put joints ``index`` (k,) at ``position`` (k,) and hold them there during the next step, with unlimited
         force. With ``velocity`` (k,) they move at it during the step.
 
@@ -169,7 +185,7 @@ class Model(Body):
         self._reading = None
         self.drive_velocity(index, velocity, np.full(len(index), _RIGID_EFFORT))
 
-    def drive_effort(self, index, effort):
+    def drive_effort(self, index: np.ndarray, effort: np.ndarray) -> None:
         """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; call it again for every step.
 
         Efforts are clamped to ``bounds.EFFORT``; raises BulletSimError for NaN.
@@ -184,7 +200,7 @@ class Model(Body):
         self._reading = None
         self.parts.command(index, pybullet.TORQUE_CONTROL, forces=effort.tolist())
 
-    def add_effort(self, index, effort):
+    def add_effort(self, index: np.ndarray, effort: np.ndarray) -> None:
         """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step, in addition to their drives.
 
         Raises BulletSimError out of bounds.
@@ -193,14 +209,14 @@ class Model(Body):
         self.wake()
         self.parts.command(index, pybullet.TORQUE_CONTROL, forces=effort.tolist())
 
-    def limited_effort(self, index, effort):
+    def limited_effort(self, index: np.ndarray, effort: np.ndarray) -> np.ndarray:
         """Return ``effort`` (k,) on joints ``index`` (k,) as Gazebo cuts it: to the effort limits, and to nothing
         where it would speed up a joint that is beyond its velocity limit."""
         speed = self.read_joints()[1][index]
         too_fast = (np.abs(speed) > self.max_velocity[index]) & (effort * speed > 0.0)
         return np.where(too_fast, 0.0, np.clip(effort, -self.max_effort[index], self.max_effort[index]))
 
-    def set_damping(self, index, damping):
+    def set_damping(self, index: int, damping: float) -> None:
         """Set the viscous damping of joint ``index`` [Nm s/rad or N s/m], as far as the tick's length allows it.
 
         Raises BulletSimError out of bounds.
@@ -208,24 +224,24 @@ class Model(Body):
         within(bounds.DAMPING, damping, "the damping of joint '%s'" % self.joint_names[index])
         self._damping.set(index, damping)
 
-    def set_inertial(self, body, mass, inertia, centre=None):
+    def set_inertial(self, body: str, mass: float, inertia: ArrayLike, centre: ArrayLike | None = None) -> None:
         super().set_inertial(body, mass, inertia, centre)
         if self._link_index[body] >= 0:
             self._damping.restore_inertia(self._link_index[body])
 
     @property
-    def damping(self):
+    def damping(self) -> np.ndarray:
         """(n,) The viscous damping of the joints as it acts [Nm s/rad or N s/m]."""
         return self._damping.values
 
-    def step_changed(self):
+    def step_changed(self) -> None:
         """For World: the length of a tick has changed."""
         self._told = None  # Bullet turns the greatest effort into an impulse of a tick
         self._damping.step_changed(self._world.time_step_s)
         if self.springs is not None:
             self.springs.step_changed(self._world.time_step_s)
 
-    def set_limits(self, index, lower, upper):
+    def set_limits(self, index: int, lower: float, upper: float) -> None:
         """Set the limits of joint ``index`` [rad or m]. Raises BulletSimError if ``lower`` is not below ``upper``."""
         if not lower < upper:
             raise BulletSimError("a lower limit of %g is not below the upper limit %g" % (lower, upper))
@@ -237,7 +253,7 @@ class Model(Body):
         )
         self.lower[index], self.upper[index] = lower, upper
 
-    def couple(self, joint, other, ratio):
+    def couple(self, joint: int, other: int, ratio: float) -> None:
         """Couple two joints by a permanent gear: ``other`` moves ``ratio`` times as far as ``joint``.
 
         A drive on one of them drives both. Another call for the same joints changes nothing.
@@ -258,7 +274,7 @@ class Model(Body):
             gear, gearRatio=-1.0 / ratio, erp=POSITION_GAIN, maxForce=_GEAR_FORCE, physicsClientId=self._client
         )
 
-    def release(self, index):
+    def release(self, index: np.ndarray) -> None:
         """Switch the motors of joints ``index`` (k,) off; the joints' friction (Coulomb's) remains."""
         friction = self._friction[index]
         self.drive_velocity(index, np.zeros(len(index)), friction)
@@ -268,7 +284,8 @@ class Model(Body):
             self._effort_driven[rough] = self._any_effort_driven = True
             self._commanded_effort[rough], self._reading = 0.0, None
 
-    def set_joint_positions(self, index, position, velocity=None):
+    def set_joint_positions(self, index: Sequence[int] | np.ndarray, position: np.ndarray,
+                            velocity: np.ndarray | None = None) -> None:
         """Put joints ``index`` (k,) at ``position`` (k,) at once, at rest or at ``velocity`` (k,). Nothing in between
         is simulated.
 
@@ -285,14 +302,15 @@ class Model(Body):
             self._reading = None
         self._world.wake_all()
 
-    def gravity_efforts(self, position=None):
+    def gravity_efforts(self, position: np.ndarray | None = None) -> np.ndarray:
         """Return the efforts (n,) that balance gravity at ``position`` (n,), default the present one.
 
         Inverse dynamics without velocity and acceleration. Raises BulletSimError for a model that is not fixed.
         """
         return self.inverse_dynamics(position if position is not None else self.read_joints()[0])
 
-    def inverse_dynamics(self, position, velocity=None, acceleration=None):
+    def inverse_dynamics(self, position: np.ndarray, velocity: np.ndarray | None = None,
+                         acceleration: np.ndarray | None = None) -> np.ndarray:
         """Return the efforts (n,) that give ``acceleration`` (n,) at ``position`` (n,) and ``velocity`` (n,)."""
         if self.free:
             raise BulletSimError("inverse dynamics need a fixed base; model '%s' is free" % self.name)
@@ -311,7 +329,7 @@ class Model(Body):
             pybullet.setGravity(*self._world.gravity, physicsClientId=self._client)
         return np.array(efforts)
 
-    def mass_matrix(self, position):
+    def mass_matrix(self, position: np.ndarray) -> np.ndarray:
         """Return the joint-space inertia (n, n) at ``position`` (n,); only for a model that is fixed."""
         if self.free:
             raise BulletSimError("the joint-space inertia needs a fixed base; model '%s' is free" % self.name)
@@ -320,13 +338,13 @@ class Model(Body):
             inertia[np.ix_(numbers, numbers)] = block
         return inertia
 
-    def remove(self):
+    def remove(self) -> None:
         """For World: take the body out of the physics."""
         for gear in (*self._gears.values(), *self._loops):
             pybullet.removeConstraint(gear, physicsClientId=self._client)
         self.parts.remove()
 
-    def set_base_pose(self, pose):
+    def set_base_pose(self, pose: Pose) -> None:
         super().set_base_pose(pose)
         if self.static:
             # From the cache: a body that touched a NaN has no valid pose any more.
@@ -335,19 +353,19 @@ class Model(Body):
 
     # -- start --------------------------------------------------------------------------------------------------
 
-    def mark_start(self):
+    def mark_start(self) -> None:
         """Remember base pose and joint positions as what ``reset`` returns to."""
         self._start = (self.base_pose(), self.read_joints()[0], self.loose_poses())
         base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
         self._good = (base, self._start[1])  # the last good pose, in PyBullet's frame of the base
         self._good_loose = self._loose_centres()
 
-    def _loose_centres(self):
+    def _loose_centres(self) -> dict[int, tuple]:
         """{index of a loose root: PyBullet's (position, quaternion)}"""
         return {index: pybullet.getBasePositionAndOrientation(self.parts.places[index].body,
                                                               physicsClientId=self._client) for index in self.loose}
 
-    def reset(self):
+    def reset(self) -> None:
         """Return to the marked start, at rest. Drives stay as they are."""
         pose, position, loose = self._start
         self.set_base_pose(pose)
@@ -359,7 +377,7 @@ class Model(Body):
 
     # -- for World: when the physics has failed -----------------------------------------------------------------
 
-    def fault(self):
+    def fault(self) -> Fault | None:
         """Return the Fault of the present state, or None if it is good; then it is kept as the last good one.
 
         Called after every step, so one sum checks all numbers.
@@ -389,7 +407,7 @@ class Model(Body):
         self._good, self._good_loose = (base, joints), loose
         return None
 
-    def _stop_at_limits(self, position, velocity):
+    def _stop_at_limits(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Put fast joints that passed their limits back to them; return the positions (n,).
 
         In the next step Bullet stops them there, and the links on them feel the impact.
@@ -402,7 +420,7 @@ class Model(Body):
         self._reading = None
         return self.read_joints()[0]
 
-    def motion(self):
+    def motion(self) -> Motion:
         """Return the state that :meth:`take_parts` needs to continue the present motion."""
         twist = None if self.static else pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
         base = self._good[0]
@@ -413,12 +431,12 @@ class Model(Body):
                  for index, centre in self._loose_centres().items()}
         return Motion(base, position, twist, velocity, loose)
 
-    def last_good(self):
+    def last_good(self) -> Motion:
         """Return the state that :meth:`take_parts` needs to put the model at its last good state, at rest."""
         loose = {index: (centre, None) for index, centre in self._good_loose.items()}
         return Motion(*self._good, None, np.zeros(len(self._all)), loose)
 
-    def put_back(self):
+    def put_back(self) -> None:
         """Restore the last good state, at rest."""
         (position, quaternion), joints = self._good
         if not self.static:
@@ -429,7 +447,7 @@ class Model(Body):
             self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.set_joint_positions(np.arange(len(self._all)), joints)
 
-    def take_parts(self, parts, motion):
+    def take_parts(self, parts: Parts, motion: Motion) -> None:
         """Continue with ``parts``, the rebuilt copy of the previous ones."""
         base, joints, twist, velocity, loose = motion
         client = {"physicsClientId": self._client}
@@ -457,7 +475,7 @@ class Model(Body):
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _refuse_nan(self, index, values, what):
+    def _refuse_nan(self, index: np.ndarray, values: list[float], what: str) -> None:
         """Raise BulletSimError where one of ``values``, a list for joints ``index`` (k,), is not a number."""
         if math.isnan(sum(values)):  # also of two infinities
             bad = [self.joint_names[i] for i, value in zip(index, values, strict=True) if math.isnan(value)]
@@ -465,7 +483,7 @@ class Model(Body):
                 raise BulletSimError("the %s for %s of '%s' is nan; expected a number"
                                      % (what, ", ".join(bad), self.name))
 
-    def _gravity_in_base(self):
+    def _gravity_in_base(self) -> list[float] | None:
         """Return gravity (3,) in the axes of a fixed root, or None where gravity is the same in both."""
         key = (self._base_quaternion, self._world.gravity)
         if key != self._gravity_key:
@@ -475,7 +493,7 @@ class Model(Body):
             self._gravity_key = key
         return self._turned_gravity
 
-    def _drive_otherwise(self, index):
+    def _drive_otherwise(self, index: np.ndarray) -> None:
         """Note that joints ``index`` (k,) are no longer driven by efforts."""
         if self._any_effort_driven:
             self._effort_driven[index] = False
@@ -483,6 +501,6 @@ class Model(Body):
             self._reading = None
 
 
-def _column(joints, field, absent):
+def _column(joints: Sequence[Joint], field: str, absent: float) -> np.ndarray:
     values = (getattr(joint.limit, field) for joint in joints)
     return np.array([absent if value is None else value for value in values], dtype=float)

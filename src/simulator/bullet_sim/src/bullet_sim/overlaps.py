@@ -4,6 +4,11 @@
 Bullet turns the depth of an overlap into a speed. A Husky, which its launch file spawns with its wheels 0.13 m in the
 ground, then flies 100 m high. Gazebo (ODE) corrects an overlap by the position alone.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from urdf_model import Surface
@@ -12,6 +17,11 @@ from urdf_model.model import ALL_BITS
 from .builder import is_rigid
 from .quiet_pybullet import pybullet
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from .model import Model
+
 # Shallower overlaps stay: bodies that rest on each other have them [m]. Soft surfaces, whose stiffness turns an overlap
 # into a speed, keep no more than the one in which they bear the model's weight, and this at least.
 _ALLOWED_M, _MIN_M = 1e-3, 1e-5
@@ -19,7 +29,7 @@ _ALLOWED_M, _MIN_M = 1e-3, 1e-5
 _ROUNDS = 10
 
 
-def come_out(client, model, index, others, gravity):
+def come_out(client: int, model: Model, index: int, others: Iterable[Model], gravity: Sequence[float]) -> None:
     """Move a free root of a Model, by its ``index``, out of the Models ``others``; its velocity is kept.
 
     It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's; ``gravity`` (3,)
@@ -40,12 +50,12 @@ def come_out(client, model, index, others, gravity):
         _put(client, body, start, turn, twist)
 
 
-def _put(client, body, place, turn, twist):
+def _put(client: int, body: int, place: Sequence[float], turn: Sequence[float], twist: tuple) -> None:
     pybullet.resetBasePositionAndOrientation(body, place, turn, physicsClientId=client)
     pybullet.resetBaseVelocity(body, *twist, physicsClientId=client)
 
 
-def _deepest(client, model, body, others, weight):
+def _deepest(client: int, model: Model, body: int, others: Iterable[Model], weight: float) -> np.ndarray | None:
     """Return the way (3,) [m, world] out of what the multibody ``body`` of ``model`` is deepest in, or None."""
     depth, way = 0.0, None
     for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
@@ -58,7 +68,7 @@ def _deepest(client, model, body, others, weight):
     return way
 
 
-def _allowed(weight, surfaces):
+def _allowed(weight: float, surfaces: Iterable[Surface]) -> float:
     """The depth [m] in which two surfaces may stay, of which one belongs to a model of this ``weight`` [N]."""
     softest = min((surface.stiffness for surface in surfaces if not is_rigid(surface.stiffness)), default=None)
     if softest is None:
@@ -66,10 +76,10 @@ def _allowed(weight, surfaces):
     return min(max(weight / softest, _MIN_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
 
 
-def _surface(model, body, index):
+def _surface(model: Model, body: int, index: int) -> Surface:
     """The Surface of the link that PyBullet numbers ``index`` in the multibody ``body`` of ``model``."""
     return model.merged.links[model.link_name(body, index)].surface or Surface()
 
 
-def _bits(surface):
+def _bits(surface: Surface) -> int:
     return ALL_BITS if surface.bitmask is None else surface.bitmask

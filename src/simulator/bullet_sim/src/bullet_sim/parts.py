@@ -4,11 +4,19 @@
 A step costs Bullet, for each joint that is driven, a pass over all joints of its multibody. A fixed root transmits
 nothing, so the limbs on it need not be one multibody: two arms as two cost a quarter less.
 """
-from typing import NamedTuple
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from urdf_model import MergedRobot
 
 # A limb with fewer joints joins another one: a multibody costs something, too.
 _MIN_JOINTS = 4
@@ -42,14 +50,14 @@ class Limb(NamedTuple):
     joints: list
 
 
-def link_indices(merged):
+def link_indices(merged: MergedRobot) -> dict[str, int]:
     """Return {body: its index here} of a urdf_model.MergedRobot: the number of its joint, -1 for the root, and -2, -3
     and so on for those of ``loose``."""
     return {**{body: -1 - number for number, body in enumerate(merged.roots)},
             **{joint.child: number for number, joint in enumerate(merged.joints.values())}}
 
 
-def limbs(merged, separate):
+def limbs(merged: MergedRobot, separate: bool) -> list[Limb]:
     """The Limbs that a urdf_model.MergedRobot is built as: those on its root first.
 
     One for each root, unless ``separate`` and several limbs with some joints are on the first, which must be fixed.
@@ -63,7 +71,7 @@ def limbs(merged, separate):
     return [*(Limb(merged.root, numbers) for numbers in on_root), *(Limb(*tree) for tree in trees.items())]
 
 
-def _limbs_on_root(merged, tree):
+def _limbs_on_root(merged: MergedRobot, tree: list[int]) -> list[list[int]]:
     joints = list(merged.joints.values())
     limb_of, found = {}, {}
     for number in tree:
@@ -81,7 +89,7 @@ def _limbs_on_root(merged, tree):
 class Parts:
     """Reads and commands the joints of several multibodies as those of one."""
 
-    def __init__(self, client, bodies, merged, found):
+    def __init__(self, client: int, bodies: Iterable[int], merged: MergedRobot, found: Sequence[Limb]) -> None:
         """``client``: PyBullet's; ``bodies``: its numbers of the multibodies, the first has the root's shape;
         ``found``: what :func:`limbs` returned for ``merged``, one for each of them."""
         self._client = client
@@ -103,11 +111,11 @@ class Parts:
         self._indices = {place: index for index, place in self.places.items()}
         self._shares = {}
 
-    def index(self, body, local):
+    def index(self, body: int, local: int) -> int:
         """The model's index of the link that PyBullet has as ``local`` of ``body``."""
         return self._roots[body] if local == -1 else self._indices[body, local]
 
-    def joint_states(self):
+    def joint_states(self) -> Sequence[tuple]:
         """PyBullet's states of all joints, in the order of the model."""
         if len(self.bodies) == 1:
             return pybullet.getJointStates(self.bodies[0], self._local[0], physicsClientId=self._client)
@@ -117,7 +125,7 @@ class Parts:
                 states += pybullet.getJointStates(body, local, physicsClientId=self._client)
         return states if self._order is None else [states[number] for number in self._order]
 
-    def command(self, index, mode, **columns):
+    def command(self, index: np.ndarray, mode: int, **columns: list) -> None:
         """``setJointMotorControlArray`` for joints ``index`` (k,), an int array; ``columns``: PyBullet's arguments,
         lists of k."""
         for body, local, rows in self._share(index):
@@ -125,7 +133,7 @@ class Parts:
                 body, local, mode, physicsClientId=self._client,
                 **(columns if rows is None else {name: _rows(column, rows) for name, column in columns.items()}))
 
-    def put(self, index, position, velocity):
+    def put(self, index: np.ndarray, position: list[float], velocity: list[float]) -> None:
         """Put joints ``index`` (k,), an int array, at ``position`` and ``velocity``, lists of k, at once."""
         position, velocity = [[value] for value in position], [[value] for value in velocity]
         for body, local, rows in self._share(index):
@@ -133,7 +141,7 @@ class Parts:
             # In one call, since each call computes all link poses.
             pybullet.resetJointStatesMultiDof(body, local, *values, physicsClientId=self._client)
 
-    def inverse_dynamics(self, position, velocity, acceleration):
+    def inverse_dynamics(self, position: list[float], velocity: list[float], acceleration: list[float]) -> list[float]:
         """``calculateInverseDynamics`` of lists over all joints; returns a list."""
         efforts = [0.0] * len(position)
         for body, numbers in zip(self.bodies, self._joints, strict=True):
@@ -144,24 +152,24 @@ class Parts:
                 efforts[number] = effort
         return efforts
 
-    def mass_matrices(self, position):
+    def mass_matrices(self, position: list[float]) -> Iterator[tuple[list[int], Sequence[Sequence[float]]]]:
         """(numbers of the joints, ``calculateMassMatrix`` of them) of each multibody; ``position``: list over all
         joints."""
         for body, numbers in zip(self.bodies, self._joints, strict=True):
             yield numbers, pybullet.calculateMassMatrix(body, [position[number] for number in numbers],
                                                         physicsClientId=self._client)
 
-    def root_of(self, index):
+    def root_of(self, index: int) -> int:
         """The index of the root of the tree that a link is in."""
         return self._roots[self.places[index].body]
 
-    def set_root(self, index, position, quaternion):
+    def set_root(self, index: int, position: Sequence[float], quaternion: Sequence[float]) -> None:
         """Put the root of that index there, with all limbs on it."""
         for body in self.bodies:
             if self._roots[body] == index:
                 pybullet.resetBasePositionAndOrientation(body, position, quaternion, physicsClientId=self._client)
 
-    def contacts(self, other=None):
+    def contacts(self, other: Parts | None = None) -> list[tuple]:
         """PyBullet's contacts of the multibodies, with those of ``other`` (Parts) where it is given; each once."""
         if other is None:
             found = []
@@ -175,7 +183,7 @@ class Parts:
         return [point for a, b in pairs
                 for point in pybullet.getContactPoints(bodyA=a, bodyB=b, physicsClientId=self._client) or ()]
 
-    def remove(self):
+    def remove(self) -> None:
         """Take the multibodies out of the physics."""
         for body in self.bodies:
             pybullet.removeBody(body, physicsClientId=self._client)
@@ -200,12 +208,12 @@ class Parts:
                 for body, rows in rows_of.items()]
 
 
-def _as_slice(rows, count):
+def _as_slice(rows: list[int], count: int) -> slice | list[int] | None:
     """Ascending ``rows`` of ``count``: None for all of them, a slice where they follow each other, which is quicker."""
     if len(rows) == count:
         return None
     return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] + 1 == len(rows) else rows
 
 
-def _rows(column, rows):
+def _rows(column: list, rows: slice | list[int]) -> list:
     return column[rows] if isinstance(rows, slice) else [column[row] for row in rows]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Position and orientation of a body."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -22,15 +24,15 @@ class Pose(NamedTuple):
     quaternion: tuple = (0.0, 0.0, 0.0, 1.0)
 
     @classmethod
-    def from_matrix(cls, matrix):
+    def from_matrix(cls, matrix: np.ndarray) -> Pose:
         """Return the pose of a (4, 4) rigid transform."""
         return cls(tuple(matrix[:3, 3].tolist()), tuple(quaternion_from_matrix(matrix).tolist()))
 
-    def matrix(self):
+    def matrix(self) -> np.ndarray:
         """Return the (4, 4) rigid transform of this pose. Raises ValueError for a quaternion without direction."""
         return rigid(matrix_from_quaternion(self.quaternion), np.asarray(self.position, dtype=float))
 
-    def checked(self):
+    def checked(self) -> Pose:
         """Return this pose with a normalised quaternion; raises BulletSimError when it is not a pose in this world."""
         if len(self.position) != 3 or len(self.quaternion) != 4:
             raise BulletSimError("a pose is 3 numbers of position and 4 of quaternion, found %s" % (self,))

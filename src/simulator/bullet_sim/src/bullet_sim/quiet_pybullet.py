@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Imports PyBullet without the line that it prints, which every launch and every tool would show."""
 
+from __future__ import annotations
+
 import importlib
 import os
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from types import ModuleType
 
 
-def _imported():
+def _imported() -> ModuleType:
     if "pybullet" in sys.modules:
         return sys.modules["pybullet"]
     sys.stderr.flush()

@@ -2,12 +2,15 @@
 """Collision shapes, made once and shared: PyBullet leaks a quarter of a megabyte each time that it loads a mesh
 again."""
 
+from __future__ import annotations
+
 import contextlib
 import hashlib
 import locale
 import os
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +23,11 @@ from .gathered import Part, corners, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MAX_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from urdf_model import Shape
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
@@ -41,13 +49,14 @@ class MeshCache:
     the folder cannot be written, or its disk is full, files are made in a folder for temporary files.
     """
 
-    def __init__(self, folder=None, warn=LOG.warning):
+    def __init__(self, folder: str | Path | None = None, warn: Callable[[str], None] = LOG.warning) -> None:
         """``warn(text)`` is called for meshes that are simplified, and once for a folder that cannot be written."""
         self._warn = warn
         self.folder = Path(folder or cache_home() / "bullet_sim" / "meshes")
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
-    def wavefront(self, path, planes=(), hollow=True, part=WHOLE):
+    def wavefront(self, path: str | Path, planes: tuple[tuple, ...] = (), hollow: bool = True,
+                  part: tuple[str, bool] = WHOLE) -> str:
         """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
 
         ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part. ``hollow``: True to
@@ -65,7 +74,8 @@ class MeshCache:
         hull = self._known[key].with_suffix(".hull.obj")
         return str(hull if not hollow and hull.exists() else self._known[key])
 
-    def corners(self, path, planes=(), part=WHOLE):
+    def corners(self, path: str | Path, planes: tuple[tuple, ...] = (),
+                part: tuple[str, bool] = WHOLE) -> np.ndarray | None:
         """The corners (3 m, 3) of the triangles of a copy as :meth:`wavefront` has made it for any world of this user;
         None if there is none yet."""
         try:
@@ -73,12 +83,12 @@ class MeshCache:
         except (OSError, ValueError):
             return None
 
-    def _target(self, path, planes, part):
+    def _target(self, path: str | Path, planes: tuple[tuple, ...], part: tuple[str, bool]) -> Path:
         asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
         content = read_file(path, MAX_BYTES) + asked.encode() + _VERSION
         return self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
 
-    def keep(self, key, lines):
+    def keep(self, key: bytes, lines: Callable[[], list[str]]) -> str:
         """Return the path of a file that holds the result of ``lines()``, cached under ``key`` (bytes)."""
         target = self.folder / (hashlib.sha256(key + _VERSION).hexdigest()[:32] + ".obj")
         if not target.exists():
@@ -88,7 +98,7 @@ class MeshCache:
                 draft.write_text(text, encoding="ascii")
         return str(target)
 
-    def _folder_with_room(self, size):
+    def _folder_with_room(self, size: int) -> Path:
         """A folder in which a file of ``size`` bytes can be made. Raises BulletSimError where there is none."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -108,7 +118,7 @@ class MeshCache:
         self.folder = spare
         return spare
 
-    def _convert(self, path, name, planes, part):
+    def _convert(self, path: str | Path, name: str, planes: tuple[tuple, ...], part: tuple[str, bool]) -> Path:
         target = self._folder_with_room(int(np.clip(_GROWTH * os.stat(path).st_size, *_ROOM))) / name
         if target.exists():
             return target
@@ -126,7 +136,7 @@ class MeshCache:
 
 
 @contextlib.contextmanager
-def _points_in_numbers():
+def _points_in_numbers() -> Iterator[None]:
     """Use the C locale while Bullet reads a file: under a locale with decimal commas, its reader of files with several
     objects reads "0.8" as 0."""
     in_force = locale.setlocale(locale.LC_NUMERIC)
@@ -137,7 +147,7 @@ def _points_in_numbers():
         locale.setlocale(locale.LC_NUMERIC, in_force)
 
 
-def _reason(uri):
+def _reason(uri: str) -> str:
     scheme = uri.partition("://")[0].lower()
     if scheme in ("http", "https", "ftp"):
         return ": meshes are not fetched over the network; save it and name the file"
@@ -147,11 +157,11 @@ def _reason(uri):
 class MeshFiles:
     """From a urdf_model.Mesh to files: ``find_mesh(uri)`` -> path or None, and a MeshCache. Any thread may ask."""
 
-    def __init__(self, find_mesh, cache=None):
+    def __init__(self, find_mesh: Callable[[str], str | None], cache: MeshCache | None = None) -> None:
         self._find_mesh = find_mesh
         self._cache = cache or MeshCache()
 
-    def path(self, mesh):
+    def path(self, mesh: Mesh) -> str:
         """Return the path of the file; raises BulletSimError if it does not exist, or is no file that is read."""
         path = self._find_mesh(mesh.filename)
         if path is None:
@@ -162,14 +172,15 @@ class MeshFiles:
             raise BulletSimError("mesh %s cannot be used: %s" % (mesh.filename, error.strerror)) from None
         return path
 
-    def wavefront(self, mesh, planes=(), hollow=True):
+    def wavefront(self, mesh: Mesh, planes: tuple[tuple, ...] = (), hollow: bool = True) -> str:
         """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read.
 
         ``planes``, ``hollow``: as for MeshCache.
         """
         return self._cache.wavefront(self.path(mesh), planes, hollow, (mesh.submesh, mesh.centred))
 
-    def parts(self, shapes, concave, mesh_cuts=None):
+    def parts(self, shapes: Sequence[Shape], concave: bool,
+              mesh_cuts: dict[str, tuple[tuple, ...]] | None = None) -> list[Part]:
         """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MAX_SHAPES`` Part.
 
         ``concave``, ``mesh_cuts``: as for ``ShapeStore.compound``. Raises BulletSimError for too many shapes, and for a
@@ -194,12 +205,13 @@ class ShapeStore:
     """The collision shapes of one physics client, one compound for each set of geometries. PyBullet frees no shape that
     a body has used (5 kB for a box), so they stay for models of the same shape."""
 
-    def __init__(self, client, mesh_files):
+    def __init__(self, client: int, mesh_files: MeshFiles) -> None:
         self._client = client
         self._mesh_files = mesh_files
         self._shapes = {}
 
-    def compound(self, shapes, concave, mesh_cuts=None, exact=False):
+    def compound(self, shapes: Sequence[Shape], concave: bool, mesh_cuts: dict[str, tuple[tuple, ...]] | None = None,
+                 exact: bool = False) -> int:
         """Return PyBullet's id of the compound of ``shapes`` (urdf_model.Shape), or -1 for none.
 
         ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
@@ -217,7 +229,7 @@ class ShapeStore:
             self._shapes[key] = self._create(parts)
         return self._shapes[key]
 
-    def _create(self, parts):
+    def _create(self, parts: list[Part]) -> int:
         if isinstance(parts[0][0], Plane):
             return pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
         columns = {
@@ -256,7 +268,7 @@ _SHAPE_TYPES = {
 }
 
 
-def principal_axes(inertia):
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the principal moments (3,) of a (3, 3) inertia and the rotation (3, 3) whose columns are their axes."""
     moments, axes = np.linalg.eigh(inertia)
     if np.linalg.det(axes) < 0.0:

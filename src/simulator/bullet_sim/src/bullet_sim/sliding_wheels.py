@@ -5,11 +5,22 @@ Bullet bounds the friction of a contact by a cone, but finds its direction by wh
 light wheel, sideways the whole vehicle. So a vehicle with fixed wheels, which must slide to turn, hardly turns. Here
 the difference between Coulomb's friction and that of the last step acts on the wheel in the next step.
 """
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .quiet_pybullet import pybullet
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from urdf_model import Joint
+
+    from .model import Model
 
 # Slower contacts roll, and Bullet's friction is right [m/s].
 _CREEP_M_PER_S = 0.02
@@ -21,7 +32,7 @@ _REACH_M = 1.0
 _SAME = 1e-3
 
 
-def fixed_wheels(joints):
+def fixed_wheels(joints: Iterable[Joint]) -> list[int]:
     """Indices of the ``joints`` (urdf_model.Joint, in the order of the model) of wheels that cannot all roll when the
     vehicle turns: on several axles with the same direction on the same link."""
     axles = {}
@@ -40,7 +51,7 @@ def fixed_wheels(joints):
     return sorted(found)
 
 
-def sliding_wheels(client, model):
+def sliding_wheels(client: int, model: Model) -> list[SlidingWheels]:
     """Return the SlidingWheels of a Model, a list; ``client``: PyBullet's."""
     trees = {}
     joints = list(model.merged.joints.values())
@@ -54,17 +65,17 @@ def sliding_wheels(client, model):
 class SlidingWheels:
     """The fixed wheels on one root of a model."""
 
-    def __init__(self, client, model, root, wheels):
+    def __init__(self, client: int, model: Model, root: int, wheels: Iterable[int]) -> None:
         """``client``: PyBullet's; ``model``: a Model, ``root``: index of its root; ``wheels``: PyBullet's numbers of
         their joints."""
         self._client, self._model, self._root, self._wheels = client, model, root, frozenset(wheels)
         self._surfaces = {}  # (body, link) -> (friction, does it stand still)
 
-    def models_changed(self):
+    def models_changed(self) -> None:
         """A model was added or removed: PyBullet gives the number of a removed body to a new one."""
         self._surfaces = {}
 
-    def correct(self):
+    def correct(self) -> None:
         """Before a step: push the wheels that slid in the last one."""
         rows = self._sliding()
         if not rows:
@@ -89,11 +100,11 @@ class SlidingWheels:
                                         physicsClientId=self._client)
 
     @property
-    def _body(self):
+    def _body(self) -> int:
         """PyBullet's number of the multibody."""
         return self._model.parts.places[self._root].body
 
-    def _sliding(self):
+    def _sliding(self) -> list[tuple]:
         """Contacts of the wheels near the bound of their friction, with things that stand still: rows of link, place,
         normal (towards the wheel), friction on the wheel [N], and its bound [N]."""
         body, found = self._body, []
@@ -110,7 +121,7 @@ class SlidingWheels:
                 found.append((link, point[5] if sign > 0.0 else point[6], [sign * n for n in point[7]], push, most))
         return found
 
-    def _surface(self, body_and_link):
+    def _surface(self, body_and_link: tuple[int, int]) -> tuple[float, bool]:
         if body_and_link not in self._surfaces:
             mass, friction = pybullet.getDynamicsInfo(*body_and_link, physicsClientId=self._client)[:2]
             self._surfaces[body_and_link] = friction, mass == 0.0

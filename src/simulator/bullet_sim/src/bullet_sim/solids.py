@@ -7,14 +7,20 @@ Descriptions contain shapes that only keep a controller at a distance, and then 
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 from .errors import BulletSimError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from urdf_model import Robot
 
 #: Choices: the link collides as it is drawn, or not at all.
 AS_DRAWN, HOLLOW = "as drawn", "hollow"
 
 
-def with_solids(robot, solids):
+def with_solids(robot: Robot, solids: Mapping[str, str] | None) -> Robot:
     """Return ``robot`` (urdf_model.Robot) with the collision shapes that ``solids`` asks for; without any, itself.
 
     ``solids``: {link: AS_DRAWN or HOLLOW}, or None. Raises BulletSimError for an unknown link, and for another choice.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,13 @@ from urdf_model.transforms import rigid
 
 from .errors import BulletSimError
 from .shapes import principal_axes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from urdf_model import Inertial, Link, Robot
+
+    from .shapes import MeshFiles
 
 # A link's inertia is trusted if the homogeneous box with that inertia has a size [m] and density [kg/m^3] within these
 # ranges, from balsa to platinum. Some descriptions have masses of 1e-5 kg and inertias of 10 kg m^2.
@@ -23,7 +31,7 @@ _RADII_M = (0.008, 0.06)
 _UNKNOWN_RADIUS_M = 0.03
 
 
-def with_stand_ins(robot, mesh_files):
+def with_stand_ins(robot: Robot, mesh_files: MeshFiles) -> tuple[Robot, str]:
     """Return ``robot`` with a primitive for each missing mesh, and one line for the log; the same robot and "" if no
     mesh is missing.
 
@@ -53,7 +61,7 @@ def with_stand_ins(robot, mesh_files):
     return dataclasses.replace(robot, links={**robot.links, **links}), "; ".join(told)
 
 
-def _sift(shapes, check):
+def _sift(shapes: Iterable[Shape], check: Callable[[Mesh], str]) -> tuple[list[Shape], list[tuple[Shape, str]]]:
     """Return the shapes that can be used, and the others as (shape, why)."""
     usable, lost = [], []
     for shape in shapes:
@@ -66,12 +74,12 @@ def _sift(shapes, check):
     return usable, lost
 
 
-def _fitted(robot, link):
+def _fitted(robot: Robot, link: Link) -> Shape:
     """Return a Shape for a link of which only inertia and joints are known."""
     return equivalent_box(link.inertial) or _between_joints(robot, link)
 
 
-def equivalent_box(inertial):
+def equivalent_box(inertial: Inertial | None) -> Shape | None:
     """Return the Shape of the homogeneous box with the mass and the principal moments of ``inertial``, or None.
 
     From I_x = m (b^2 + c^2) / 12 and its like: a^2 = 6 (I_y + I_z - I_x) / m. None if a link cannot have that size or
@@ -91,7 +99,7 @@ def equivalent_box(inertial):
     return Shape(Box(tuple(sides.tolist())), rigid(axes, inertial.centre))
 
 
-def _between_joints(robot, link):
+def _between_joints(robot: Robot, link: Link) -> Shape:
     """Return a rod from the link's joint to the farthest next one, or a ball at the end of a chain."""
     ends = [joint.origin[:3, 3] for joint in robot.children(link.name)]
     far = max(ends, key=np.linalg.norm, default=np.zeros(3))
@@ -105,7 +113,7 @@ def _between_joints(robot, link):
     return Shape(Sphere(radius), np.eye(4), link=link.name)
 
 
-def _turn_z_to(direction):
+def _turn_z_to(direction: np.ndarray) -> np.ndarray:
     """Return a rotation (3, 3) that takes the z axis to the unit vector ``direction``."""
     beside = np.eye(3)[int(np.argmin(np.abs(direction)))]
     x = np.cross(beside, direction)

@@ -1,10 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """After each step, restores models with an impossible state, before anything reads it."""
-from typing import NamedTuple
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 from urdf_model import bounds
 
 from .errors import BulletSimError, within
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    import numpy as np
+
+    from .model import Model
+    from .world import World
 
 # Bounds of what Model.read_joints returns. Efforts only need to be finite.
 _OF_JOINTS = (
@@ -28,7 +39,7 @@ class Fault(NamedTuple):
     is_finite: bool
 
 
-def out_of_bounds(roots, joint_names, readings):
+def out_of_bounds(roots: Mapping[str, tuple], joint_names: Iterable[str], readings: Iterable[np.ndarray]) -> str:
     """Return which value of a model is out of its bound, or "".
 
     roots: {link: (position (3,), quaternion (4,))}; readings: position, velocity and effort of the joints
@@ -54,7 +65,7 @@ class StateWatch:
     bodies are then rebuilt. This takes some ms per robot.
     """
 
-    def __init__(self, world, error):
+    def __init__(self, world: World, error: Callable[[str], None]) -> None:
         self._world = world
         self._error = error
         self._logged_at = {}  # model's name -> steps
@@ -62,17 +73,17 @@ class StateWatch:
         self._sorted = False
         self._turn = 0
 
-    def models_changed(self):
+    def models_changed(self) -> None:
         """A model was added or removed."""
         self._sorted = False
 
-    def note_touched(self, model):
+    def note_touched(self, model: Model) -> None:
         """A force or a new state was applied to ``model``."""
         if model.still_for >= _ASLEEP_STEPS:
             model.still_for = 0
             self._sorted = False
 
-    def look(self):
+    def look(self) -> None:
         """Restore every model with an impossible state to its state before the step, at rest, and log it."""
         if not self._sorted:
             self._sort()
@@ -89,13 +100,13 @@ class StateWatch:
         if faulty:
             self._put_back()
 
-    def _sort(self):
+    def _sort(self) -> None:
         moving = [model for model in self._world.models.values() if model.free or model.joint_names]
         self._lively = [model for model in moving if _is_never_still(model) or model.still_for < _ASLEEP_STEPS]
         self._resting = [model for model in moving if model not in self._lively]
         self._sorted = True
 
-    def _put_back(self):
+    def _put_back(self) -> None:
         world = self._world
         found = {model: model.fault() for model in (*self._lively, *self._resting)}
         faults = {model: fault for model, fault in found.items() if fault is not None}
@@ -114,6 +125,6 @@ class StateWatch:
                 )
 
 
-def _is_never_still(model):
+def _is_never_still(model: Model) -> bool:
     """Whether the watch does not know it from the base alone when a model rests."""
     return bool(model.joint_names or model.loose)

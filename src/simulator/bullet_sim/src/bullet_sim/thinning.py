@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Meshes with fewer triangles and about the same shape, by merging the vertices that share a cell of a grid."""
 
+from __future__ import annotations
+
 import numpy as np
 
 _COARSEST_GRID, _FINEST_GRID = 2, 512
@@ -9,7 +11,7 @@ _MANY = 100_000
 _HALVED_GRIDS = (256, 128, 64)
 
 
-def thin_out(vertices, faces, target):
+def thin_out(vertices: np.ndarray, faces: np.ndarray, target: int) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, faces) of about the same shape, at most ``target`` triangles, if possible.
 
     Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner are
@@ -37,7 +39,7 @@ def thin_out(vertices, faces, target):
     return best if best is not None else (vertices, faces)
 
 
-def outermost(vertices, grid=128):
+def outermost(vertices: np.ndarray, grid: int = 128) -> np.ndarray:
     """Return of the vertices (n, 3) in each cell of a cubic grid, ``grid`` cells across, the one that is farthest out.
 
     Farthest from the mean of all vertices: the result has about the same convex hull.
@@ -51,18 +53,18 @@ def outermost(vertices, grid=128):
     return vertices[farthest]
 
 
-def _extent(vertices):
+def _extent(vertices: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the lowest corner (3,) of the box around ``vertices`` (n, 3) and its longest side."""
     return vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-9)
 
 
-def _clusters(vertices, low, cells_per_m):
+def _clusters(vertices: np.ndarray, low: np.ndarray, cells_per_m: float) -> np.ndarray:
     """Return for each of ``vertices`` (n, 3) the number of the cell that it lies in; empty cells have none."""
     cell = np.floor((vertices - low) * cells_per_m).astype(np.int64) @ np.array([1, 4096, 4096**2])
     return np.unique(cell, return_inverse=True)[1]
 
 
-def _merged(vertices, faces, cluster):
+def _merged(vertices: np.ndarray, faces: np.ndarray, cluster: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     count = np.bincount(cluster)
     merged = np.stack([np.bincount(cluster, vertices[:, k]) / count for k in range(3)], axis=1)
     corners = cluster[faces]

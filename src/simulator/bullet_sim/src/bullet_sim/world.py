@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world: one PyBullet client, its models, its time."""
 
+from __future__ import annotations
+
 import itertools
 import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +24,15 @@ from .sliding_wheels import sliding_wheels
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from urdf_model import MergedRobot
+
+    from .parts import Motion
+
 # Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.
 SOLVER_ITERATIONS = 20
 # Bullet ends the iterations early where all of them change speeds by less than the root of this [m/s]. With its own
@@ -29,26 +41,26 @@ SOLVER_ITERATIONS = 20
 _CREEP_M2_PER_S2 = {True: 1e-9, False: 1e-7}
 
 
-def plain_path(uri):
+def plain_path(uri: str) -> str | None:
     """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages, whose
     meshes others find (``model_files.resources.ResourceFinder``)."""
     path = uri[len("file://") :] if uri.startswith("file://") else uri
     return path if os.path.isfile(path) else None
 
 
-def is_fixed(root, static=None):
+def is_fixed(root: str, static: bool | None = None) -> bool:
     """Whether a robot with this root link is fixed in the world; ``static``: as for ``World.spawn``."""
     return root == "world" if static is None else static
 
 
-def self_colliding(merged):
+def self_colliding(merged: MergedRobot) -> list[tuple[str, str]]:
     """The pairs of links of a urdf_model.MergedRobot that collide with each other: both of them ask for it."""
     links = [link.name for link in merged.links.values() if link.self_collide and link.collisions]
     joined = {frozenset((joint.parent, joint.child)) for joint in merged.joints.values()}
     return [pair for pair in itertools.combinations(links, 2) if frozenset(pair) not in joined]
 
 
-def _has_mesh(link):
+def _has_mesh(link: Link | None) -> bool:
     """Whether a link does not exist, or has a collision mesh."""
     return link is None or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)
 
@@ -73,16 +85,9 @@ class World:
 
     _contact_ahead_in_force_m = None
 
-    def __init__(
-        self,
-        time_step_s=0.002,
-        gravity=(0.0, 0.0, -9.81),
-        seed=0,
-        contact_ahead_m=0.004,
-        find_mesh=plain_path,
-        warn=LOG.warning,
-        error=LOG.error,
-    ):
+    def __init__(self, time_step_s: float = 0.002, gravity: Iterable[float] = (0.0, 0.0, -9.81), seed: int = 0,
+                 contact_ahead_m: float = 0.004, find_mesh: Callable[[str], str | None] = plain_path,
+                 warn: Callable[[str], None] = LOG.warning, error: Callable[[str], None] = LOG.error) -> None:
         self.time_step_s = within(bounds.TIME_STEP, time_step_s, "the time step")
         self._step_since = 0, 0.0  # the tick and the time [s] that the present length of a tick counts from
         self.solver_iterations = SOLVER_ITERATIONS
@@ -116,17 +121,17 @@ class World:
         self.set_gravity(gravity)
 
     @property
-    def time_s(self):
+    def time_s(self) -> float:
         """Simulation time [s]."""
         tick, time_s = self._step_since
         return time_s + (self.tick - tick) * self.time_step_s
 
     @property
-    def gravity(self):
+    def gravity(self) -> tuple[float, ...]:
         """Gravity (3,) [m/s^2]."""
         return self._gravity
 
-    def set_gravity(self, gravity):
+    def set_gravity(self, gravity: Iterable[float]) -> None:
         """Set gravity (3,) [m/s^2]. Raises BulletSimError unless it is three numbers within bounds."""
         gravity = tuple(float(g) for g in gravity)
         if len(gravity) != 3:
@@ -136,13 +141,13 @@ class World:
         self._gravity = gravity
         self.wake_all()
 
-    def set_solver_iterations(self, iterations):
+    def set_solver_iterations(self, iterations: int) -> None:
         """Set the iterations of Bullet's constraint solver (``bounds.SOLVER_ITERATIONS``). Raises BulletSimError."""
         within(bounds.SOLVER_ITERATIONS, iterations, "the number of solver iterations")
         pybullet.setPhysicsEngineParameter(numSolverIterations=iterations, physicsClientId=self._client)
         self.solver_iterations = iterations
 
-    def set_time_step(self, time_step_s):
+    def set_time_step(self, time_step_s: float) -> None:
         """Set the length of a tick from the next one on [s]; the time is kept.
 
         Raises BulletSimError out of bounds.
@@ -154,12 +159,14 @@ class World:
         for model in self.models.values():
             model.step_changed()
 
-    def wake_all(self):
+    def wake_all(self) -> None:
         """Wake all sleeping bodies: Bullet does not notice changes from outside."""
         for model in self.models.values():
             model.wake()
 
-    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, merged=None):
+    def spawn(self, robot: Robot, name: str, pose: Pose | None = None, static: bool | None = None,
+              self_collision_pairs: Collection[tuple[str, str]] = (),
+              mesh_cuts: dict[str, tuple[tuple, ...]] | None = None, merged: MergedRobot | None = None) -> Model:
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
         The frame of a robot from a URDF is that of its root link. ``warn`` is called with the replacements of
@@ -217,7 +224,7 @@ class World:
         self._models_changed()
         return model
 
-    def _part_rough_pairs(self, model, pairs):
+    def _part_rough_pairs(self, model: Model, pairs: Iterable[tuple[str, str]]) -> None:
         """Let links of ``model`` that overlap now not collide where one has a mesh: its convex hull is larger."""
         links = model.merged.links
         overlapping = {frozenset((contact.link_a, contact.link_b)) for contact in self.touching(model)
@@ -228,7 +235,8 @@ class World:
             self._warn("model '%s': these links do not collide with each other, since their convex hulls overlap: "
                        "%s" % (model.name, ", ".join(sorted(" and ".join(sorted(pair)) for pair in overlapping))))
 
-    def make_shape(self, merged, link, static=None, mesh_cuts=None):
+    def make_shape(self, merged: MergedRobot, link: str, static: bool | None = None,
+                   mesh_cuts: dict[str, tuple[tuple, ...]] | None = None) -> None:
         """Make the collision shape of a body of ``merged`` (urdf_model.MergedRobot) beforehand.
 
         A shape takes up to 20 ms; this spreads a robot's shapes over several ticks. ``static``, ``mesh_cuts``: as for
@@ -238,17 +246,17 @@ class World:
         exact = any(joint.child == link and is_wheel(joint) for joint in merged.joints.values())
         self._shapes.compound(link_collisions(merged, link, static), static and link == merged.root, mesh_cuts, exact)
 
-    def hang(self, model, link, most_n):
+    def hang(self, model: Model, link: str, most_n: float) -> Hanging:
         """Hold a link of a free Model where it is, with a force [N] at most; returns the :class:`.hanging.Hanging` that
         moves it and lets it go. Raises BulletSimError for an unknown link."""
         return Hanging(self._client, model, link, most_n)
 
-    def add_ground_plane(self, name="ground_plane"):
+    def add_ground_plane(self, name: str = "ground_plane") -> Model:
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
         link = Link("link", collisions=[Shape(Plane(), np.eye(4), "collision", None, "link")])
         return self.spawn(Robot(name, {"link": link}, {}, "link", keeps_links=True), name, static=True)
 
-    def delete(self, name):
+    def delete(self, name: str) -> None:
         """Remove a model. Raises BulletSimError when there is none of that name."""
         model = self._model(name)
         model.remove()
@@ -262,7 +270,7 @@ class World:
         # Bodies that stood on it must fall.
         self.wake_all()
 
-    def _models_changed(self):
+    def _models_changed(self) -> None:
         any_free = any(model.free for model in self.models.values())
         # Bullet's cone of friction fails where a coefficient is 0; without it, friction is a pyramid, as Gazebo's.
         pyramid = any(model.directed for model in self.models.values())
@@ -273,22 +281,22 @@ class World:
             for wheels in groups:
                 wheels.models_changed()
 
-    def note_weightless(self, model, wanted):
+    def note_weightless(self, model: Model, wanted: bool) -> None:
         """For Model: whether ``model`` has links whose weight must be taken away at each step."""
         self._weightless = [other for other in self._weightless if other is not model] + [model] * wanted
 
-    def note_touched(self, model):
+    def note_touched(self, model: Model) -> None:
         """For Model: something was done to ``model``, which may be asleep."""
         if model not in self._touched:
             self._touched.append(model)
         self._watch.note_touched(model)
 
-    def note_placed(self, model):
+    def note_placed(self, model: Model) -> None:
         """For Model: ``model``, which is free, was put somewhere; the next step moves it out of what it overlaps."""
         if model not in self._placed:
             self._placed.append(model)
 
-    def _put_contact_ahead(self):
+    def _put_contact_ahead(self) -> None:
         """PyBullet has one value for all worlds of a process: set ours again if another world changed it."""
         if World._contact_ahead_in_force_m != self._contact_ahead_m:
             World._contact_ahead_in_force_m = self._contact_ahead_m
@@ -296,7 +304,7 @@ class World:
                 contactBreakingThreshold=self._contact_ahead_m, physicsClientId=self._client
             )
 
-    def step(self):
+    def step(self) -> None:
         """Advance the world by one tick."""
         self._put_contact_ahead()
         if self._placed:
@@ -322,7 +330,7 @@ class World:
                 model.reapply_wrenches()
         self._watch.look()
 
-    def rebuild(self, models, motions=None):
+    def rebuild(self, models: Iterable[Model], motions: Mapping[Model, Motion] | None = None) -> None:
         """Rebuild the multibodies of ``models``.
 
         ``motions``: {model: result of ``Model.motion`` or ``Model.last_good``}. All bodies are removed before the first
@@ -336,22 +344,22 @@ class World:
             model.take_parts(parts, motion)
         self.wake_all()
 
-    def reset_models(self):
+    def reset_models(self) -> None:
         """Return every model to its marked start. Time goes on."""
         for model in self.models.values():
             model.reset()
 
-    def reset_time(self):
+    def reset_time(self) -> None:
         """Begin again at tick 0."""
         self.tick = 0
         self._step_since = 0, 0.0
 
-    def detect_contacts(self):
+    def detect_contacts(self) -> None:
         """Find the contacts at the present poses, without a step; ``contacts`` then returns them."""
         self._put_contact_ahead()
         pybullet.performCollisionDetection(physicsClientId=self._client)
 
-    def contacts(self, model=None, other=None):
+    def contacts(self, model: Model | None = None, other: Model | None = None) -> list[Contact]:
         """Return the contacts of the last step as a list of Contact; all, or those of one Model, or between two."""
         if model is None:
             points = pybullet.getContactPoints(physicsClientId=self._client) or ()
@@ -370,12 +378,12 @@ class World:
             )
         return found
 
-    def touching(self, model):
+    def touching(self, model: Model) -> list[Contact]:
         """Return the contacts of ``model`` at the present poses, as :meth:`contacts` does; no time passes."""
         self.detect_contacts()
         return self.contacts(model)
 
-    def ray_test_batch(self, starts, ends):
+    def ray_test_batch(self, starts: ArrayLike, ends: ArrayLike) -> np.ndarray:
         """Cast rays from ``starts`` (k, 3) to ``ends`` (k, 3) [m, world]; return the fractions (k,) at which they hit.
 
         1.0 if a ray hits nothing.
@@ -384,7 +392,8 @@ class World:
         hits = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
         return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
 
-    def first_hits(self, starts, ends):
+    def first_hits(self, starts: Iterable[Sequence[float]],
+                   ends: Iterable[Sequence[float]]) -> list[tuple[str, str] | None]:
         """Cast rays as ``ray_test_batch`` does; return for each its first hit: ``(model's name, link's merged name)``,
         or None.
 
@@ -395,17 +404,17 @@ class World:
         found = ((models.get(hit[0]), hit) for hit in hits)
         return [None if model is None else (model.name, model.link_name(*hit[:2])) for model, hit in found]
 
-    def close(self):
+    def close(self) -> None:
         """Disconnect the physics client. The world cannot be used afterwards."""
         if self._client is not None:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = None
             self.models = {}
 
-    def _models_by_body(self):
+    def _models_by_body(self) -> dict[int, Model]:
         return {body: model for model in self.models.values() for body in model.parts.bodies}
 
-    def _model(self, name):
+    def _model(self, name: str) -> Model:
         try:
             return self.models[name]
         except KeyError:
