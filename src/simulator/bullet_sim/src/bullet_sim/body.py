@@ -140,7 +140,8 @@ class Body:
         self._put_root(self._link_index[root], pose.checked().matrix())
         self._was_placed()
 
-    def set_root_twist(self, root: str, linear: Sequence[float] | np.ndarray, angular: Sequence[float] | np.ndarray) -> None:
+    def set_root_twist(self, root: str, linear: Sequence[float] | np.ndarray,
+                       angular: Sequence[float] | np.ndarray) -> None:
         """Set the velocity of a free body of ``merged.roots`` [m/s, rad/s, world axes]: that of the model's frame for
         the first one, else that of its link's. Raises BulletSimError out of bounds."""
         self._set_root_twist(self._link_index[root], linear, angular)
@@ -185,7 +186,8 @@ class Body:
             self._set_root_twist(index, linear, angular)
         self.wake()
 
-    def _set_root_twist(self, index: int, linear: Sequence[float] | np.ndarray, angular: Sequence[float] | np.ndarray) -> None:
+    def _set_root_twist(self, index: int, linear: Sequence[float] | np.ndarray,
+                        angular: Sequence[float] | np.ndarray) -> None:
         within(bounds.SPEED, linear, "the linear velocity")
         angular = np.asarray(within(bounds.TURN_RATE, angular, "the angular velocity"), dtype=float)
         # The frame moves at `linear`; Bullet wants the velocity of the centre of mass.
