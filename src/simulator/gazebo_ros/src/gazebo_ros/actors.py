@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``libactor_trajectory.so``: moves the actor of a world along its trajectory. ROS-free."""
+from __future__ import annotations
+
 import bisect
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,13 +11,19 @@ from bullet_sim import Pose
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from typing import Any
+
+    from gazebo_ros.model_plugin import PluginContext
+
 _PERIOD_S = 1.0 / 30.0  # of the poses, as in Gazebo
 
 
 class Trajectory:
     """Poses by time: straight between waypoints."""
 
-    def __init__(self, waypoints):
+    def __init__(self, waypoints: Iterable[tuple[float, Sequence[float]]]) -> None:
         """``waypoints``: list of (time [s], pose (6,): x, y, z [m], roll, pitch, yaw), at least one."""
         waypoints = sorted(waypoints, key=lambda waypoint: waypoint[0])
         self._times = [time for time, _ in waypoints]
@@ -22,11 +31,11 @@ class Trajectory:
         self._turns = [quaternion_from_matrix(pose_matrix(rpy=pose[3:])) for _, pose in waypoints]
 
     @property
-    def length_s(self):
+    def length_s(self) -> float:
         """The time of the last waypoint."""
         return self._times[-1]
 
-    def pose(self, time_s):
+    def pose(self, time_s: float) -> Pose:
         """The Pose at a time [s] since the start; before the first waypoint that, after the last one that."""
         after = bisect.bisect_right(self._times, time_s)
         if after in (0, len(self._times)):
@@ -46,7 +55,7 @@ class ActorMotion(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         waypoints = [(self._number(point, "time"), self._pose(point))
                      for point in context.element.iterfind("trajectory/waypoint")]
@@ -56,7 +65,7 @@ class ActorMotion(ModelPlugin):
         self._delay_s = self._number(context.element, "delay_start")
         self._began_s, self._next_s = context.world.time_s, 0.0
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         if self._trajectory is None or time_s < self._next_s:
             return
         self._next_s = time_s + _PERIOD_S
@@ -66,19 +75,19 @@ class ActorMotion(ModelPlugin):
         if passed >= self._delay_s:
             self.context.model.set_base_pose(self._trajectory.pose(passed - self._delay_s))
 
-    def reset(self):
+    def reset(self) -> None:
         self._began_s, self._next_s = self.context.world.time_s, 0.0
 
-    def _flag(self, tag):
+    def _flag(self, tag: str) -> bool:
         return self.context.element_text(tag, "true").lower() in ("true", "1")
 
-    def _number(self, element, tag):
+    def _number(self, element: Any, tag: str) -> float:
         return self._numbers(element, tag, 1)[0]
 
-    def _pose(self, element):
+    def _pose(self, element: Any) -> list[float]:
         return self._numbers(element, "pose", 6)
 
-    def _numbers(self, element, tag, count):
+    def _numbers(self, element: Any, tag: str, count: int) -> list[float]:
         text = (element.findtext(tag) or "").strip() or " ".join(count * ["0"])
         try:
             values = [float(word) for word in text.split()]

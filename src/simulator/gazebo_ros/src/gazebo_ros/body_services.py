@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The services and the topic under /gazebo that are about single links and joints."""
+from __future__ import annotations
+
 import time
+from typing import TYPE_CHECKING
 
 import numpy as np
 from bullet_sim_msgs.msg import Drag
@@ -38,6 +41,14 @@ from gazebo_ros.link_placing import joints_to, placed, rates
 from loop_ros.faults import SURVIVED
 from urdf_model import bounds
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from gazebo_ros.changes import Changes
+    from gazebo_ros.entities import Entities
+    from gazebo_ros.simulation import Simulation
+    from loop_ros.protocol import Log, LoopRos
+
 _REFUSALS = (UnknownEntity, BulletSimError, ValueError)
 _JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": GetJointPropertiesResponse.CONTINUOUS,
                 "prismatic": GetJointPropertiesResponse.PRISMATIC}
@@ -53,7 +64,8 @@ _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel"
 class BodyServices:
     """Advertises the services. Everything here runs in the loop thread."""
 
-    def __init__(self, simulation, entities, changes, ros, log, notice):
+    def __init__(self, simulation: Simulation, entities: Entities, changes: Changes, ros: LoopRos, log: Log,
+                 notice: Callable[[], object]) -> None:
         """``entities``: :class:`gazebo_ros.entities.Entities`; ``changes``: :class:`gazebo_ros.changes.Changes`;
         ``notice()`` is called when :meth:`take_commands` has something to do."""
         self._simulation = simulation
@@ -80,7 +92,7 @@ class BodyServices:
                 ("set_link_state", SetLinkState, self._set_link_state)):
             ros.service("/gazebo/" + name, srv_class, handler)
 
-    def take_commands(self):
+    def take_commands(self) -> None:
         """Execute the messages of /gazebo/set_link_state and /gazebo/drag."""
         self._link_state_commands.handle(self._take_link_state)
         self._drag_commands.handle(self._take_drag)
@@ -111,7 +123,7 @@ class BodyServices:
             return
         self._drags.ask(target, dragging.Drag(grip, end, time.monotonic()))
 
-    def push(self):
+    def push(self) -> None:
         """Before a physics step: apply the wrenches, efforts and pulls that are due."""
         if self._drags:
             for target, drag in self._drags.due(time.monotonic()):
@@ -142,7 +154,7 @@ class BodyServices:
         index = model.index([joint])
         model.add_effort(index, model.limited_effort(index, np.array([effort])))
 
-    def forget(self, model_name=None):
+    def forget(self, model_name: str | None = None) -> None:
         """Drop the wrenches, efforts and pulls of a model that is gone, or all."""
         for jobs in (self._wrenches, self._efforts, self._drags):
             jobs.remove(lambda target: model_name is None or target[0] == model_name)

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line of gzserver, as people's launch files write it into ``args``. ROS-free."""
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import NoReturn
 
 _DESCRIPTION = """The simulator: physics, /clock and the services under /gazebo.
 
@@ -25,7 +32,7 @@ class CommandLine:
     process sees to it that cameras are drawn), and ``ignored``, a list of words.
     """
 
-    def __init__(self, arguments):
+    def __init__(self, arguments: Sequence[str]) -> None:
         """``arguments``: list of words without the program's name and without ROS's remappings.
 
         Raises ``ValueError`` that says what is wrong.
@@ -51,5 +58,5 @@ class CommandLine:
 
 
 class _Parser(argparse.ArgumentParser):
-    def error(self, message):
+    def error(self, message: str) -> NoReturn:
         raise ValueError("the command line of the simulator: %s; expected [WORLD_FILE] [-u] [--seed NUMBER]" % message)

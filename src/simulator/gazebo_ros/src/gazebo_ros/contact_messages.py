@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Contacts of the world as ``gazebo_msgs/ContactState``, with the names of Gazebo's collisions."""
+from __future__ import annotations
+
 import weakref
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gazebo_msgs.msg import ContactState
@@ -10,20 +13,25 @@ from urdf_model import CollisionName, collision_names
 from urdf_model.distance import distance_from
 from urdf_model.transforms import inverse
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
+
+    from bullet_sim import Contact, Model, World
+
 
 class CollisionNames:
     """Names of the collisions of a ``bullet_sim.World``, as Gazebo has them: ``model::link::collision``."""
 
-    def __init__(self, world):
+    def __init__(self, world: World) -> None:
         self._world = world
         self._known = weakref.WeakKeyDictionary()  # Model -> {body: [(shape, CollisionName)]}
 
-    def of_link(self, model, link):
+    def of_link(self, model: Model, link: str) -> dict[str, str]:
         """Return the names in a link of Gazebo, of a ``bullet_sim.Model``: {plain name: full name}."""
         return {name.name: _full(model.name, name) for rows in self._rows(model).values() for _, name in rows
                 if name.link == link}
 
-    def at(self, model_name, body, position):
+    def at(self, model_name: str, body: str, position: Iterable[float]) -> str:
         """Return the name of the collision of a model's body that is at or next to ``position`` (3,) [m, world]."""
         model = self._world.models[model_name]
         rows = self._rows(model)[body]
@@ -48,11 +56,12 @@ class CollisionNames:
         return self._known[model]
 
 
-def _full(model_name, name):
+def _full(model_name: str, name: CollisionName) -> str:
     return "%s::%s::%s" % (model_name, *name)
 
 
-def contact_states(contacts, names, about=None):
+def contact_states(contacts: Iterable[Contact], names: CollisionNames,
+                   about: Collection[str] | None = None) -> list[ContactState]:
     """List of ContactState, one for each pair of collisions among ``contacts``, a list of ``bullet_sim.Contact``.
 
     ``names``: :class:`CollisionNames`; ``about``: names of collisions: only their contacts, in which they come first;
@@ -70,7 +79,7 @@ def contact_states(contacts, names, about=None):
     return [_contact_state(mine, other, points) for (mine, other), points in touching.items()]
 
 
-def _contact_state(mine, other, points):
+def _contact_state(mine: str, other: str, points: list[tuple[Contact, float]]) -> ContactState:
     state = ContactState(collision1_name=mine, collision2_name=other)
     state.info = "%d contact points" % len(points)
     total = np.zeros(3)

@@ -1,11 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The status of /gazebo on /diagnostics: messages and requests that failed, threads and plugins that failed."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from command_line.options import counted
 from gazebo_ros.pacing import ticks_between
 from rospy_fixes.ports.threads import STATUS_NAME
 from sim_time.stamps import stamp_ns
+
+if TYPE_CHECKING:
+    from gazebo_ros.simulation import Simulation
+    from loop_ros.faults import Faults
+    from loop_ros.protocol import LoopRos
+    from rospy_fixes.ports.threads import ThreadFaults
 
 RATE_HZ = 1.0
 #: Prefix of the names of the statuses.
@@ -18,7 +28,7 @@ _HARDWARE = "simulator"
 class Diagnostics:
     """Call :meth:`on_tick` after each tick."""
 
-    def __init__(self, simulation, faults, threads, ros):
+    def __init__(self, simulation: Simulation, faults: Faults, threads: ThreadFaults, ros: LoopRos) -> None:
         """``faults``: :class:`loop_ros.faults.Faults`; ``threads``: :class:`rospy_fixes.ports.threads.ThreadFaults`."""
         self._simulation = simulation
         self._faults = faults
@@ -26,11 +36,11 @@ class Diagnostics:
         self.step_changed()
         self._publisher = ros.publisher("/diagnostics", DiagnosticArray)
 
-    def step_changed(self):
+    def step_changed(self) -> None:
         """The length of a tick has changed."""
         self._divisor = ticks_between(RATE_HZ, 1.0 / self._simulation.step_s)
 
-    def on_tick(self):
+    def on_tick(self) -> None:
         """Publish the messages due at this tick."""
         simulation = self._simulation
         if simulation.tick % self._divisor == 0 and self._publisher.has_listeners:
@@ -38,7 +48,7 @@ class Diagnostics:
             message.header.stamp = stamp_ns(simulation.time_ns)
             self._publisher.publish(message)
 
-    def statuses(self):
+    def statuses(self) -> list[DiagnosticStatus]:
         """List of ``DiagnosticStatus``: one for all dropped messages and requests, one for the threads that serve
         others if one of them met an error, one for each plugin that has ever raised."""
         failed = [hosted for hosted in self._simulation.plugins if hosted.failures]

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links that are pulled by a spring, as with a mouse. ROS-free; wall times are arguments."""
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from urdf_model import bounds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+
+    from bullet_sim import Model
 
 #: A link is let go when nobody has asked for it this long [s, wall].
 FORGET_S = 0.5
@@ -42,7 +51,7 @@ class Drag(NamedTuple):
     asked_s: float
 
 
-def masses_of(model, link, grip):
+def masses_of(model: Model, link: str, grip: np.ndarray) -> Masses:
     """The :class:`Masses` for a pull at the point ``grip`` (3,) [m, world] of a link of a ``bullet_sim.Model``."""
     merged = model.merged
     name = merged.frames[link].link
@@ -59,7 +68,8 @@ def masses_of(model, link, grip):
                   inertia * (1.0 + swung / own), own / (own + swung))
 
 
-def spring_wrench(masses, away, velocity, turn_rate, step_s):
+def spring_wrench(masses: Masses, away: npt.ArrayLike, velocity: npt.ArrayLike, turn_rate: npt.ArrayLike,
+                  step_s: float) -> tuple[np.ndarray, np.ndarray]:
     """(force (3,) [N] at the grip, torque (3,) [Nm]) of the spring, in world axes.
 
     ``away``: from the grip to the target (3,) [m]; ``velocity`` (3,) of the grip [m/s]; ``turn_rate`` (3,) of the link
@@ -77,30 +87,30 @@ def spring_wrench(masses, away, velocity, turn_rate, step_s):
 class Drags:
     """The pulls of now, by (model, link)."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._drags = {}
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._drags)
 
-    def __contains__(self, target):
+    def __contains__(self, target: object) -> bool:
         return target in self._drags
 
-    def ask(self, target, drag):
+    def ask(self, target: tuple[str, str], drag: Drag) -> None:
         """Pull ``target``, (model's name, link), by a :class:`Drag`; it replaces the one before."""
         self._drags[target] = drag
 
-    def remove(self, concerns):
+    def remove(self, concerns: Callable[[tuple[str, str]], bool]) -> None:
         """End the pulls of the targets with ``concerns(target)`` true."""
         self._drags = {target: drag for target, drag in self._drags.items() if not concerns(target)}
 
-    def due(self, now_s):
+    def due(self, now_s: float) -> list[tuple[tuple[str, str], Drag]]:
         """[(target, :class:`Drag`)] of the pulls that somebody still asks for at ``now_s`` [s, wall]."""
         self.remove(lambda target: not now_s - self._drags[target].asked_s < FORGET_S)
         return list(self._drags.items())
 
 
-def push(model, link, drag, step_s):
+def push(model: Model, link: str, drag: Drag, step_s: float) -> None:
     """Apply a pull to ``link`` of a ``bullet_sim.Model`` in the next step of ``step_s`` [s]."""
     pose = model.link_pose(link).matrix()
     arm = pose[:3, :3] @ drag.grip

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sensors whose measurements are pictures."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from gazebo_ros.model_plugin import ModelPlugin
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 
 class DrawnSensor(ModelPlugin):
@@ -14,7 +21,7 @@ class Prosilica(DrawnSensor):
     """``libgazebo_ros_prosilica.so``: a camera that streams. Of one whose parameter ``trigger_mode`` is ``polled`` a
     warning says so: polled_camera is in no package of Debian's ROS."""
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         mode = context.param("trigger_mode", "streaming")
         if mode != "streaming":

@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of models and links as the Gazebo services use them, and poses relative to them. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from bullet_sim import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from bullet_sim import Model, World
 
 #: Reference frames that mean the world.
 WORLD_FRAMES = ("", "world", "map", "/map")
@@ -12,18 +21,18 @@ class UnknownEntity(Exception):
     """There is no model, link or frame of that name; the text lists the known ones."""
 
 
-def _known(names):
+def _known(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
 class Entities:
     """Looks things up in a :class:`bullet_sim.World`."""
 
-    def __init__(self, world):
+    def __init__(self, world: World) -> None:
         """``world``: a ``bullet_sim.World``."""
         self._world = world
 
-    def model(self, name):
+    def model(self, name: str) -> Model:
         """The ``bullet_sim.Model``; raises :class:`UnknownEntity`."""
         try:
             return self._world.models[name]
@@ -31,7 +40,7 @@ class Entities:
             raise UnknownEntity("model '%s' does not exist; models: %s"
                                 % (name, _known(self._world.models))) from None
 
-    def link(self, scoped):
+    def link(self, scoped: str) -> tuple[Model, str]:
         """``model::link``, or a link's name that only one model has -> (model, link name).
 
         Raises :class:`UnknownEntity`.
@@ -50,7 +59,7 @@ class Entities:
                                 % (model_name, link_name, _known(model.link_names)))
         return model, link_name
 
-    def joint(self, name):
+    def joint(self, name: str) -> tuple[Model, str]:
         """A joint's name -> (the first model with such a joint, joint name); also ``model::joint``.
 
         Raises :class:`UnknownEntity`.
@@ -63,7 +72,7 @@ class Entities:
         known = [joint for model in self._world.models.values() for joint in model.joint_names]
         raise UnknownEntity("joint '%s' not found; joints that move: %s" % (name, _known(known)))
 
-    def frame(self, name):
+    def frame(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pose and velocity of the reference frame ``name``: (4x4 matrix in the world, linear, angular velocity).
 
         The world, a model, or a link as ``model::link``; a link's plain name where no model has it, as in Gazebo the
@@ -83,13 +92,14 @@ class Entities:
             raise UnknownEntity("reference frame '%s' is no model and no link; models: %s" % (name, _known(models)))
         return (model.link_pose(link_name).matrix(), *map(np.asarray, model.link_twist(link_name)))
 
-    def pose_in_world(self, pose, reference):
+    def pose_in_world(self, pose: Pose, reference: str) -> Pose:
         """Transform a :class:`Pose` from the frame ``reference`` to the world."""
         if reference in WORLD_FRAMES:
             return pose
         return Pose.from_matrix(self.frame(reference)[0] @ pose.matrix())
 
-    def relative(self, pose, linear, angular, reference):
+    def relative(self, pose: Pose, linear: np.ndarray, angular: np.ndarray,
+                 reference: str) -> tuple[Pose, np.ndarray, np.ndarray]:
         """Pose and velocities of the world, seen from ``reference``: (Pose, linear, angular).
 
         Velocities are differences to those of the frame's origin, in the frame's axes, as Gazebo has them.

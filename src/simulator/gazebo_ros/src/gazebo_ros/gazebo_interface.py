@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Calls to a simulator's services, for scripts. Every wait has a deadline in wall time and names what it waits for."""
+from __future__ import annotations
+
 import sys
 import time
+from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SpawnModel
 from std_srvs.srv import Empty
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any
+
+    from geometry_msgs.msg import Pose
 
 #: How long to wait for the simulator, a parameter or a model [s, wall time].
 WAIT_S = 60.0
@@ -18,7 +27,7 @@ class GazeboInterfaceError(Exception):
     """The simulator did not do what was asked; the text says what was expected and what was found."""
 
 
-def wait_until(condition, what, timeout_s=WAIT_S):
+def wait_until(condition: Callable[[], Any], what: str, timeout_s: float = WAIT_S) -> Any:
     """Poll ``condition()`` until it returns something true, and return that.
 
     After a moment says on the terminal that it waits for ``what``; raises :class:`GazeboInterfaceError` at the end of
@@ -41,7 +50,7 @@ def wait_until(condition, what, timeout_s=WAIT_S):
         time.sleep(_POLL_S)
 
 
-def call(service, srv_class, *arguments, timeout_s=WAIT_S):
+def call(service: str, srv_class: type, *arguments: Any, timeout_s: float = WAIT_S) -> Any:
     """Wait for a service, call it with ``arguments``, return the response."""
     name = rospy.resolve_name(service)
 
@@ -58,26 +67,30 @@ def call(service, srv_class, *arguments, timeout_s=WAIT_S):
         raise GazeboInterfaceError("%s failed: %s" % (name, error)) from error
 
 
-def _spawn_client(service, model_name, model_xml, robot_namespace, initial_pose, reference_frame, gazebo_namespace):
+def _spawn_client(service: str, model_name: str, model_xml: str, robot_namespace: str, initial_pose: Pose,
+                  reference_frame: str, gazebo_namespace: str) -> bool:
     response = call("%s/%s" % (gazebo_namespace, service), SpawnModel, model_name, model_xml, robot_namespace,
                     initial_pose, reference_frame)
     (rospy.loginfo if response.success else rospy.logerr)(response.status_message)
     return response.success
 
 
-def spawn_urdf_model_client(model_name, model_xml, robot_namespace, initial_pose, reference_frame, gazebo_namespace):
+def spawn_urdf_model_client(model_name: str, model_xml: str, robot_namespace: str, initial_pose: Pose,
+                            reference_frame: str, gazebo_namespace: str) -> bool:
     """Spawn the URDF text ``model_xml`` at ``initial_pose`` (geometry_msgs/Pose); True when it worked."""
     return _spawn_client("spawn_urdf_model", model_name, model_xml, robot_namespace, initial_pose, reference_frame,
                          gazebo_namespace)
 
 
-def spawn_sdf_model_client(model_name, model_xml, robot_namespace, initial_pose, reference_frame, gazebo_namespace):
+def spawn_sdf_model_client(model_name: str, model_xml: str, robot_namespace: str, initial_pose: Pose,
+                           reference_frame: str, gazebo_namespace: str) -> bool:
     """Spawn the SDF text ``model_xml`` at ``initial_pose`` (geometry_msgs/Pose); True when it worked."""
     return _spawn_client("spawn_sdf_model", model_name, model_xml, robot_namespace, initial_pose, reference_frame,
                          gazebo_namespace)
 
 
-def set_model_configuration_client(model_name, model_param_name, joint_names, joint_positions, gazebo_namespace):
+def set_model_configuration_client(model_name: str, model_param_name: str, joint_names: Sequence[str],
+                                   joint_positions: Sequence[float], gazebo_namespace: str) -> bool:
     """Put joints of a model at ``joint_positions`` [rad or m]; True when it worked. ``model_param_name`` is unused."""
     response = call("%s/set_model_configuration" % gazebo_namespace, SetModelConfiguration, model_name,
                     model_param_name, joint_names, joint_positions)
@@ -85,19 +98,19 @@ def set_model_configuration_client(model_name, model_param_name, joint_names, jo
     return response.success
 
 
-def delete_model_client(model_name, gazebo_namespace):
+def delete_model_client(model_name: str, gazebo_namespace: str) -> bool:
     """Delete a model; True when it worked."""
     response = call("%s/delete_model" % gazebo_namespace, DeleteModel, model_name)
     (rospy.loginfo if response.success else rospy.logerr)(response.status_message)
     return response.success
 
 
-def unpause_client(gazebo_namespace):
+def unpause_client(gazebo_namespace: str) -> None:
     """Let the world run."""
     call("%s/unpause_physics" % gazebo_namespace, Empty)
 
 
-def wait_for_model(model_name, gazebo_namespace):
+def wait_for_model(model_name: str, gazebo_namespace: str) -> None:
     """Wait until a model of that name is in the world."""
     def is_there():
         return model_name in call("%s/get_world_properties" % gazebo_namespace, GetWorldProperties).model_names

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The services under /gazebo. The status_message of each response says what was found and, after an error, what would
 be right."""
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rosgraph
@@ -47,11 +50,17 @@ from loop_ros.request_queue import LoopEnded
 from sim_time.stamps import stamp_ns
 from urdf_model import bounds, collision_names
 
+if TYPE_CHECKING:
+    from gazebo_ros.simulation import Simulation
+    from gazebo_ros.spawning import Spawner
+    from gazebo_ros.world_lights import WorldLights
+    from loop_ros.protocol import Log, LoopRos
+
 _ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 _NOT_CONTENT = re.compile(r"<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
 
 
-def root_element(xml):
+def root_element(xml: str) -> str:
     """Name of the root element of an XML text, or "" where there is none."""
     found = _ROOT_ELEMENT.search(_NOT_CONTENT.sub("", xml))
     return found.group(1) if found else ""
@@ -66,7 +75,7 @@ def _parameters():
 class GazeboServices:
     """Advertises the services; fast work runs in the loop, slow work in the thread of the request."""
 
-    def __init__(self, simulation, spawner, lights, ros, log):
+    def __init__(self, simulation: Simulation, spawner: Spawner, lights: WorldLights, ros: LoopRos, log: Log) -> None:
         """Advertises everything at once; requests wait until the loop runs. ``lights``: :class:`WorldLights`."""
         self._simulation = simulation
         self._world = simulation.world
@@ -104,7 +113,7 @@ class GazeboServices:
                 ("spawn_urdf_model", SpawnModel, self._spawn_model)):
             ros.service_in_thread("/gazebo/" + name, srv_class, handler)
 
-    def take_commands(self):
+    def take_commands(self) -> None:
         """Loop thread: execute the messages of /gazebo/set_model_state and /gazebo/set_link_state."""
         if not self._has_commands:
             return

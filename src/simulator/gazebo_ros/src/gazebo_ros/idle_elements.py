@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which <gazebo> elements of a URDF, and which elements of its plugins, have no effect here. ROS-free."""
+from __future__ import annotations
+
 import os
+from typing import TYPE_CHECKING
 
 from gazebo_ros.plugin_elements import TABLES
 from sdf_model import elements as sdf
 from urdf_model.element_table import ElementTable, Idle, IdleElements
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from urdf_model import Robot
 
 _STOPS = "the stops of joints are hard"
 _NOT_IN_A_URDF = "this element of SDF is not read in a URDF"
@@ -39,7 +47,7 @@ WITHOUT_EFFECT = (
 URDF = ElementTable([KNOWN], WITHOUT_EFFECT)
 
 
-def idle_elements(robot, source):
+def idle_elements(robot: Robot, source: str) -> str:
     """One line that names what has an effect in Gazebo and none here in the <gazebo> elements of a
     ``urdf_model.Robot``, and what is not known there; "" for nothing. ``source`` names the description."""
     found = IdleElements()
@@ -60,7 +68,7 @@ def idle_elements(robot, source):
     return found.text()
 
 
-def plugin_elements(robots, source):
+def plugin_elements(robots: Iterable[Robot], source: str) -> str:
     """As :func:`idle_elements`, of the plugins of several robots: for an SDF, whose other elements its reader names."""
     found = IdleElements()
     for robot in robots:

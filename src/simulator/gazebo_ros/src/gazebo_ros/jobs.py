@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Forces with a start and a duration. ROS-free; times are integer nanoseconds of simulation."""
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 @dataclass
@@ -21,18 +26,18 @@ class TimedJobs:
     nothing, a negative one never ends.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._jobs = []
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._jobs)
 
-    def add(self, target, payload, start_ns, duration_ns):
+    def add(self, target: Any, payload: Any, start_ns: int, duration_ns: int) -> None:
         """Apply ``payload`` to ``target`` (anything that can be compared). A start in the past means now."""
         if duration_ns != 0:
             self._jobs.append(_Job(target, payload, start_ns, duration_ns))
 
-    def due(self, now_ns):
+    def due(self, now_ns: int) -> list[tuple[Any, Any]]:
         """The (target, payload) pairs for the tick that begins at ``now_ns``, in the order they were added."""
         if not self._jobs:
             return []
@@ -48,6 +53,6 @@ class TimedJobs:
         self._jobs = left
         return found
 
-    def remove(self, concerns):
+    def remove(self, concerns: Callable[[Any], bool]) -> None:
         """Drop the jobs with ``concerns(target)`` true."""
         self._jobs = [job for job in self._jobs if not concerns(job.target)]

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The services under /gazebo about lights. Cameras render with all lights; the window follows the direction of the
 sun."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from gazebo_msgs.srv import (
     DeleteLight,
@@ -15,11 +19,15 @@ from std_msgs.msg import ColorRGBA
 from gazebo_ros.entities import UnknownEntity
 from urdf_model.transforms import matrix_from_quaternion, rigid
 
+if TYPE_CHECKING:
+    from gazebo_ros.world_lights import WorldLights
+    from loop_ros.protocol import LoopRos
+
 
 class LightServices:
     """Reads and changes the world's lights."""
 
-    def __init__(self, lights, ros):
+    def __init__(self, lights: WorldLights, ros: LoopRos) -> None:
         """``lights``: :class:`gazebo_ros.world_lights.WorldLights`."""
         self._lights = lights
         for name, srv_class, handler in (("delete_light", DeleteLight, self._delete),

@@ -5,13 +5,26 @@ A plugin lives in the loop thread. It may use the context and the world in that 
 the subscriptions of the context. No call blocks: topics and services are registered with the ROS master by a thread of
 their own, messages are sent without waiting.
 """
+from __future__ import annotations
+
 import contextlib
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from loop_ros.node_handle import NodeHandle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any, Self
+
+    import numpy.typing as npt
+
+    from bullet_sim import Model, World
+    from loop_ros.protocol import Log, LoopRos
+    from urdf_model import Robot
+    from world_picture.shared_picture import NoPicture, PictureWriter
 
 
 class PluginError(Exception):
@@ -41,7 +54,7 @@ class ModelPlugin:
     named_if_empty = False
 
     @classmethod
-    def spawn_options(cls, robot, element):
+    def spawn_options(cls, robot: Robot, element: Any) -> dict[str, Any]:
         """Keyword arguments for ``bullet_sim.World.spawn`` of a model with this plugin.
 
         Called before the model exists, with the ``urdf_model.Robot`` and the ``<plugin>`` element. A robot that is
@@ -53,38 +66,38 @@ class ModelPlugin:
         """
         return {}
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         """Runs in the loop thread at spawn, after a start configuration (``spawn_model -J``) is in place.
 
         Raise :class:`PluginError` to refuse the model. ``context`` is a :class:`PluginContext`.
         """
         self.context = context
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         """Before the physics step: read the state, command the drives. ``time_s`` is the time the step starts at."""
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         """After the physics step: publish due messages. ``time_s`` is the time that the step reached."""
 
-    def step_changed(self, step_s):
+    def step_changed(self, step_s: float) -> None:
         """From the next tick on, a tick lasts ``step_s`` [s]; ``update`` gets it as ``dt``."""
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         """A service has moved the model's joints (set_model_configuration); targets should follow, so that nothing
         moves until a new command comes.
 
         Messages that are in the queues now came before.
         """
 
-    def reset(self):
+    def reset(self) -> None:
         """The world was reset. After ``reset_simulation`` the next ``time_s`` is smaller."""
 
-    def close(self):
+    def close(self) -> None:
         """The model is being deleted or the node ends. Topics and services of the context are closed after this."""
 
     # -- when it has raised ---------------------------------------------------------------------------------------
 
-    def restarted(self):
+    def restarted(self) -> ModelPlugin:
         """Return the plugin that replaces this one after it raised. It must start no motion, and moving joints come to
         rest.
 
@@ -92,7 +105,7 @@ class ModelPlugin:
         """
         return self.successor()
 
-    def successor(self, *arguments):
+    def successor(self, *arguments: Any) -> Self:
         """Close this plugin; returns a new one of its class, made with the context and ``arguments``.
 
         It takes over topics and services of the same name and type, so that clients stay connected; the others are
@@ -105,15 +118,15 @@ class ModelPlugin:
         self.context.end_restart()
         return plugin
 
-    def hold(self):
+    def hold(self) -> None:
         """The plugin counts as failed: keep the joints that it drives where they are, by the simplest means."""
 
-    def while_failed(self, time_s):
+    def while_failed(self, time_s: float) -> bool:
         """Called in place of ``update`` and ``publish`` while it counts as failed; return True to be revived."""
         return False
 
 
-def with_tf_prefix(parameters, namespace, name):
+def with_tf_prefix(parameters: dict[str, Any], namespace: str, name: str) -> str:
     """The frame ``name`` with the ``tf_prefix`` that a node in ``namespace`` finds among ``parameters`` (a tree)."""
     if name.startswith("/"):
         return name.lstrip("/")
@@ -165,7 +178,8 @@ class PluginContext(NodeHandle):
         ``info``, ``warn``, ``error`` and ``*_throttle(period_s, text)``; never blocks the loop.
     """
 
-    def __init__(self, world, model, source, log, ros, parameters, host=_NO_HOST):
+    def __init__(self, world: World, model: Model, source: PluginSource, log: Log, ros: LoopRos,
+                 parameters: dict[str, Any], host: PluginHost = _NO_HOST) -> None:
         """``ros``: as for a NodeHandle; ``parameters``: the tree of the parameter server at spawn time; ``source``:
         :class:`PluginSource`; ``host``: :class:`PluginHost`."""
         self.world = world
@@ -176,11 +190,12 @@ class PluginContext(NodeHandle):
         self._parameters = parameters
         self._host = host
 
-    def plugins(self):
+    def plugins(self) -> tuple[ModelPlugin, ...]:
         """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
         return tuple(self._host.plugins())
 
-    def screen(self, link, place, size_m, pixels, glows=False, radius_m=0.0):
+    def screen(self, link: str, place: npt.ArrayLike, size_m: Sequence[float], pixels: Sequence[int],
+               glows: bool = False, radius_m: float = 0.0) -> PictureWriter | NoPicture:
         """Make a screen, a rectangle of the model that shows pictures; call it in the constructor.
 
         It is fixed to ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer
@@ -194,7 +209,7 @@ class PluginContext(NodeHandle):
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
                              lambda: self._host.add_screen(link, place, size_m, pixels, glows, radius_m), closes=False)
 
-    def param(self, name, default=None):
+    def param(self, name: str, default: Any = None) -> Any:
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""
         branch = self._parameters
         for part in self.resolve(name).strip("/").split("/"):
@@ -203,12 +218,12 @@ class PluginContext(NodeHandle):
             branch = branch[part]
         return branch
 
-    def frame(self, name):
+    def frame(self, name: str) -> str:
         """The frame ``name`` as messages have it: behind the parameter ``tf_prefix`` of the namespace, or of one above
         it, unless the name is absolute."""
         return with_tf_prefix(self._parameters, self.namespace, name)
 
-    def element_text(self, tag, default=None):
+    def element_text(self, tag: str, default: str | None = None) -> str | None:
         """Stripped text of a child of the ``<plugin>`` element, or ``default`` where it is missing or empty."""
         text = self.element.findtext(tag)
         return text.strip() if text and text.strip() else default

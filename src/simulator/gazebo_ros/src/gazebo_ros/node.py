@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The /gazebo node: reads its parameters, builds the loop and its parts, runs it, cleans up."""
+from __future__ import annotations
+
 import contextlib
 import gc
 import logging
@@ -47,7 +49,7 @@ _SWITCH_INTERVAL_S = 0.0005
 _THREADS_END_S = 0.3
 
 
-def main(argv=None):
+def main(argv: list[str] | None = None) -> int:
     """Run the simulator until a signal or a shutdown request ends it; returns the exit code."""
     argv = sys.argv if argv is None else argv
     try:

@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeping simulation time in step with wall time, and measuring how well that works. ROS-free."""
+from __future__ import annotations
+
 import contextlib
 import ctypes
 import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 # A longer stall is not caught up: simulation time then stays behind [s].
 MAX_DEBT_S = 1.0
@@ -23,7 +29,7 @@ _PR_SET_TIMERSLACK = 29
 _MIN_SLACK_NS = 1
 
 
-def ticks_between(rate, tick_rate):
+def ticks_between(rate: float, tick_rate: float) -> int:
     """Number of ticks between two events at ``rate`` [Hz, simulation time].
 
     1 if the rate is above ``tick_rate`` [Hz]; rounded if the rate does not divide it. Raises ``ValueError`` for a rate
@@ -35,7 +41,7 @@ def ticks_between(rate, tick_rate):
     return max(1, round(tick_rate / rate))
 
 
-def wake_on_time():
+def wake_on_time() -> None:
     """Make the kernel wake the calling thread on time, not up to 0.05 ms later. Does nothing on systems other than
     Linux."""
     with contextlib.suppress(AttributeError, OSError):
@@ -49,7 +55,8 @@ class Pacer:
     fast as possible). ``clock`` and ``sleep`` are replaceable for tests.
     """
 
-    def __init__(self, step_s, real_time_factor=1.0, clock=time.perf_counter, sleep=time.sleep):
+    def __init__(self, step_s: float, real_time_factor: float = 1.0, clock: Callable[[], float] = time.perf_counter,
+                 sleep: Callable[[float], object] = time.sleep) -> None:
         """Raises ``ValueError`` for a step that is not positive and for a negative factor."""
         if not step_s > 0.0:
             raise ValueError("the time step is %r s, expected a positive number" % (step_s,))
@@ -63,22 +70,22 @@ class Pacer:
         self.lag = Lag(clock())
         self.restart()
 
-    def restart(self):
+    def restart(self) -> None:
         """Forget the delay: time counts from now on. For the start and after a pause."""
         # When the next tick is due, and when it may happen at the gentle speed.
         self._due = self._gentle = self._last = self._clock()
         self.lag.forget(self._last)
 
-    def forget_lag(self):
+    def forget_lag(self) -> None:
         """Do not count the present delay as a lack of processor time."""
         self.lag.forget(self._clock())
 
     @property
-    def is_paced(self):
+    def is_paced(self) -> bool:
         """False where ticks follow each other as fast as possible."""
         return self._period > 0.0
 
-    def wait(self, ticks=1):
+    def wait(self, ticks: int = 1) -> None:
         """Sleep until the next tick is due. Called after every tick, or once after several ``ticks``."""
         now = self._clock()
         if not self._period:
@@ -108,13 +115,13 @@ class Lag:
     Every turn of the loop costs something by itself: it wakes up, reads sockets, sends the time.
     """
 
-    def __init__(self, now=0.0):
+    def __init__(self, now: float = 0.0) -> None:
         """``now`` [s, wall time]: also of the methods."""
         self.is_late = False
         self._on_time_since = self._seen_at = now
         self.forget(now)
 
-    def forget(self, now):
+    def forget(self, now: float) -> None:
         """After a pause or a long request: what has happened since the last turn counts neither as late nor as on
         time."""
         self._on_time_since += now - self._seen_at
@@ -122,7 +129,7 @@ class Lag:
         # Since when it is late, and how late it was then, or at the end of the last LONGER_AFTER_S.
         self._late_since, self._late_s = None, 0.0
 
-    def update(self, late_s, now):
+    def update(self, late_s: float, now: float) -> None:
         """At the end of a turn that should have ended ``late_s`` ago [s]."""
         self._seen_at = now
         if late_s <= LATE_S:
@@ -140,19 +147,19 @@ class Lag:
 class RateMeter:
     """Real-time factor over consecutive windows of wall time."""
 
-    def __init__(self, window_s=1.0, clock=time.perf_counter):
+    def __init__(self, window_s: float = 1.0, clock: Callable[[], float] = time.perf_counter) -> None:
         """``window_s``: length of a window [s]."""
         self._window = window_s
         self._clock = clock
         self.restart(0.0)
 
-    def restart(self, time_s):
+    def restart(self, time_s: float) -> None:
         """Start a window at simulation time ``time_s`` [s], after a pause or a reset: a pause does not count as
         slow."""
         self._wall_start = self._clock()
         self._sim_start = time_s
 
-    def update(self, time_s):
+    def update(self, time_s: float) -> float | None:
         """The real-time factor of the window that ends now, or None while it is still open."""
         elapsed = self._clock() - self._wall_start
         if elapsed < self._window:
@@ -165,7 +172,8 @@ class RateMeter:
 class SlownessWatch:
     """Decides when a low real-time factor is logged: once, then at most every five minutes."""
 
-    def __init__(self, threshold=0.95, windows=3, quiet_s=300.0, clock=time.monotonic):
+    def __init__(self, threshold: float = 0.95, windows: int = 3, quiet_s: float = 300.0,
+                 clock: Callable[[], float] = time.monotonic) -> None:
         """A window is slow below ``threshold`` times the requested factor; ``windows`` slow ones in a row are logged,
         but not within ``quiet_s`` [s, wall time] of the previous line."""
         self._threshold = threshold
@@ -176,7 +184,7 @@ class SlownessWatch:
         self._told_at = None
         self._sum, self._count = 0.0, 0
 
-    def news(self, factor, wanted):
+    def news(self, factor: float, wanted: float) -> tuple[float, float | None, float | None] | None:
         """Add one window's factor and the requested one. Returns (present factor, its mean since the last line, time
         since then [s]; the last two None at first), or None if there is nothing to log."""
         self._sum += factor
@@ -195,7 +203,7 @@ class SlownessWatch:
         return sum(self._slow) / len(self._slow), mean, ago
 
 
-def slowness_line(wanted, factor, mean, ago_s):
+def slowness_line(wanted: float, factor: float, mean: float | None, ago_s: float | None) -> str:
     """The log line about a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
     if mean is None:
         return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "

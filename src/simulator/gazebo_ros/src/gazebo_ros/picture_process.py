@@ -3,8 +3,16 @@
 
 The thread of this class owns the process; the loop only says that there is a camera.
 """
+from __future__ import annotations
+
 import subprocess
 import threading
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from loop_ros.protocol import Log
 
 #: After a renderer has failed, the next one is started this much later [s].
 RESTART_S = 2.0
@@ -15,7 +23,8 @@ _ENDS_S = 2.0
 class PictureProcess:
     """At most one renderer at a time. It ends with this process, whatever ends that."""
 
-    def __init__(self, command, runs_already, log, restart_s=RESTART_S):
+    def __init__(self, command: list[str], runs_already: Callable[[], bool], log: Log,
+                 restart_s: float = RESTART_S) -> None:
         """``command``: list of words; the process must end when its standard input ends.
 
         ``runs_already()``: whether another process draws; asked before each start. ``log``: has ``info``, ``warn``.
@@ -26,11 +35,11 @@ class PictureProcess:
         self._thread = threading.Thread(target=self._run, name="picture process", daemon=True)
         self._thread.start()
 
-    def want(self):
+    def want(self) -> None:
         """There is a camera. Does not wait; further calls change nothing."""
         self._wanted.set()
 
-    def close(self):
+    def close(self) -> None:
         """End the renderer and wait for its end."""
         with self._lock:
             self._closing.set()
@@ -41,7 +50,7 @@ class PictureProcess:
         if self._thread.is_alive() and self._process is not None:
             self._process.kill()
 
-    def _run(self):
+    def _run(self) -> None:
         self._wanted.wait()
         while not self._runs_already():
             if not self._start():
@@ -53,7 +62,7 @@ class PictureProcess:
             self._log.warn("sensor_renderer ended with code %d and is started again" % code)
             self._closing.wait(self._restart_s)
 
-    def _start(self):
+    def _start(self) -> bool:
         """Start the process; return whether it runs."""
         with self._lock:
             if self._closing.is_set():

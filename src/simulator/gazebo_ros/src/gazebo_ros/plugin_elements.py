@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The elements of noetic's gazebo_plugins and gazebo_ros_control, by file name, and their effect here. ROS-free."""
+from __future__ import annotations
+
 from urdf_model.element_table import ElementTable
 
 # Read for all plugins, or of no use to any: noetic's plugins do not read alwaysOn, and rosDebugLevel is of the log. Of
@@ -23,7 +25,7 @@ _PAUSES = {"updateOffset": "0"}, "measurements begin with the time"
 _MIMIC = "joint mimicJoint multiplier offset sensitiveness maxEffort hasPID"
 
 
-def _with_errors(known, *prefixes):
+def _with_errors(known: str, *prefixes: str) -> str:
     """``known`` and the elements of the error model of each measurement."""
     return known + "".join(" %s%s" % (prefix, name[0].upper() + name[1:] if prefix else name)
                            for prefix in prefixes for name in _ERRORS)

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maps the file name of a model plugin to its Python class."""
+from __future__ import annotations
+
 import importlib
 import os
+from typing import TYPE_CHECKING
 
 import yaml
 
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
 
 
 def _read(path):
@@ -16,7 +22,7 @@ def _read(path):
 class PluginTable:
     """File name of a plugin -> ``"module:Class"``, imported when first asked for."""
 
-    def __init__(self, entries):
+    def __init__(self, entries: dict[str, str]) -> None:
         """``entries``: mapping of file names to "module:Class"; a wrong entry raises :class:`PluginError`."""
         if not isinstance(entries, dict):
             raise PluginError("the table of model plugins is %s, expected a mapping of file name to module:Class"
@@ -28,7 +34,9 @@ class PluginTable:
         self._classes = {}
 
     @classmethod
-    def from_yaml(cls, path, extra=None, others=(), warn=None):
+    def from_yaml(cls, path: str | os.PathLike[str], extra: dict[str, str] | None = None,
+                  others: Sequence[str | os.PathLike[str]] = (),
+                  warn: Callable[[str], object] | None = None) -> PluginTable:
         """The table of a YAML file, with the entries of the mapping ``extra`` added or replaced. ``others``: further
         files, the first one of which counts; one that cannot be used is left out, after a call of ``warn(text)``."""
         entries = _read(path)
@@ -45,11 +53,11 @@ class PluginTable:
         return cls({**entries, **(extra or {})})
 
     @property
-    def known(self):
+    def known(self) -> list[str]:
         """Sorted file names."""
         return sorted(self._entries)
 
-    def find(self, filename):
+    def find(self, filename: str) -> type[ModelPlugin] | None:
         """The plugin class for ``<plugin filename=...>``, or None for a file name that is not in the table.
 
         A path in front of the file name does not count. An entry that cannot be imported, or that is no

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The publications of /gazebo itself at each tick: the clock, the states of models and links, the real-time factor, and
 the snapshot for viewers."""
+from __future__ import annotations
+
 import struct
 import time
+from typing import TYPE_CHECKING
 
 import rospy
 from gazebo_msgs.msg import ContactsState, LinkStates, ModelStates, PerformanceMetrics
@@ -12,6 +15,12 @@ from gazebo_ros.contact_messages import CollisionNames, contact_states
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.pacing import RateMeter, SlownessWatch, slowness_line, ticks_between
 from sim_time.stamps import stamp_ns
+
+if TYPE_CHECKING:
+    from gazebo_ros.simulation import Simulation
+    from loop_ros.protocol import Log
+    from loop_ros.ros_objects import RosObjects
+    from world_picture.snapshot import NoSnapshot, SnapshotWriter
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
@@ -38,7 +47,8 @@ PAUSED_SNAPSHOT_RATE = 20.0
 class Publications:
     """Call :meth:`on_tick` after each tick, :meth:`on_turn` at each turn of the loop."""
 
-    def __init__(self, simulation, ros, snapshot, log, clock_rate):
+    def __init__(self, simulation: Simulation, ros: RosObjects, snapshot: SnapshotWriter | NoSnapshot, log: Log,
+                 clock_rate: float) -> None:
         """``clock_rate`` [Hz]: of /clock, rounded to whole ticks; raises ``ValueError`` if it is not positive.
 
         ``snapshot``: :class:`SnapshotWriter`.
@@ -64,7 +74,7 @@ class Publications:
         self._metrics = ros.publisher("/gazebo/performance_metrics", PerformanceMetrics)
         self.publish_clock()
 
-    def step_changed(self):
+    def step_changed(self) -> None:
         """The length of a tick has changed."""
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
@@ -75,7 +85,7 @@ class Publications:
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._contacts_divisor = ticks_between(CONTACTS_RATE, tick_rate)
 
-    def on_turn(self):
+    def on_turn(self) -> None:
         """While the world is paused: exclude that time from the measured rate, and show what services change."""
         if self._simulation.is_stepping:
             return
@@ -85,7 +95,7 @@ class Publications:
             self._snapshot_written_at = now
             self.write_snapshot()
 
-    def on_tick(self):
+    def on_tick(self) -> None:
         """Publish the messages due at this tick."""
         simulation = self._simulation
         tick = simulation.tick
@@ -111,12 +121,12 @@ class Publications:
         if factor is not None:
             self._report(factor)
 
-    def publish_clock(self):
+    def publish_clock(self) -> None:
         """Publish the time now."""
         seconds, nanoseconds = divmod(self._simulation.time_ns, 10**9)
         self._clock.publish_serialized(_CLOCK_MESSAGE.pack(_CLOCK_BYTES, seconds, nanoseconds))
 
-    def time_was_reset(self):
+    def time_was_reset(self) -> None:
         """Simulation time has jumped back."""
         self._meter.restart(self._simulation.time_s)
         self._set_rospy_time()
@@ -124,7 +134,7 @@ class Publications:
         self._snapshot.resets += 1
         self.write_snapshot()
 
-    def write_snapshot(self):
+    def write_snapshot(self) -> None:
         """Write the present state to the snapshot."""
         parts = []
         for model in self._simulation.world.models.values():

@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ``<ray>`` element of a laser or range finder, and a scan that is cast a few rays at a time. ROS-free."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 #: Largest number of rays per tick [about 5 us each]: a larger scan takes several ticks, as a real scanner's sweep does.
 RAYS_PER_TICK = 32
@@ -22,7 +29,7 @@ class RayPattern:
     [rad], the wider of both angles; ``remarks``: texts about angles that Gazebo takes and that are rarely meant.
     """
 
-    def __init__(self, ray, what):
+    def __init__(self, ray: Any, what: str) -> None:
         """``ray``: the element, or None for SDF's defaults; ``what`` names the sensor in messages. Raises
         :class:`RayPatternError`."""
         self._ray, self._what, self.remarks = ray, what, []
@@ -42,7 +49,7 @@ class RayPattern:
         self.directions = np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)],
                                    axis=-1).reshape(-1, 3)
 
-    def _span(self, path, default_samples):
+    def _span(self, path: str, default_samples: int) -> tuple[int, float, float]:
         samples = round(self._number(path + "/samples", default_samples) * self._number(path + "/resolution", 1.0))
         low, high = self._number(path + "/min_angle", 0.0), self._number(path + "/max_angle", 0.0)
         # Scanners that turn continuously are described either from 0 to 2 pi or from -pi to pi.
@@ -53,7 +60,7 @@ class RayPattern:
                                 % (self._what, path, low, high))
         return samples, low, high
 
-    def _number(self, path, default):
+    def _number(self, path: str, default: float) -> float:
         text = ("" if self._ray is None else self._ray.findtext(path) or "").strip()
         try:
             value = float(text) if text else float(default)
@@ -67,7 +74,8 @@ class RayPattern:
 class Sweep:
     """One scan in the making."""
 
-    def __init__(self, pattern, cast, random):
+    def __init__(self, pattern: RayPattern, cast: Callable[[np.ndarray, np.ndarray], np.ndarray],
+                 random: np.random.Generator) -> None:
         """``cast(starts, ends)`` -> fractions (k,) at which rays from (k, 3) to (k, 3) hit, 1.0 for no hit; ``random``:
         ``numpy.random.Generator`` for noise."""
         self._pattern = pattern
@@ -76,7 +84,7 @@ class Sweep:
         self._ranges = np.empty(len(pattern.directions))
         self._done = 0
 
-    def go_on(self, pose):
+    def go_on(self, pose: np.ndarray) -> np.ndarray | None:
         """Cast the next rays from a sensor at ``pose`` (4, 4). Returns the ranges (n,) [m] if the scan is now complete,
         infinite for rays that hit nothing, else None."""
         pattern = self._pattern
@@ -97,5 +105,5 @@ class Sweep:
         return self._ranges.copy()
 
 
-def _angles(count, low, high):
+def _angles(count: int, low: float, high: float) -> np.ndarray:
     return np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2.0])

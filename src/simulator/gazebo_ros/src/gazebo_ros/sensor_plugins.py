@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gazebo's sensor plugins that measure without pictures: laser, range finder, IMU, bumper, pose, joint states."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gazebo_msgs.msg import ContactsState
@@ -19,6 +22,14 @@ from sim_time.stamps import stamp
 from urdf_model import gazebo_links
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
+
+    import genpy
+
+    from gazebo_ros.model_plugin import PluginContext
+
 
 class PacedSensor(ModelPlugin):
     """Base class: one topic, published at a rate while it has subscribers. Names come from the plugin's elements."""
@@ -27,7 +38,7 @@ class PacedSensor(ModelPlugin):
     topic_tag, default_topic = "topicName", None
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self.sensor, self.link = sensor_of(context.element)
         self.what = "sensor plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
@@ -39,15 +50,15 @@ class PacedSensor(ModelPlugin):
             raise PluginError("%s names no topic; expected <%s>" % (self.what, self.topic_tag))
         self.publisher = context.publisher(topic, self.message_class)
 
-    def number(self, tag, default):
+    def number(self, tag: str, default: float) -> float:
         """A number of the plugin's element; raises ``PluginError``."""
         return self.number_in(self.context.element, tag, default)
 
-    def number_in(self, element, tag, default):
+    def number_in(self, element: Any, tag: str, default: float) -> float:
         """A number of an element's child."""
         return self.numbers(element, tag, (default,))[0]
 
-    def numbers(self, element, tag, defaults):
+    def numbers(self, element: Any, tag: str, defaults: Sequence[float]) -> tuple[float, ...]:
         """As many numbers as ``defaults`` has; raises ``PluginError``."""
         text = (element.findtext(tag) or "").strip()
         try:
@@ -59,12 +70,12 @@ class PacedSensor(ModelPlugin):
                               % (self.what, tag, text, len(defaults), "" if len(defaults) == 1 else "s"))
         return values
 
-    def sensor_pose(self):
+    def sensor_pose(self) -> np.ndarray:
         """The pose (4, 4) of the ``<sensor>`` in its link."""
         values = self.numbers(self.sensor, "pose", (0.0,) * 6)
         return pose_matrix(values[:3], values[3:])
 
-    def link_named(self, tag):
+    def link_named(self, tag: str) -> str:
         """The link that the plugin's element ``tag`` names; raises ``PluginError``."""
         name = self.context.element_text(tag)
         found = None if name is None else unscoped(self.context.model.name, name)
@@ -73,24 +84,24 @@ class PacedSensor(ModelPlugin):
                               % (self.what, tag, name or "", ", ".join(self.context.model.merged.frames)))
         return found
 
-    def is_due(self, time_s):
+    def is_due(self, time_s: float) -> bool:
         """Whether the next measurement is due; if so, it counts as taken."""
         return self.publisher.has_listeners and self._pace.take(time_s)
 
-    def stamped(self, message, time_s, frame):
+    def stamped(self, message: Any, time_s: float, frame: str) -> Any:
         """``message`` with its header filled."""
         message.header.stamp = stamp(time_s)
         message.header.frame_id = frame
         return message
 
-    def reset(self):
+    def reset(self) -> None:
         self._pace.restart()
 
 
 class RaySensor(PacedSensor):
     """A sensor of rays, cast into the collision shapes."""
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         if self.sensor is None:
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
@@ -107,7 +118,7 @@ class RaySensor(PacedSensor):
         self._start_sweep()
         self._sweeping = False
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self._sweeping:
             if not self.is_due(time_s):
                 return
@@ -118,16 +129,16 @@ class RaySensor(PacedSensor):
             self._sweeping = False
             self.publisher.publish(self.stamped(self.message(ranges), self._began_s, self.frame))
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> genpy.Message:
         """The message for ``ranges`` (n,) [m]."""
         raise NotImplementedError
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._start_sweep()
         self._sweeping = False
 
-    def _start_sweep(self):
+    def _start_sweep(self) -> None:
         world = self.context.world
         self._sweep = Sweep(self.pattern, world.ray_test_batch, world.random)
 
@@ -139,11 +150,11 @@ class Laser(RaySensor):
     message_class = LaserScan
     named_if_empty = True
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._intensities = [0.0] * self.pattern.columns
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> LaserScan:
         pattern = self.pattern
         row = ranges.reshape(pattern.rows, pattern.columns)[pattern.rows // 2]
         return LaserScan(angle_min=pattern.angle_min, angle_max=pattern.angle_max, angle_increment=pattern.increment,
@@ -156,14 +167,14 @@ class RangeFinder(RaySensor):
 
     message_class = Range
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._field = self.number("fov", self.pattern.field)
         said = context.element_text("radiation", "infrared").lower()
         self._radiation = Range.ULTRASOUND if said == "ultrasound" else Range.INFRARED
         self._noise = self.number("gaussianNoise", 0.0)
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> Range:
         nearest = min(float(ranges.min()), self.pattern.range_max)
         if self._noise and nearest < self.pattern.range_max:
             nearest += self.context.world.random.normal(0.0, self._noise)
@@ -180,7 +191,7 @@ class ImuSensor(PacedSensor):
     message_class = Imu
     default_topic = "imu"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         rate = self.number("updateRateHZ", 0.0)
         if rate > 0.0:
@@ -197,10 +208,10 @@ class ImuSensor(PacedSensor):
             context.service(service, Empty, lambda request: EmptyResponse())
         self._last = None
 
-    def _matrix(self):
+    def _matrix(self) -> np.ndarray:
         return self.context.model.link_pose(self._body).matrix() @ self._place
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self.publisher.has_listeners:
             self._last = None
             return
@@ -223,7 +234,7 @@ class ImuSensor(PacedSensor):
             covariance[0] = covariance[4] = covariance[8] = self._noise ** 2
         self.publisher.publish(self.stamped(message, time_s, self._frame))
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._last = None
 
@@ -233,7 +244,7 @@ class PoseSensor(PacedSensor):
 
     message_class = Odometry
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._body = self.link_named("bodyName")
         frame = context.element_text("frameName", "world")
@@ -244,7 +255,7 @@ class PoseSensor(PacedSensor):
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, turn, (0.0,) * 3))
         self._noise = self.number("gaussianNoise", 0.0)
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self.is_due(time_s):
             return
         model = self.context.model
@@ -277,7 +288,7 @@ class Bumper(PacedSensor):
     message_class = ContactsState
     topic_tag, default_topic = "bumperTopicName", "bumper_states"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         if self.link is None:
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
@@ -293,7 +304,7 @@ class Bumper(PacedSensor):
             asked = []
         self._watched = frozenset(known[name] for name in asked if name in known) or frozenset(known.values())
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self.is_due(time_s):
             return
         model = self.context.model
@@ -309,7 +320,7 @@ class JointStatePublisher(PacedSensor):
     default_topic = "joint_states"
     named_after_model = True
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         model = context.model
         text = context.element_text("jointName", "")
@@ -321,7 +332,7 @@ class JointStatePublisher(PacedSensor):
         self._names = names
         self._index = model.index(names)
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if self.is_due(time_s):
             position, velocity, effort = (values[self._index].tolist() for values in self.context.model.read_joints())
             self.publisher.publish(self.stamped(JointState(name=self._names, position=position, velocity=velocity,

@@ -3,14 +3,26 @@
 
 A tick is: commands and requests in, plugins' ``update``, one physics step, time, plugins' ``publish``.
 """
+from __future__ import annotations
+
 import contextlib
 import time
 import traceback
 from concurrent.futures import Future
+from typing import TYPE_CHECKING
 
 from command_line.options import counted
 from gazebo_ros.pacing import LATE_S, Pacer
 from loop_ros.faults import SURVIVED, described
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from bullet_sim import World
+    from gazebo_ros.model_plugin import ModelPlugin, PluginContext
+    from loop_ros.faults import Faults
+    from loop_ros.protocol import Log
+    from loop_ros.request_queue import RequestQueue
 
 # While the world is paused: how long the loop sleeps when nobody asks for anything, and while a lock-step request
 # waits for its topics [s].
@@ -31,7 +43,7 @@ class HostedPlugin:
     failed, so that it is not ticked until a reset revives it.
     """
 
-    def __init__(self, plugin, context, model_name, label):
+    def __init__(self, plugin: ModelPlugin, context: PluginContext, model_name: str, label: str) -> None:
         """``label``: the plugin's file name, for messages."""
         self.plugin = plugin
         self.context = context
@@ -42,7 +54,7 @@ class HostedPlugin:
 
 
 class _Advance:
-    def __init__(self, ticks, awaited, timeout_s, give_up_at):
+    def __init__(self, ticks: int, awaited: list[str], timeout_s: float, give_up_at: float) -> None:
         self.remaining = ticks
         self.awaited = awaited
         self.timeout_s = timeout_s
@@ -53,7 +65,8 @@ class _Advance:
 class Simulation:
     """Runs a ``bullet_sim.World`` and its model plugins, tick by tick."""
 
-    def __init__(self, world, requests, log, faults, real_time_factor=1.0, paused=False, deliveries=dict):
+    def __init__(self, world: World, requests: RequestQueue, log: Log, faults: Faults, real_time_factor: float = 1.0,
+                 paused: bool = False, deliveries: Callable[[], dict[str, int]] = dict) -> None:
         """Ready to :meth:`run`.
 
         ``requests``: :class:`loop_ros.request_queue.RequestQueue`; ``faults``: :class:`loop_ros.faults.Faults`.
@@ -84,22 +97,22 @@ class Simulation:
         self._delivered_before = {}
 
     @property
-    def time_ns(self):
+    def time_ns(self) -> int:
         """Simulation time as an exact count of nanoseconds."""
         tick, time_ns = self._step_since
         return time_ns + (self.tick - tick) * self._step_ns
 
     @property
-    def time_s(self):
+    def time_s(self) -> float:
         """Simulation time [s]."""
         return self.time_ns * 1e-9
 
     @property
-    def step_s(self):
+    def step_s(self) -> float:
         """Length of a tick [s]."""
         return self._step_s
 
-    def set_step(self, step_s):
+    def set_step(self, step_s: float) -> None:
         """Set the length of a tick from the next one on [s]; time and the real-time factor stay.
 
         Raises ``BulletSimError`` if it is out of bounds, and ``ValueError`` if a plugin only works with the present
@@ -118,25 +131,25 @@ class Simulation:
         self.on_step_change()
 
     @property
-    def real_time_factor(self):
+    def real_time_factor(self) -> float:
         """The requested factor; 0 is as fast as possible."""
         return self._pacer.real_time_factor
 
     @real_time_factor.setter
-    def real_time_factor(self, factor):
+    def real_time_factor(self, factor: float) -> None:
         self._pacer = Pacer(self._step_s, factor)
 
     @property
-    def ticks_at_once(self):
+    def ticks_at_once(self) -> int:
         """The one of ``turn_lengths`` that is in force."""
         return self.turn_lengths[self._pacer.lag.is_late]
 
     @property
-    def is_stepping(self):
+    def is_stepping(self) -> bool:
         """True while time moves: running, or advancing in lock-step."""
         return not self.paused or (self._advance is not None and not self._advance.awaited)
 
-    def run(self, stop):
+    def run(self, stop: Callable[[], bool]) -> None:
         """Turn until ``stop()`` is true. The calling thread becomes the only one that may touch the world."""
         self._pacer.restart()
         requests = self.requests
@@ -164,7 +177,7 @@ class Simulation:
             if self.tick % at_once == 0 or self.paused:
                 return count
 
-    def do_tick(self):
+    def do_tick(self) -> None:
         """One tick."""
         time_s, step_s = self.time_s, self._step_s
         for hosted in self._working:
@@ -185,7 +198,7 @@ class Simulation:
             self._wait_for_revival(time_s)
         self._faults.guarded("after a tick", self.on_tick)
 
-    def start_advance(self, ticks, topics, timeout_s):
+    def start_advance(self, ticks: int, topics: Sequence[str], timeout_s: float) -> Future[tuple[int, int]]:
         """Advance the paused world by ``ticks`` once each of ``topics`` has delivered since the last advance.
 
         Returns a ``Future`` of (tick, time in ns) that ends when that is done, or with :class:`AdvanceRefused`. Raises
@@ -205,7 +218,7 @@ class Simulation:
         self._advance = _Advance(ticks, list(topics), timeout_s, time.monotonic() + timeout_s)
         return self._advance.future
 
-    def reset(self, time_too):
+    def reset(self, time_too: bool) -> None:
         """Reset every model to its start, and with ``time_too`` the time to zero. Revives failed plugins."""
         self.read_messages()
         self.world.reset_models()
@@ -225,7 +238,7 @@ class Simulation:
             self.on_time_reset()
         self._pacer.restart()
 
-    def joints_were_set(self, model_name):
+    def joints_were_set(self, model_name: str) -> None:
         """Tell the model's plugins that its joints were moved by a service."""
         self.read_messages()
         for hosted in [hosted for hosted in self._working if hosted.model_name == model_name]:
@@ -234,12 +247,12 @@ class Simulation:
             except SURVIVED as error:
                 self._has_raised(hosted, "joints_set", error)
 
-    def host(self, hosted):
+    def host(self, hosted: HostedPlugin) -> None:
         """Run this plugin from the next tick on."""
         self.plugins = [*self.plugins, hosted]
         self._sort()
 
-    def unhost(self, model_name=None):
+    def unhost(self, model_name: str | None = None) -> None:
         """Close the plugins of one model, or of all."""
         for hosted in [h for h in self.plugins if model_name is None or h.model_name == model_name]:
             self._close(hosted)

@@ -3,12 +3,15 @@
 
     rosrun gazebo_ros spawn_model -urdf -param robot_description -model baxter -z 0.93 -J left_s1 -0.55
 """
+from __future__ import annotations
+
 import argparse
 import os
 import re
 import signal
 import sys
 import threading
+from typing import TYPE_CHECKING
 
 import rospkg
 import rospy
@@ -24,8 +27,12 @@ from sdf_model import description_file
 from urdf_model import bounds
 from urdf_model.transforms import quaternion_from_matrix, rpy_matrix
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
 
-def arguments(argv):
+
+def arguments(argv: Iterable[str]) -> argparse.Namespace:
     """The command line, parsed."""
     # Launch files are full of "-1e-05", which argparse takes for an option; a blank in front makes it a value.
     argv = [" " + word if word.startswith("-") and is_number(word) else word for word in argv]
@@ -65,7 +72,7 @@ def arguments(argv):
     return options
 
 
-def is_number(word):
+def is_number(word: str) -> bool:
     """Whether ``word`` reads as a float."""
     try:
         float(word)
@@ -74,7 +81,7 @@ def is_number(word):
     return True
 
 
-def read_description(options):
+def read_description(options: argparse.Namespace) -> str:
     """The text of the description; raises ``GazeboInterfaceError``."""
     if options.stdin:
         return sys.stdin.read()
@@ -89,7 +96,7 @@ def read_description(options):
         raise gazebo_interface.GazeboInterfaceError("cannot read %s: %s" % (path, error)) from error
 
 
-def database_file(model, is_urdf):
+def database_file(model: str, is_urdf: bool) -> Path:
     """The description in the folder of a model; raises ``GazeboInterfaceError``."""
     folders = model_folders()
     for folder in folders:
@@ -100,13 +107,13 @@ def database_file(model, is_urdf):
         model, "model.urdf" if is_urdf else "SDF", ", ".join(map(str, folders))))
 
 
-def initial_pose(options):
+def initial_pose(options: argparse.Namespace) -> Pose:
     """``geometry_msgs/Pose`` from -x -y -z -R -P -Y."""
     rotation = rpy_matrix(options.R, options.P, options.Y)
     return Pose(Point(options.x, options.y, options.z), Quaternion(*quaternion_from_matrix(rotation)))
 
 
-def spawn(options):
+def spawn(options: argparse.Namespace) -> bool:
     """Do what the options say; True when the model is in the world."""
     xml = read_description(options)
     if options.package_to_model:

@@ -4,13 +4,15 @@
 Slow work (parsing, importing plugins, finding files) happens in the thread of the request; the loop only makes the
 bodies.
 """
+from __future__ import annotations
+
 import gc
 import itertools
 import re
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from lxml import etree
@@ -33,6 +35,15 @@ from sdf_model import ModelFolders, SdfError, add_loops, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 from world_picture.shared_picture import NoPicture, PictureWriter
 from world_picture.snapshot import SnapshotError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any
+
+    from gazebo_ros.simulation import Simulation
+    from loop_ros.protocol import Log, LoopRos
+    from sdf_model import SdfModel
+    from urdf_model import Robot
 
 
 class SpawnRefused(Exception):
@@ -78,7 +89,8 @@ class Library(NamedTuple):
 class Spawner:
     """Makes models and their plugins, and keeps the list for viewers."""
 
-    def __init__(self, simulation, library, ros, log, on_change, folder=None):
+    def __init__(self, simulation: Simulation, library: Library, ros: LoopRos, log: Log,
+                 on_change: Callable[[], object], folder: str | Path | None = None) -> None:
         """``library``: :class:`Library`; ``on_change()``: models changed.
 
         ``folder``: where viewers find the pictures of screens.
@@ -100,7 +112,7 @@ class Spawner:
         self._folder = None if folder is None else Path(folder)
         self._number = itertools.count()
 
-    def listed(self):
+    def listed(self) -> list[dict[str, Any]]:
         """The scene's entry of each model of the world."""
         return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
                  "static": bool(model.static), "loose": bool(model.loose),
@@ -109,7 +121,7 @@ class Spawner:
                  "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
                 for model in self._simulation.world.models.values()]
 
-    def prepare(self, name, xml, namespace, parameters):
+    def prepare(self, name: str, xml: str, namespace: str | None, parameters: Callable[[], dict[str, Any]]) -> Prepared:
         """Any thread but the loop's: read a URDF. Raises :class:`SpawnRefused`.
 
         ``parameters``: function that returns the tree of the parameter server; called when a plugin needs it.
@@ -123,7 +135,8 @@ class Spawner:
         add_loops(robot)
         return self.prepare_robot(name, xml, robot, namespace, parameters, drawing=xml)
 
-    def prepare_sdf(self, name, xml, namespace, parameters):
+    def prepare_sdf(self, name: str, xml: str, namespace: str | None,
+                    parameters: Callable[[], dict[str, Any]]) -> Prepared:
         """Any thread but the loop's: read an SDF with one model. Raises :class:`SpawnRefused`."""
         self._check_name(name)
         try:
@@ -135,7 +148,8 @@ class Spawner:
         prepared.origin = found.pose
         return prepared
 
-    def prepare_robot(self, name, xml, robot, namespace, parameters, drawing=None):
+    def prepare_robot(self, name: str, xml: str, robot: Robot, namespace: str | None,
+                      parameters: Callable[[], dict[str, Any]], drawing: str | None = None) -> Prepared:
         """Any thread but the loop's: the same for a ``urdf_model.Robot`` that has been read from ``xml``.
 
         ``namespace``: None for a model of a world file; ``drawing``: URDF text for viewers where there is one already.
@@ -174,7 +188,7 @@ class Spawner:
                         sensors=sensors, lights=lights_of_links(robot, merged, self._log.warn),
                         parameters=tree, options=options, mended=mended)
 
-    def make_shapes(self, prepared):
+    def make_shapes(self, prepared: Prepared) -> None:
         """Any thread but the loop's, while that runs: let the loop make a model's slow shapes, one per turn.
 
         Raises ``BulletSimError``.
@@ -183,7 +197,7 @@ class Spawner:
         for link in _slow_bodies(prepared.merged):
             self._simulation.requests.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
 
-    def spawn(self, prepared, pose):
+    def spawn(self, prepared: Prepared, pose: Pose) -> None:
         """Loop thread: make the model at ``pose`` and start its plugins. Raises :class:`SpawnRefused`."""
         world = self._simulation.world
         try:
@@ -209,7 +223,7 @@ class Spawner:
         # Keep the model's objects out of garbage collections: they live as long as the model.
         gc.freeze()
 
-    def spawn_world(self, models):
+    def spawn_world(self, models: Sequence[SdfModel]) -> None:
         """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs those that fail."""
         said = plugin_elements([found.robot for found in models], "the world or a model")
         if said:
@@ -222,7 +236,7 @@ class Spawner:
                 why = str(error) if isinstance(error, SpawnRefused) else described(error)
                 self._log.error("model '%s' of the world file: %s" % (found.name, why))
 
-    def delete(self, name):
+    def delete(self, name: str) -> None:
         """Loop thread: remove a model and its plugins. Raises ``BulletSimError`` when there is none of that name."""
         if name not in self._simulation.world.models:
             self._simulation.world.delete(name)  # raises, and knows the right text
@@ -356,7 +370,7 @@ def _drawn(merged, plugin, namespace):
             "plugin": sensor.findall("plugin").index(plugin), "namespace": namespace}
 
 
-def is_floor(robot):
+def is_floor(robot: Robot) -> bool:
     """Whether a ``urdf_model.Robot`` is only a ground plane."""
     shapes = [shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions)]
     return bool(shapes) and all(isinstance(shape.geometry, Plane) for shape in shapes)

@@ -1,9 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads the ``<gazebo>`` elements of a URDF. In an SDF they are our own extension. ROS-free."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 from loop_ros.names import IllegalName, checked_name
 from urdf_model.element_table import content
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any
+
+    from urdf_model import Robot
 
 #: The element, inside <gazebo>, in which spawn_model hands over the joint positions of its option -J.
 START_CONFIGURATION = "start_configuration"
@@ -14,12 +23,12 @@ class ExtrasError(Exception):
     """A <gazebo> element cannot be used; the text says which and what would be right."""
 
 
-def plugins(robot):
+def plugins(robot: Robot) -> list[Any]:
     """The ``<plugin>`` elements of all ``<gazebo>`` elements that belong to the model, not to a sensor."""
     return [plugin for gazebo in robot.gazebo for plugin in gazebo.findall("plugin")]
 
 
-def sensor_plugins(robot, warn):
+def sensor_plugins(robot: Robot, warn: Callable[[str], object]) -> list[Any]:
     """The ``<plugin>`` elements of the ``<sensor>`` elements of links, and of those of joints that measure force.
 
     A sensor elsewhere is left out with its plugins, and ``warn(text)`` is called.
@@ -42,7 +51,7 @@ def sensor_plugins(robot, warn):
     return found
 
 
-def sensor_of(plugin):
+def sensor_of(plugin: Any) -> tuple[Any, str | None]:
     """The ``<sensor>`` that a plugin element stands in and the name of its link or joint; ``(None, None)`` outside of
     one."""
     sensor = plugin.getparent()
@@ -51,13 +60,13 @@ def sensor_of(plugin):
     return sensor, sensor.getparent().get("reference")
 
 
-def is_static(robot):
+def is_static(robot: Robot) -> bool | None:
     """True or None (not said): ``<gazebo><static>true</static></gazebo>`` fixes a model in the world."""
     said = [content(static).lower() for gazebo in robot.gazebo for static in gazebo.findall("static")]
     return True if "true" in said or "1" in said else None
 
 
-def start_configuration(robot, warn):
+def start_configuration(robot: Robot, warn: Callable[[str], object]) -> dict[str, float]:
     """Joint positions {name: rad or m} of the model at its start, from ``<gazebo><start_configuration>``.
 
     As in Gazebo, the last position of a joint counts, and unknown joints are passed over; ``warn(text)`` is called for
@@ -81,13 +90,13 @@ def start_configuration(robot, warn):
     return positions
 
 
-def unscoped(model_name, name):
+def unscoped(model_name: str, name: str) -> str:
     """The plain name of a joint or link, also if it is given as Gazebo scopes it, ``model::name``."""
     scope = model_name + "::"
     return name[len(scope):] if name.startswith(scope) else name
 
 
-def with_start_configuration(xml, positions):
+def with_start_configuration(xml: str, positions: Sequence[tuple[str, float]]) -> str:
     """The model description ``xml`` with a start configuration added. ``positions``: list of (name, value)."""
     if not positions:
         return xml
@@ -100,7 +109,7 @@ def with_start_configuration(xml, positions):
     raise ExtrasError("joint positions need a URDF or an SDF: the description has no </robot> and no </model>")
 
 
-def namespace_of(plugin, spawn_namespace):
+def namespace_of(plugin: Any, spawn_namespace: str | None) -> str:
     """The absolute namespace of a plugin: its own ``robotNamespace``, else the one it was spawned with.
 
     Raises :class:`ExtrasError` for a namespace that is none in ROS.
@@ -114,5 +123,5 @@ def namespace_of(plugin, spawn_namespace):
             plugin.get("filename"), "its robotNamespace" if own else "robot_namespace of the request", error)) from None
 
 
-def _attribute(text):
+def _attribute(text: str) -> str:
     return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

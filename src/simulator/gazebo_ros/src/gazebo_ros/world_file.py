@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds and reads world files, and holds the defaults of worlds. ROS-free."""
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sdf_model import SdfError, parse_sdf_world
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sdf_model import ModelFolders, SdfWorld
 
 #: SDF's defaults of a world: gravity [m/s^2], length of a tick [s].
 GRAVITY = (0.0, 0.0, -9.8)
@@ -13,7 +21,7 @@ class WorldFileError(Exception):
     """The world file cannot be used; the text names the file, and the line where there is one."""
 
 
-def find_world(name, folders):
+def find_world(name: str | Path, folders: Iterable[str | Path]) -> Path:
     """Path of the world file ``name``: itself if it is there, else below one of ``folders``.
 
     Raises :class:`WorldFileError`, which lists the searched files, and the worlds where they could have been.
@@ -27,7 +35,7 @@ def find_world(name, folders):
         name, ", ".join(map(str, candidates)), "there is " + ", ".join(there) if there else "no world is there"))
 
 
-def read_world(path, folders):
+def read_world(path: str | Path, folders: ModelFolders) -> SdfWorld:
     """The ``sdf_model.SdfWorld`` of the file at ``path``, with gravity and step size in any case.
 
     ``folders``: ``sdf_model.ModelFolders``. Raises :class:`WorldFileError`.

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lights of the world: read from the world file, changed by services, listed for viewers. ROS-free."""
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
@@ -8,11 +11,20 @@ from lxml import etree
 from gazebo_ros.entities import UnknownEntity
 from sdf_model import Scene, SdfError, parse_light
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Any
+
+    import numpy.typing as npt
+
+    from sdf_model import Light
+    from urdf_model import MergedRobot, Robot
+
 
 class WorldLights:
     """Lights by name."""
 
-    def __init__(self, lights, scene=None):
+    def __init__(self, lights: Sequence[Light], scene: Scene | None = None) -> None:
         """``lights``: list of ``sdf_model.Light``; ``scene``: ``sdf_model.Scene``."""
         self._lights = {light.name: light for light in lights}
         self._scene = scene or Scene()
@@ -21,7 +33,7 @@ class WorldLights:
         #: Called when the list for viewers has changed.
         self.on_change = lambda: None
 
-    def get(self, name):
+    def get(self, name: str) -> Light:
         """The ``sdf_model.Light``; raises :class:`UnknownEntity`."""
         try:
             return self._lights[name]
@@ -29,7 +41,7 @@ class WorldLights:
             raise UnknownEntity("light '%s' does not exist; lights: %s"
                                 % (name, ", ".join(self._lights) or "none")) from None
 
-    def change(self, name, **values):
+    def change(self, name: str, **values: npt.ArrayLike) -> None:
         """Change some fields of a light; raises :class:`UnknownEntity`, and ``ValueError`` for values that are not
         finite."""
         light = self.get(name)
@@ -39,13 +51,13 @@ class WorldLights:
         self._lights[name] = dataclasses.replace(light, **values)
         self.on_change()
 
-    def delete(self, name):
+    def delete(self, name: str) -> None:
         """Take a light out of the world; raises :class:`UnknownEntity`."""
         self.get(name)
         del self._lights[name]
         self.on_change()
 
-    def listed(self):
+    def listed(self) -> dict[str, Any]:
         """The scene's entry of light: plain data.
 
         ``ambient``, ``background``: red, green, blue, or None to let the viewer choose; ``shadows``, ``sky``;
@@ -56,7 +68,7 @@ class WorldLights:
                 "lights": None if self._unlit else [_listed(light) for light in self._lights.values()]}
 
 
-def _listed(light):
+def _listed(light: Light) -> dict[str, Any]:
     return {"type": light.type, "place": light.pose[:3, 3].tolist(),
             "direction": (light.pose[:3, :3] @ light.direction).tolist(), "diffuse": list(light.diffuse[:3]),
             "specular": list(light.specular[:3]),
@@ -64,7 +76,7 @@ def _listed(light):
             "cast_shadows": light.cast_shadows}
 
 
-def lights_of_links(robot, merged, warn):
+def lights_of_links(robot: Robot, merged: MergedRobot, warn: Callable[[str], object]) -> list[dict[str, Any]]:
     """The lights in links of a model, for its entry of the scene: as :meth:`WorldLights.listed` has them, with
     ``link``, the body's link in whose frame they are.
 
