@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A conveyor: a belt whose surface moves and carries by friction what lies on it."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from std_msgs.msg import Float64
 
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 #: Fastest belt [m/s].
 MAX_M_S = 2.0
@@ -23,7 +29,7 @@ class ConveyorBelt(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         name = unscoped(context.model.name, context.element_text("joint", ""))
@@ -38,11 +44,11 @@ class ConveyorBelt(ModelPlugin):
             raise PluginError("%s: <speed> is '%s', expected -%g to %g m/s" % (self._what, text, MAX_M_S, MAX_M_S))
         self._commands = context.subscription(context.element_text("commandTopic", "conveyor/command"), Float64)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._commands.handle(self._take)
         self.context.model.carry(self._joint, np.zeros(1), np.array([self._speed]))
 
-    def _take(self, message):
+    def _take(self, message: Float64) -> None:
         speed = self._checked(message.data)
         if speed is None:
             self.context.log.warn_throttle(1.0, "%s: a speed of %s was commanded, expected -%g to %g m/s"
@@ -51,7 +57,7 @@ class ConveyorBelt(ModelPlugin):
             self._speed = speed
 
     @staticmethod
-    def _checked(value):
+    def _checked(value: float | str) -> float | None:
         """The speed [m/s], or None where it is out of range."""
         try:
             speed = float(value)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Vehicles that follow ``cmd_vel``: on two wheels, on four, or sliding."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Twist
@@ -14,6 +17,12 @@ from gazebo_ros.urdf_extras import unscoped
 from ros_controllers.wheel_odometry import WheelOdometry
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
+
+if TYPE_CHECKING:
+    import genpy
+    from geometry_msgs.msg import TransformStamped
+
+    from gazebo_ros.model_plugin import PluginContext
 
 # Variances of x, y, z [m2], roll, pitch, yaw [rad2]: large for the directions that plane odometry does not measure.
 _UNKNOWN = 1e12
@@ -31,7 +40,7 @@ class Drive(ModelPlugin):
     tf_tag = "publishOdomTF"
     variances = _VARIANCES
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self.what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         self.model = context.model
@@ -50,17 +59,17 @@ class Drive(ModelPlugin):
 
     # -- of each kind ------------------------------------------------------------------------------------------------
 
-    def configure(self):
+    def configure(self) -> None:
         """Read the elements of this kind. Raises ``PluginError``."""
 
-    def drive(self, x, y, turn, dt):
+    def drive(self, x: float, y: float, turn: float, dt: float) -> None:
         """Before a step: drive at ``x``, ``y`` [m/s] in the model's axes, and turn [rad/s]."""
         raise NotImplementedError
 
-    def moved(self, time_s, dt):
+    def moved(self, time_s: float, dt: float) -> None:
         """After a step, for a kind that integrates its odometry."""
 
-    def where(self):
+    def where(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(pose (4, 4), linear velocity (3,), angular velocity (3,)), the velocities in the model's axes."""
         pose = self.model.base_pose().matrix()
         linear, angular = (pose[:3, :3].T @ np.asarray(part) for part in self.model.base_twist())
@@ -68,14 +77,14 @@ class Drive(ModelPlugin):
 
     # -- the loop ----------------------------------------------------------------------------------------------------
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._now = time_s
         self._commands.handle(self._take)
         if time_s - self._commanded_at > self.timeout_s:
             self._wanted = (0.0, 0.0, 0.0)
         self.drive(*self._wanted, dt)
 
-    def _take(self, message):
+    def _take(self, message: Twist) -> None:
         wanted = (message.linear.x, message.linear.y, message.angular.z)
         if all(map(math.isfinite, wanted)):
             self._wanted, self._commanded_at = wanted, self._now
@@ -83,7 +92,7 @@ class Drive(ModelPlugin):
             self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is not a number and ignored"
                                            % (self.what, *wanted))
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         self.moved(time_s, self.context.world.time_step_s)
         if not self._pace.take(time_s):
             return
@@ -96,15 +105,15 @@ class Drive(ModelPlugin):
                 self._tf.publish(TFMessage([transform_msg(time_s, self._odometry_frame, self._base_frame, pose)]))
         self.also_publish(time_s)
 
-    def also_publish(self, time_s):
+    def also_publish(self, time_s: float) -> None:
         """Called at the same rate, for a kind with further topics."""
 
-    def reset(self):
+    def reset(self) -> None:
         self._wanted, self._commanded_at = (0.0, 0.0, 0.0), 0.0
         self._commands.take()
         self._pace.restart()
 
-    def _message(self, now, pose, linear, angular):
+    def _message(self, now: genpy.Time, pose: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> Odometry:
         message = Odometry(child_frame_id=self._base_frame)
         message.header.stamp, message.header.frame_id = now, self._odometry_frame
         position, twist = message.pose.pose.position, message.twist.twist
@@ -117,11 +126,11 @@ class Drive(ModelPlugin):
 
     # -- elements ----------------------------------------------------------------------------------------------------
 
-    def text(self, tag, default=None):
+    def text(self, tag: str, default: str | None = None) -> str | None:
         """The text of an element, or ``default``. Kinds whose elements have other names override it."""
         return self.context.element_text(tag, default)
 
-    def number(self, tag, default):
+    def number(self, tag: str, default: float) -> float:
         """A finite number, 0 or more."""
         text = self.text(tag)
         try:
@@ -132,14 +141,14 @@ class Drive(ModelPlugin):
             raise PluginError("%s: <%s> is '%s', expected a number of 0 or more" % (self.what, tag, text))
         return value
 
-    def positive(self, tag, default):
+    def positive(self, tag: str, default: float) -> float:
         """A finite number above 0."""
         value = self.number(tag, default)
         if value == 0.0:
             raise PluginError("%s: <%s> is 0, expected a number above 0" % (self.what, tag))
         return value
 
-    def flag(self, tag, default):
+    def flag(self, tag: str, default: bool) -> bool:
         """true, false, 1 or 0."""
         text = self.text(tag)
         if text is None:
@@ -149,7 +158,7 @@ class Drive(ModelPlugin):
             raise PluginError("%s: <%s> is '%s', expected true or false" % (self.what, tag, text))
         return known[text.lower()]
 
-    def joint(self, tag, default):
+    def joint(self, tag: str, default: str) -> str:
         """The name of one of the model's joints."""
         name = unscoped(self.model.name, self.text(tag, default))
         if name not in self.model.joint_names:
@@ -161,30 +170,30 @@ class Drive(ModelPlugin):
 class _Wheels(Drive):
     """Wheels on two sides."""
 
-    def sides(self):
+    def sides(self) -> tuple[list[str], list[str]]:
         """(joints of the left wheels, joints of the right ones), names."""
         raise NotImplementedError
 
-    def configure(self):
+    def configure(self) -> None:
         left, right = self.sides()
         self._left, self._right = self.model.index(left), self.model.index(right)
         self._both = np.concatenate([self._left, self._right])
         self._torque = np.full(len(self._both), self.positive(self.torque_tag, 5.0))
         self._speeds = np.zeros(2)  # of the left and the right rims, as they are commanded [m/s]
 
-    def rims(self, x, turn):
+    def rims(self, x: float, turn: float) -> np.ndarray:
         """Target speeds of the rims (2,) [m/s], left and right."""
         half = turn * self._separation / 2.0
         return np.array([x - half, x + half])
 
-    def drive(self, x, y, turn, dt):
+    def drive(self, x: float, y: float, turn: float, dt: float) -> None:
         wanted = self.rims(x, turn)
         change = self.acceleration * dt if self.acceleration else math.inf
         self._speeds = np.clip(wanted, self._speeds - change, self._speeds + change)
         rates = np.repeat(self._speeds / self._radius, (len(self._left), len(self._right)))
         self.model.drive_velocity(self._both, rates, self._torque)
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._speeds = np.zeros(2)
 
@@ -201,10 +210,10 @@ class DiffDrive(_Wheels):
     torque_tag = "wheelTorque"
     named_after_model = True
 
-    def sides(self):
+    def sides(self) -> tuple[list[str], list[str]]:
         return [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]
 
-    def configure(self):
+    def configure(self) -> None:
         super().configure()
         self._separation = self.positive("wheelSeparation", 0.34)
         self._radius = self.positive("wheelDiameter", 0.15) / 2.0
@@ -221,18 +230,18 @@ class DiffDrive(_Wheels):
         if self.flag("publishWheelTF", False):
             self._wheel_tf = self.context.publisher("/tf", TFMessage)
 
-    def moved(self, time_s, dt):
+    def moved(self, time_s: float, dt: float) -> None:
         if self._counted is None:
             return
         before, self._turned = self._turned, self._angles()
         left, right = self._radius * (self._turned - before)
         self._counted.move((left + right) / 2.0, self.turn(left, right, dt), dt)
 
-    def turn(self, left, right, dt):
+    def turn(self, left: float, right: float, dt: float) -> float:
         """The angle [rad] that odometry counts for a step in which the rims moved by ``left`` and ``right`` [m]."""
         return (right - left) / self._separation
 
-    def where(self):
+    def where(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         counted = self._counted
         if counted is None:
             return super().where()
@@ -242,7 +251,7 @@ class DiffDrive(_Wheels):
         pose[:2, 3] = counted.x, counted.y
         return pose, np.array([counted.linear, 0.0, 0.0]), np.array([0.0, 0.0, counted.angular])
 
-    def also_publish(self, time_s):
+    def also_publish(self, time_s: float) -> None:
         if self._wheels is not None and self._wheels.has_listeners:
             position, velocity, effort = (values[self._both].tolist() for values in self.model.read_joints())
             message = JointState(None, self._wheel_names, position, velocity, effort)
@@ -251,22 +260,22 @@ class DiffDrive(_Wheels):
         if self._wheel_tf is not None and self._wheel_tf.has_listeners:
             self._wheel_tf.publish(TFMessage([self._wheel_transform(name, time_s) for name in self._wheel_names]))
 
-    def _wheel_transform(self, name, time_s):
+    def _wheel_transform(self, name: str, time_s: float) -> TransformStamped:
         joint = self.context.robot.joints[name]
         parent, child = (self.model.link_pose(link).matrix() for link in (joint.parent, joint.child))
         return transform_msg(time_s, self.context.frame(joint.parent), self.context.frame(joint.child),
                           np.linalg.inv(parent) @ child)
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         self._turned = self._angles()
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._turned = self._angles()
         if self._counted is not None:
             self._counted = WheelOdometry()
 
-    def _angles(self):
+    def _angles(self) -> np.ndarray:
         position = self.model.read_joints()[0]
         return np.array([position[self._left].mean(), position[self._right].mean()])
 
@@ -282,11 +291,11 @@ class SkidSteer(_Wheels):
     tf_tag = "broadcastTF"
     acceleration = 0.0
 
-    def sides(self):
+    def sides(self) -> tuple[list[str], list[str]]:
         return tuple([self.joint("%s%sJoint" % (side, end), "%s_%s_joint" % (side, end.lower())) for end in
                       ("Front", "Rear")] for side in ("left", "right"))
 
-    def configure(self):
+    def configure(self) -> None:
         super().configure()
         self._separation = self.positive("wheelSeparation", 0.4)
         self._radius = self.positive("wheelDiameter", 0.15) / 2.0
@@ -304,12 +313,12 @@ class PlanarMove(Drive):
     rate = 20.0
     rate_tag = "odometryRate"
 
-    def configure(self):
+    def configure(self) -> None:
         text = self.text("cmdTimeout", "-1")
         if not text.startswith("-"):
             self.timeout_s = self.number("cmdTimeout", 0.0)
 
-    def drive(self, x, y, turn, dt):
+    def drive(self, x: float, y: float, turn: float, dt: float) -> None:
         pose = self.model.base_pose().matrix()
         heading = math.atan2(pose[1, 0], pose[0, 0])
         cosine, sine = math.cos(heading), math.sin(heading)
@@ -324,7 +333,7 @@ class ForceBasedMove(PlanarMove):
 
     tf_tag = "publishOdometryTf"
 
-    def drive(self, x, y, turn, dt):
+    def drive(self, x: float, y: float, turn: float, dt: float) -> None:
         along, across = self.model.base_pose().matrix()[:3, :2].T
         linear, angular = (np.asarray(part) for part in self.model.base_twist())
         up = np.cross(along, across)

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A lift with a door that goes to floors, and velocities that a model starts with."""
+from __future__ import annotations
+
 from collections import deque
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from std_msgs.msg import String
@@ -9,6 +12,9 @@ from std_msgs.msg import String
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
 from urdf_model import OutOfBounds, bounds
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 # A joint goes to its target with these speeds for each metre that it is away [1/s], and with these largest forces [N]:
 # the proportional by the derivative gain of Gazebo's elevator plugin, and the former for one metre.
@@ -31,7 +37,7 @@ class Elevator(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         self._joints = context.model.index([self._joint(tag) for tag in ("door_joint", "lift_joint")])
@@ -42,7 +48,7 @@ class Elevator(ModelPlugin):
         self._until_s = None
         self._commands = context.subscription(context.element_text("topic", "elevator"), String)
 
-    def _joint(self, tag):
+    def _joint(self, tag: str) -> str:
         name = unscoped(self.context.model.name, self.context.element_text(tag, ""))
         sliding = [joint.name for joint in self.context.robot.movable_joints() if joint.type == "prismatic"]
         if name not in sliding:
@@ -50,14 +56,14 @@ class Elevator(ModelPlugin):
                               % (self._what, tag, name, ", ".join(sliding) or "(there are none)"))
         return name
 
-    def _number(self, tag, default):
+    def _number(self, tag: str, default: float) -> float:
         text = self.context.element_text(tag, str(default))
         try:
             return bounds.POSITION.check(float(text), "<%s>" % tag)
         except ValueError as error:
             raise PluginError("%s: <%s> is '%s', expected a number" % (self._what, tag, text)) from error
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._commands.handle(self._take)
         while self._states and self._states[0](time_s):
             self._states.popleft()
@@ -65,7 +71,7 @@ class Elevator(ModelPlugin):
         self.context.model.drive_velocity(self._joints, np.array([_DOOR_RATE, _LIFT_RATE]) * error,
                                           np.array([_DOOR_FORCE, _LIFT_FORCE]))
 
-    def _take(self, message):
+    def _take(self, message: String) -> None:
         try:
             floor = int(message.data)
         except ValueError:
@@ -79,11 +85,11 @@ class Elevator(ModelPlugin):
                              partial(self._moves, 0, _OPEN_M, _DOOR_NEAR), self._waits,
                              partial(self._moves, 0, 0.0, _DOOR_NEAR)]
 
-    def _moves(self, joint, target, near, time_s):
+    def _moves(self, joint: int, target: float, near: float, time_s: float) -> bool:
         self._targets[joint] = target
         return abs(target - self.context.model.read_joints()[0][self._joints[joint]]) < near
 
-    def _waits(self, time_s):
+    def _waits(self, time_s: float) -> bool:
         if self._until_s is None:
             self._until_s = time_s + self._wait_s
         if time_s < self._until_s:
@@ -91,7 +97,7 @@ class Elevator(ModelPlugin):
         self._until_s = None
         return True
 
-    def reset(self):
+    def reset(self) -> None:
         self._states.clear()
         self._until_s = None
         self._targets[:] = 0.0
@@ -103,13 +109,13 @@ class InitialVelocity(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._twist = [self._vector(tag, bound) for tag, bound in (
             ("linear", bounds.SPEED), ("angular", bounds.TURN_RATE))]
         self._start()
 
-    def _vector(self, tag, bound):
+    def _vector(self, tag: str, bound: bounds.Bound) -> list[float]:
         text = self.context.element_text(tag, "0 0 0")
         try:
             values = bound.check([float(word) for word in text.split()], "<%s>" % tag)
@@ -121,7 +127,7 @@ class InitialVelocity(ModelPlugin):
                 self.context.element.get("filename"), self.context.model.name, tag, text))
         return values
 
-    def _start(self):
+    def _start(self) -> None:
         model, scope = self.context.model, self.context.element.getparent().get("scope", "")
         if not scope:
             model.set_base_twist(*self._twist)
@@ -130,5 +136,5 @@ class InitialVelocity(ModelPlugin):
             if root.startswith(scope):
                 model.set_root_twist(root, *self._twist)
 
-    def reset(self):
+    def reset(self) -> None:
         self._start()

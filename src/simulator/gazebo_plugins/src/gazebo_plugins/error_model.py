@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors of a measurement: offset, drift, noise, scale. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
 _ONE_HOUR_HZ = 1.0 / 3600.0
 
@@ -17,27 +24,29 @@ class ErrorModel:
     :param scale: factor on the measurement
     """
 
-    def __init__(self, size, random, offset=0.0, drift=0.0, frequency=_ONE_HOUR_HZ, noise=0.0, scale=1.0):
+    def __init__(self, size: int, random: np.random.Generator, offset: npt.ArrayLike = 0.0, drift: npt.ArrayLike = 0.0,
+                 frequency: npt.ArrayLike = _ONE_HOUR_HZ, noise: npt.ArrayLike = 0.0,
+                 scale: npt.ArrayLike = 1.0) -> None:
         self._random = random
         self._offset, self.drift, self._frequency, self.noise, self._scale = (
             np.broadcast_to(np.asarray(values, dtype=float), (size,))
             for values in (offset, drift, frequency, noise, scale))
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Restart the drift at a random value."""
         self._drifted = self._random.normal(0.0, 1.0, self.drift.shape) * self.drift
 
     @property
-    def bias(self):
+    def bias(self) -> np.ndarray:
         """The slow part of the error (size,): offset and drift."""
         return self._offset + self._drifted
 
-    def add_drift(self, change):
+    def add_drift(self, change: np.ndarray) -> None:
         """Add ``change`` (size,) to the drift."""
         self._drifted = self._drifted + change
 
-    def measure(self, value, dt):
+    def measure(self, value: npt.ArrayLike, dt: float) -> np.ndarray:
         """The measurement (size,) of the true ``value`` (size,), ``dt`` [s] after the previous one."""
         if self.drift.any():
             # The process keeps its standard deviation for any dt: new noise replaces the decayed part.

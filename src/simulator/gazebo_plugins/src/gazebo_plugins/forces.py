@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gazebo's force plugins: on a joint, on a link, and a constant push."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 
@@ -10,6 +14,9 @@ from gazebo_ros.sensor_plugins import PacedSensor
 from gazebo_ros.urdf_extras import unscoped
 from urdf_model import OutOfBounds, bounds
 
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
+
 
 class ForceTorqueSensor(PacedSensor):
     """``libgazebo_ros_ft_sensor.so``: publishes the wrench through the joint ``jointName``, by default the one whose
@@ -18,7 +25,7 @@ class ForceTorqueSensor(PacedSensor):
 
     message_class = WrenchStamped
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         name = unscoped(context.model.name, context.element_text("jointName", self.link or ""))
         try:
@@ -29,12 +36,12 @@ class ForceTorqueSensor(PacedSensor):
         self._noise = self.number("gaussianNoise", 0.0)
         self._measuring = False
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         if self.publisher.has_listeners and self._pace.is_due(time_s + dt):
             self._joint.note()
             self._measuring = True
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self._measuring:
             return
         self._measuring = False
@@ -42,7 +49,7 @@ class ForceTorqueSensor(PacedSensor):
         message = WrenchStamped(wrench=_wrench(*self._joint.measure(), self._noise, self.context.world.random))
         self.publisher.publish(self.stamped(message, time_s, self._frame))
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._measuring = False
 
@@ -53,13 +60,13 @@ class LinkForce(PacedSensor):
 
     message_class = WrenchStamped
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._link = self.link_named("bodyName")
         self._body = context.model.merged.frames[self._link].link
         self._frame = context.frame(context.element_text("frameName", "world"))
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self.is_due(time_s):
             return
         model = self.context.model
@@ -80,7 +87,7 @@ class Force(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         name = context.element_text("bodyName", "")
@@ -95,12 +102,12 @@ class Force(ModelPlugin):
         self._push = None
         self._commands = context.subscription(topic, Wrench)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._commands.handle(self._take)
         if self._push is not None:
             self.context.model.apply_wrench(self._link, *self._push)
 
-    def _take(self, message):
+    def _take(self, message: Wrench) -> None:
         push = tuple((part.x, part.y, part.z) for part in (message.force, message.torque))
         try:
             bounds.FORCE.check(push[0], "the force")
@@ -110,12 +117,13 @@ class Force(ModelPlugin):
             return
         self._push = push if any(map(any, push)) else None
 
-    def reset(self):
+    def reset(self) -> None:
         self._push = None
         self._commands.take()
 
 
-def _wrench(force, torque, noise=0.0, random=None):
+def _wrench(force: np.ndarray, torque: np.ndarray, noise: float = 0.0,
+            random: np.random.Generator | None = None) -> Wrench:
     if noise:
         force, torque = force + random.normal(0.0, noise, 3), torque + random.normal(0.0, noise, 3)
     return Wrench(Vector3(*force), Vector3(*torque))

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``libgazebo_grasp_fix.so``: fingers that hold what they grip."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 
 class GraspFix(ModelPlugin):
@@ -10,7 +17,7 @@ class GraspFix(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         names = [unscoped(context.model.name, (link.text or "").strip())
                  for arm in context.element.findall("arm") for link in arm.findall("gripper_link")]

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A link that follows a frame of tf, and the true pose of a link as odometry."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -14,6 +17,9 @@ from gazebo_ros.transforms import TransformSource, transform_msg
 from gazebo_ros.urdf_extras import unscoped
 from sim_time.pace import Pace
 from urdf_model.transforms import quaternion_from_matrix
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 _WORLD = "world"
 # Of the frame of where the link is [Hz]; Gazebo sends it at each step.
@@ -31,7 +37,7 @@ class HandOfGod(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         name = context.element_text("linkName", "")
@@ -51,7 +57,7 @@ class HandOfGod(ModelPlugin):
         self._waits = False
         context.model.set_weight(self._body, False)
 
-    def _number(self, tag, default):
+    def _number(self, tag: str, default: float) -> float:
         text = self.context.element_text(tag, str(default))
         try:
             value = float(text)
@@ -61,7 +67,7 @@ class HandOfGod(ModelPlugin):
             raise PluginError("%s: <%s> is '%s', expected a number, 0 or more" % (self._what, tag, text))
         return value
 
-    def step_changed(self, step_s):
+    def step_changed(self, step_s: float) -> None:
         inertial = self.context.model.inertial(self._body)
         moments = np.linalg.eigvalsh(inertial.inertia)
         springs = []
@@ -75,7 +81,7 @@ class HandOfGod(ModelPlugin):
             springs.append((stiffness, 2.0 * math.sqrt(stiffness * inertia)))
         self._springs = tuple(springs)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._frames.take()
         wanted = self._frames.look_up(_WORLD, self._frame + "_desired")
         if wanted is None:
@@ -97,12 +103,12 @@ class HandOfGod(ModelPlugin):
         except BulletSimError as error:  # as for a frame that is very far away
             self.context.log.warn_throttle(5.0, "%s: %s; it is not pulled" % (self._what, error))
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self._waits and self._sent.has_listeners and self._pace.take(time_s):
             pose = self.context.model.link_pose(self._link).matrix()
             self._sent.publish(TFMessage([transform_msg(time_s, _WORLD, self._frame + "_actual", pose)]))
 
-    def reset(self):
+    def reset(self) -> None:
         self._pace.restart()
 
 
@@ -112,14 +118,14 @@ class WorldOdometry(PacedSensor):
 
     message_class = Odometry
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._link = self.link_named("frameName")
         self._frame = context.element_text("frameName")
         if self._pace.rate == 0.0:
             self._pace.rate = 1000.0
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not self.is_due(time_s):
             return
         pose = self.context.model.link_pose(self._link)
@@ -130,7 +136,7 @@ class WorldOdometry(PacedSensor):
         self.publisher.publish(self.stamped(message, time_s, self._frame))
 
 
-def _half_turn(rotation):
+def _half_turn(rotation: np.ndarray) -> np.ndarray:
     """Axis times half the angle (3,) [rad] of a rotation (3, 3), as Gazebo's springs have it."""
     found = np.asarray(quaternion_from_matrix(rotation))
     vector, real = (found[:3], found[3]) if found[3] >= 0.0 else (-found[:3], -found[3])

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A harness in which a model hangs, on a winch."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from std_msgs.msg import Bool, Float32
@@ -9,6 +12,11 @@ from bullet_sim import Pose
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
 from urdf_model.transforms import pose_matrix
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from gazebo_ros.model_plugin import PluginContext
 
 _MAX_N = 1e6  # of a joint without an effort limit
 _FASTEST_M_PER_S = 10.0
@@ -24,7 +32,7 @@ class Harness(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         joint = self._joint()
@@ -46,7 +54,7 @@ class Harness(ModelPlugin):
         self._hanging = None
         self._attach()
 
-    def _joint(self):
+    def _joint(self) -> Any:
         joints = self.context.element.findall("joint")
         wanted = (self.context.element.findtext("winch/joint") or "").strip()
         joint = next((joint for joint in joints if joint.get("name") == wanted), joints[0] if joints else None)
@@ -61,7 +69,7 @@ class Harness(ModelPlugin):
                                   % (self._what, joint.get("name"), ", ".join(others)))
         return joint
 
-    def _numbers(self, element, path, default, count):
+    def _numbers(self, element: Any, path: str, default: str, count: int) -> tuple[float, ...]:
         text = (element.findtext(path) or "").strip() or default
         try:
             values = tuple(float(word) for word in text.split())
@@ -72,12 +80,12 @@ class Harness(ModelPlugin):
                               % (self._what, path.rpartition("/")[2], text, count, "s" * (count > 1)))
         return values
 
-    def _attach(self):
+    def _attach(self) -> None:
         self._start = self.context.model.link_pose(self._link).matrix()
         self._way, self._speed = 0.0, 0.0
         self._hanging = self.context.world.hang(self.context.model, self._link, self._effort)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._velocities.handle(self._take_velocity)
         self._detach.handle(self._take_detach)
         if self._hanging is None:
@@ -87,25 +95,25 @@ class Harness(ModelPlugin):
         there[:3, 3] += self._way * (self._start[:3, :3] @ self._axis)
         self._hanging.hold(Pose.from_matrix(there))
 
-    def _take_velocity(self, message):
+    def _take_velocity(self, message: Float32) -> None:
         if not abs(message.data) <= _FASTEST_M_PER_S:
             self.context.log.warn_throttle(5.0, "%s: a velocity of %g m/s was commanded, expected at most %g"
                                            % (self._what, message.data, _FASTEST_M_PER_S))
             return
         self._speed = message.data
 
-    def _take_detach(self, message):
+    def _take_detach(self, message: Bool) -> None:
         if message.data and self._hanging is not None:
             self._hanging.let_go()
             self._hanging = None
 
-    def reset(self):
+    def reset(self) -> None:
         """It hangs again where the model starts."""
         if self._hanging is not None:
             self._hanging.let_go()
         self._attach()
 
-    def close(self):
+    def close(self) -> None:
         if self._hanging is not None:
             self._hanging.let_go()
             self._hanging = None

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sensors under the file names of hector_gazebo_plugins: IMU, satellite navigation, magnetometer, sonar."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3, Vector3Stamped
@@ -13,12 +16,15 @@ from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.sensor_plugins import PacedSensor, RangeFinder
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
+
 # Element after the prefix -> argument of ErrorModel.
 _ERRORS = {"offset": "offset", "drift": "drift", "driftFrequency": "frequency", "gaussianNoise": "noise",
            "scaleError": "scale"}
 
 
-def error_model(sensor, prefix="", size=3):
+def error_model(sensor: PacedSensor, prefix: str = "", size: int = 3) -> ErrorModel:
     """The :class:`ErrorModel` that a sensor's elements describe: ``gaussianNoise``, ``accelGaussianNoise`` ..., with
     one number for all axes or one for each. Raises ``PluginError``."""
     found = {}
@@ -35,7 +41,7 @@ def error_model(sensor, prefix="", size=3):
 class _LinkSensor(PacedSensor):
     """A sensor on the link ``bodyName`` (the root where it is left out), in the frame ``frameId``."""
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         period = self.number("updatePeriod", 0.0)
         if period > 0.0:
@@ -47,16 +53,16 @@ class _LinkSensor(PacedSensor):
 
     default_frame = None
 
-    def elapsed(self, time_s):
+    def elapsed(self, time_s: float) -> float:
         """Seconds since the last call, 0 at first."""
         last, self._last_s = self._last_s, time_s
         return 0.0 if last is None or time_s < last else time_s - last
 
-    def _axes(self):
+    def _axes(self) -> np.ndarray:
         """Axes of the link (3, 3) in the world's."""
         return self.context.model.link_pose(self._link).matrix()[:3, :3]
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._last_s = None
 
@@ -71,7 +77,7 @@ class HectorImu(_LinkSensor):
     message_class = Imu
     default_topic = "imu"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         topic = context.element_text("topicName", self.default_topic)
         self._accel, self._rate = error_model(self, "accel"), error_model(self, "rate")
@@ -86,7 +92,7 @@ class HectorImu(_LinkSensor):
         self._service = context.service(context.element_text("serviceName", topic + "/calibrate"), Empty,
                                         self._calibrate)
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if not (self.publisher.has_listeners or self._bias.has_listeners):
             self._velocity = None
             return
@@ -120,7 +126,7 @@ class HectorImu(_LinkSensor):
         self._rate.add_drift(-self._rate.bias)
         return EmptyResponse()
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._velocity = None
         for model in (self._accel, self._rate, self._yaw):
@@ -138,7 +144,7 @@ class HectorGps(_LinkSensor):
     default_topic = "fix"
     default_frame = "/world"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._reference = Reference(self.number("referenceLatitude", 49.9), self.number("referenceLongitude", 8.9),
                                     self.number("referenceAltitude", 0.0),
@@ -147,7 +153,7 @@ class HectorGps(_LinkSensor):
         self._position, self._speed = error_model(self), error_model(self, "velocity")
         self._velocity = context.publisher(context.element_text("velocityTopicName", "fix_velocity"), Vector3Stamped)
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         wanted = self.publisher.has_listeners, self._velocity.has_listeners
         if not any(wanted) or not self._pace.take(time_s):
             return
@@ -167,7 +173,7 @@ class HectorGps(_LinkSensor):
             message = Vector3Stamped(vector=Vector3(*self._reference.north_west_up(velocity)))
             self._velocity.publish(self.stamped(message, time_s, self._frame))
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._position.reset()
         self._speed.reset()
@@ -180,7 +186,7 @@ class HectorMagnetic(_LinkSensor):
 
     default_topic = "magnetic"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         said = context.element_text("useMagneticFieldMsgs", "false").lower()
         self.message_class = MagneticField if said in ("true", "1") else Vector3Stamped
         super().__init__(context)
@@ -190,14 +196,14 @@ class HectorMagnetic(_LinkSensor):
         self._field = magnetic_field(self.number("magnitude", 1.0), inclination, declination, heading)
         self._errors = error_model(self)
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if self.is_due(time_s):
             field = Vector3(*self._errors.measure(self._axes().T @ self._field, self.elapsed(time_s)))
             message = (MagneticField(magnetic_field=field) if self.message_class is MagneticField
                        else Vector3Stamped(vector=field))
             self.publisher.publish(self.stamped(message, time_s, self._frame))
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._errors.reset()
 
@@ -208,7 +214,7 @@ class HectorSonar(RangeFinder):
 
     default_topic = "sonar"
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self.frame = context.element_text("frameId", "/sonar_link")
         # RangeFinder's own noise would come on top.
@@ -216,14 +222,14 @@ class HectorSonar(RangeFinder):
         self._radiation = Range.ULTRASOUND
         self._errors = error_model(self, size=1)
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> Range:
         message = super().message(ranges)
         if message.range < message.max_range:
             measured = float(self._errors.measure((message.range,), self._pace.period_s)[0])
             message.range = min(max(measured, message.min_range), message.max_range)
         return message
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._errors.reset()
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``libgazebo_ros_joint_pose_trajectory.so``: moves joints through a list of positions, without physics."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from gazebo_msgs.srv import SetJointTrajectory, SetJointTrajectoryResponse
 from trajectory_msgs.msg import JointTrajectory
@@ -11,6 +15,13 @@ from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.urdf_extras import unscoped
 from urdf_model import bounds
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gazebo_msgs.srv import SetJointTrajectoryRequest
+
+    from gazebo_ros.model_plugin import PluginContext
+
 _WORLD = ("", "world", "map")
 
 
@@ -21,14 +32,14 @@ class Playback:
     :param start_s: when the first is due [s]
     """
 
-    def __init__(self, points, start_s):
+    def __init__(self, points: Sequence[tuple[np.ndarray, float]], start_s: float) -> None:
         self._points, self._next, self._due_s = points, 0, start_s
 
     @property
-    def is_over(self):
+    def is_over(self) -> bool:
         return self._next >= len(self._points)
 
-    def take(self, time_s):
+    def take(self, time_s: float) -> np.ndarray | None:
         """The positions (n,) that are due at ``time_s`` [s], or None. As in Gazebo, one point at a time."""
         if self.is_over or time_s < self._due_s - 1e-9:
             return None
@@ -48,7 +59,7 @@ class JointPoseTrajectory(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         self._playback, self._index, self._columns, self._anchor = None, None, None, None
@@ -59,7 +70,7 @@ class JointPoseTrajectory(ModelPlugin):
         self._service = context.service(context.element_text("serviceName", "set_joint_trajectory"),
                                         SetJointTrajectory, self._serve)
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._now_s = time_s
         self._commands.handle(self._take)
         playback = self._playback
@@ -77,12 +88,12 @@ class JointPoseTrajectory(ModelPlugin):
         if playback.is_over:
             self._playback = None
 
-    def _take(self, trajectory):
+    def _take(self, trajectory: JointTrajectory) -> None:
         why = self._begin(trajectory)
         if why:
             self.context.log.error_throttle(1.0, "%s: %s" % (self._what, why))
 
-    def _serve(self, request):
+    def _serve(self, request: SetJointTrajectoryRequest) -> SetJointTrajectoryResponse:
         if request.model_name not in ("", self.context.model.name):
             return SetJointTrajectoryResponse(False, "this plugin moves model '%s', not '%s'"
                                               % (self.context.model.name, request.model_name))
@@ -96,7 +107,7 @@ class JointPoseTrajectory(ModelPlugin):
             self.context.model.set_base_pose(pose)
         return SetJointTrajectoryResponse(not why, why or "the trajectory begins")
 
-    def _begin(self, trajectory):
+    def _begin(self, trajectory: JointTrajectory) -> str:
         """Start a trajectory; returns the reason of a refusal, or ""."""
         model = self.context.model
         frame = unscoped(model.name, trajectory.header.frame_id.strip("/"))
@@ -126,6 +137,6 @@ class JointPoseTrajectory(ModelPlugin):
         self._playback = Playback(points, max(trajectory.header.stamp.to_sec(), self._now_s))
         return ""
 
-    def reset(self):
+    def reset(self) -> None:
         self._playback = None
         self._commands.take()

@@ -1,11 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The force and torque that a joint transmits, fixed joints included, by the balance of momentum. ROS-free."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from bullet_sim import BulletSimError
 from urdf_model.distance import distance_from
 from urdf_model.merge import combine
 from urdf_model.transforms import inverse
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+
+    from bullet_sim import Model, World
+    from urdf_model import Inertial, Robot
 
 
 class JointWrench:
@@ -21,7 +31,7 @@ class JointWrench:
     :param joint: name of a joint of the description, movable or not
     """
 
-    def __init__(self, world, model, joint):
+    def __init__(self, world: World, model: Model, joint: str) -> None:
         robot = model.robot
         if joint not in robot.joints:
             raise BulletSimError("model '%s' has no joint '%s'; its joints are %s"
@@ -47,11 +57,11 @@ class JointWrench:
                 self._divided[body] = merged.members
         self._before = None
 
-    def note(self):
+    def note(self) -> None:
         """Call before the step that is to be measured."""
         self._before = self._momentum()
 
-    def measure(self):
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
         """Call after that step. Returns (force (3,) [N], torque (3,) [Nm] about the joint's origin), in the axes of the
         child link.
 
@@ -69,7 +79,7 @@ class JointWrench:
         axes = self._model.link_pose(self.child).matrix()[:3, :3]
         return axes.T @ force, axes.T @ torque
 
-    def _momentum(self):
+    def _momentum(self) -> tuple[np.ndarray, np.ndarray]:
         """Momentum (3,) and angular momentum (3,) about the world's origin of the links behind the joint."""
         total, turning = np.zeros(3), np.zeros(3)
         for centre, inertial, axes, (linear, angular) in self._moving():
@@ -86,7 +96,7 @@ class JointWrench:
             arm = pose[:3, :3] @ inertial.centre
             yield pose[:3, 3] + arm, inertial, pose[:3, :3], (linear + np.cross(angular, arm), angular)
 
-    def _outside(self, origin):
+    def _outside(self, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and torque about ``origin`` (3,) of weight, contacts and applied wrenches on the links behind the
         joint."""
         force, torque = np.zeros(3), np.zeros(3)
@@ -113,7 +123,7 @@ class JointWrench:
                     add(push, where, turn)
         return force, torque
 
-    def _is_behind(self, body, where):
+    def _is_behind(self, body: str, where: Sequence[float] | np.ndarray) -> bool:
         """Whether the point ``where`` (3,) of ``body`` belongs to a link behind the joint."""
         if body not in self._divided:
             return True
@@ -121,7 +131,8 @@ class JointWrench:
         return min(away, key=away.get) in self._behind
 
 
-def contact_forces(world, model, bodies):
+def contact_forces(world: World, model: Model,
+                   bodies: Collection[str]) -> list[tuple[str, np.ndarray, Sequence[float]]]:
     """List of (body, force (3,) on it [N], where (3,) [m]) of the last step's contacts on ``bodies`` of ``model``.
 
     In world axes, friction included. Contacts between two of the bodies are left out.
@@ -136,7 +147,7 @@ def contact_forces(world, model, bodies):
     return found
 
 
-def _links_behind(robot, first):
+def _links_behind(robot: Robot, first: str) -> set[str]:
     """The names (set) of ``first`` and of all links that hang on it."""
     children = {}
     for joint in robot.joints.values():
@@ -149,7 +160,7 @@ def _links_behind(robot, first):
     return behind
 
 
-def _inertial(model, members):
+def _inertial(model: Model, members: Sequence[str]) -> Inertial:
     """The Inertial of ``members`` of a body together, in the frame of the link that the body is named after."""
     body = model.merged.frames[members[0]].link
     to_frame = inverse(model.merged.frames[body].offset)
@@ -163,7 +174,7 @@ def _inertial(model, members):
     return combine(parts)
 
 
-def _distance(model, link, where):
+def _distance(model: Model, link: str, where: Sequence[float] | np.ndarray) -> float:
     """How far a point (3,) of the world is from the nearest collision shape of a link [m]."""
     in_link = np.linalg.inv(model.link_pose(link).matrix()) @ (*where, 1.0)
     shapes = model.robot.links[link].collisions

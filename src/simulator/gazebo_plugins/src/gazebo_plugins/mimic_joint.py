@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A joint that follows another one, as the fingers of many grippers do."""
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 
 class MimicJoint(ModelPlugin):
@@ -17,7 +23,7 @@ class MimicJoint(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         self._joint, self._follower = (self._index(tag) for tag in ("joint", "mimicJoint"))
@@ -26,7 +32,7 @@ class MimicJoint(ModelPlugin):
         pulled = context.element.find("hasPID") is not None
         self._effort = np.array([self._number("maxEffort", 1.0)]) if pulled else None
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         model = self.context.model
         position = model.read_joints()[0]
         target = self._multiplier * position[self._joint] + self._offset
@@ -35,7 +41,7 @@ class MimicJoint(ModelPlugin):
         elif abs(float((target - position[self._follower])[0])) >= self._tolerance:
             model.carry(self._follower, target)
 
-    def _index(self, tag):
+    def _index(self, tag: str) -> np.ndarray:
         name = unscoped(self.context.model.name, self.context.element_text(tag, ""))
         known = self.context.model.joint_names
         if name not in known:
@@ -43,7 +49,7 @@ class MimicJoint(ModelPlugin):
                               % (self._what, tag, name, ", ".join(known) or "(there are none)"))
         return self.context.model.index([name])
 
-    def _number(self, tag, default):
+    def _number(self, tag: str, default: float) -> float:
         text = self.context.element_text(tag)
         try:
             value = default if text is None else float(text)

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lasers of several rows that publish points."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from geometry_msgs.msg import Point32
 from sensor_msgs.msg import ChannelFloat32, PointCloud, PointCloud2, PointField
 
 from gazebo_ros.sensor_plugins import RaySensor
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 # Field -> (its kind in messages, numpy's).
 _FIELDS = {"x": (PointField.FLOAT32, "<f4"), "y": (PointField.FLOAT32, "<f4"), "z": (PointField.FLOAT32, "<f4"),
@@ -20,11 +27,11 @@ class BlockLaser(RaySensor):
 
     message_class = PointCloud
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._noise = self.number("gaussianNoise", 0.0)
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> PointCloud:
         with np.errstate(invalid="ignore"):  # 0 times infinity
             points = np.nan_to_num(ranges[:, None] * self.pattern.directions, nan=0.0, posinf=np.inf, neginf=-np.inf)
         if self._noise:
@@ -43,7 +50,7 @@ class VelodyneLaser(RaySensor):
 
     message_class = PointCloud2
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._noise = self.number("gaussianNoise", 0.0)
         self._least = max(self.number("min_range", 0.0), self.pattern.range_min)
@@ -55,7 +62,7 @@ class VelodyneLaser(RaySensor):
         self._fields = [PointField(name, offset, kind, 1)
                         for (name, (kind, _)), offset in zip(_FIELDS.items(), offsets, strict=True)]
 
-    def message(self, ranges):
+    def message(self, ranges: np.ndarray) -> PointCloud2:
         hit = (ranges > self._least) & (ranges < self._most)
         if self._noise:
             ranges = ranges + self.context.world.random.normal(0.0, self._noise, len(ranges))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A vehicle whose front wheel drives and steers."""
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -25,10 +27,10 @@ class Tricycle(DiffDrive):
     tolerances have no effect.
     """
 
-    def text(self, tag, default=None):
+    def text(self, tag: str, default: str | None = None) -> str | None:
         return super().text(_NAMES.get(tag, tag), _DEFAULTS.get(tag, default))
 
-    def configure(self):
+    def configure(self) -> None:
         super().configure()
         names = [self.joint("steeringJoint", "front_steering_joint"),
                  self.joint("actuatedWheelJoint", "front_wheel_joint")]
@@ -46,7 +48,7 @@ class Tricycle(DiffDrive):
             self._both = np.concatenate([front, self._both])
         self._wheel_names = [*names, *self._wheel_names]
 
-    def drive(self, x, y, turn, dt):
+    def drive(self, x: float, y: float, turn: float, dt: float) -> None:
         wanted = x / self._front_radius
         most = self.acceleration if abs(wanted) > abs(self._rate) else self._slowing
         self._rate = _towards(self._rate, wanted, most * dt)
@@ -55,20 +57,20 @@ class Tricycle(DiffDrive):
         self.model.drive_velocity(self._driven, np.array([self._rate]), self._strength)
         self.model.drive_position(self._steering, np.array([self._angle]), self._strength)
 
-    def turn(self, left, right, dt):
+    def turn(self, left: float, right: float, dt: float) -> float:
         return self._side * super().turn(left, right, dt)
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._rate, self._angle = 0.0, 0.0
 
-    def _beside(self, joint):
+    def _beside(self, joint: str) -> float:
         """How far left of the middle [m] a joint's wheel is."""
         place = self.model.link_pose(self.model.robot.joints[joint].child).position
         base = self.model.base_pose()
         return float(base.matrix()[:3, 1] @ (np.asarray(place) - np.asarray(base.position)))
 
 
-def _towards(value, target, most):
+def _towards(value: float, target: float, most: float) -> float:
     """``value``, nearer to ``target`` by at most ``most``; 0 stands for any."""
     return target if most == 0.0 else value + min(max(target - value, -most), most)

@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plugins of Gazebo that are accepted and have no effect here."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from std_msgs.msg import Int32, String
 
 from gazebo_ros.model_plugin import ModelPlugin
+
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
 
 
 class Nothing(ModelPlugin):
@@ -19,7 +26,7 @@ class Projector(ModelPlugin):
 
     required = False
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         context.log.warn("plugin %s of model '%s': projected patterns are not drawn; its topics are there and have no "
                          "effect" % (context.element.get("filename"), context.model.name))
@@ -27,6 +34,6 @@ class Projector(ModelPlugin):
             (context.element_text("projectorTopicName"), Int32), (context.element_text("textureTopicName"), String))
             if topic is not None]
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         for subscription in self._subscriptions:
             subscription.take()

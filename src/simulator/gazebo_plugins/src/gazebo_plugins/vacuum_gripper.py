@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``libgazebo_ros_vacuum_gripper.so``: attracts bodies near a link, and carries them along."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty, EmptyResponse
@@ -7,13 +11,20 @@ from std_srvs.srv import Empty, EmptyResponse
 from bullet_sim import Pose
 from gazebo_ros.sensor_plugins import PacedSensor
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from std_srvs.srv import EmptyRequest
+
+    from gazebo_ros.model_plugin import PluginContext
+
 #: Distances between link frames [m] within which a body is attracted, and sticks.
 REACH_M, STICKS_M = 0.05, 0.01
 #: Largest pull [N]; it is 1 N m / distance.
 MAX_N = 20.0
 
 
-def pull(away):
+def pull(away: np.ndarray) -> np.ndarray:
     """The force (3,) [N] on something from which the gripper is ``away`` (3,) [m]."""
     distance = float(np.linalg.norm(away))
     return min(1.0 / distance, MAX_N) * away / distance if distance > 0.0 else np.zeros(3)
@@ -28,20 +39,20 @@ class VacuumGripper(PacedSensor):
 
     message_class = Bool
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._link = self.link_named("bodyName")
         self._is_on = self._holds = False
         self._services = [context.service(name, Empty, self._switch(on)) for name, on in (("on", True), ("off", False))]
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._holds = self._is_on and self._draw()
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         if self.is_due(time_s):
             self.publisher.publish(Bool(self._holds))
 
-    def _draw(self):
+    def _draw(self) -> bool:
         """Pull at near links; returns whether there are any."""
         own = self.context.model
         place = np.asarray(own.link_pose(self._link).position)
@@ -64,13 +75,13 @@ class VacuumGripper(PacedSensor):
                 model.apply_wrench(link, pull(away).tolist())
         return found
 
-    def _switch(self, on):
+    def _switch(self, on: bool) -> Callable[[EmptyRequest], EmptyResponse]:
         def handler(request):
             self._is_on = on
             return EmptyResponse()
 
         return handler
 
-    def reset(self):
+    def reset(self) -> None:
         super().reset()
         self._is_on = self._holds = False
