@@ -2,9 +2,15 @@
 """Clouds of points for a browser: few enough to draw, as bytes. No ROS: messages are objects with the fields of
 sensor_msgs/PointCloud2.
 """
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from sensor_msgs.msg import PointCloud2
 
 #: Points of one cloud that a page gets.
 MAX_POINTS = 20000
@@ -20,7 +26,7 @@ class CloudError(Exception):
     """A message that is no cloud with x, y and z; the text says why."""
 
 
-def points_of(message, most=MAX_POINTS):
+def points_of(message: PointCloud2, most: int = MAX_POINTS) -> tuple[np.ndarray, np.ndarray]:
     """(points [m], float32 (n, 3); colours, uint8 (n, 3) red first) of a PointCloud2: every k-th row and column, so
     that at most ``most`` remain, without those that were not measured. Raises CloudError.
     """
@@ -47,7 +53,7 @@ def points_of(message, most=MAX_POINTS):
     return points[measured], _colours(cells, fields, message.is_bigendian)[measured]
 
 
-def _column(cells, offset, kind):
+def _column(cells: np.ndarray, offset: int, kind: str) -> np.ndarray:
     size = np.dtype(kind).itemsize
     return np.ascontiguousarray(cells[:, offset:offset + size]).view(kind)[:, 0]
 
@@ -61,7 +67,7 @@ def _colours(cells, fields, is_bigendian):
     return cells[:, [field.offset + place for place in at]]
 
 
-def packed(points, colours, pose):
+def packed(points: np.ndarray, colours: np.ndarray, pose: np.ndarray) -> bytes:
     """Bytes for a page: MARK and the number of points [uint32], the upper three rows of ``pose`` (the cloud's frame in
     the scene, 4 x 4) and the points [float32], the colours [uint8].
     """

@@ -2,8 +2,20 @@
 """How much of a physical robot's interface is here, for pages: compared when a page asks. No ROS: what reads the
 master is an argument.
 """
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_conformance.comparison import Verdict, compare, scores, totals
 from lab_web.lab import RobotError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from baxter_conformance.comparison import Finding, Seen
+    from baxter_model.interface import Interface
+    from lab_web.errands import Errands
 
 
 class Comparison:
@@ -12,7 +24,8 @@ class Comparison:
     [s since 1970].
     """
 
-    def __init__(self, findings, errands, changed, clock):
+    def __init__(self, findings: Callable[[], list[Finding]], errands: Errands,
+                 changed: Callable[[dict[str, Any]], object], clock: Callable[[], float]) -> None:
         self._findings = findings
         self._errands = errands
         self._changed = changed
@@ -20,25 +33,25 @@ class Comparison:
         # The last result stays in sight while the robot is compared again.
         self._state = {"is_running": False}
 
-    def ask(self, client, _operation):
+    def ask(self, client: int, _operation: dict[str, Any]) -> None:
         """Compare, unless that is under way; all pages are told. Does not wait."""
         if not self._state["is_running"]:
             self._share(is_running=True)
             self._errands.add(client, self._compare)
 
-    def _compare(self):
+    def _compare(self) -> None:
         result = {}
         try:
             result = {**shown_of(self._findings()), "when_s": self._clock()}
         finally:
             self._share(is_running=False, **result)
 
-    def _share(self, **values):
+    def _share(self, **values: Any) -> None:
         self._state = {**self._state, **values}
         self._changed(self._state)
 
 
-def shown_of(findings):
+def shown_of(findings: list[Finding]) -> dict[str, Any]:
     """Findings as pages show them: ``met`` and ``of`` (numbers of items), ``groups`` [{name, met, of}], ``others``
     [{name, verdict, reason}] of all that is missing or other than expected.
     """
@@ -49,7 +62,8 @@ def shown_of(findings):
                        for one in findings if one.is_public and one.verdict is not Verdict.MET]}
 
 
-def findings_of(robot, read, is_there, no_answer):
+def findings_of(robot: Interface, read: Callable[[Interface], Seen], is_there: Callable[[], bool],
+                no_answer: tuple[type[BaseException], ...]) -> list[Finding]:
     """Findings about the robot on the master, from ``read(robot)``, a baxter_conformance.comparison.Seen. Raises
     RobotError where the master ends meanwhile.
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page that drives the robot, and whether it still answers. No ROS; times [s] come in as arguments."""
+from __future__ import annotations
 
 #: Period of a page's heartbeats [s]; the page gets it from here.
 HEARTBEAT_S = 0.04
@@ -16,7 +17,7 @@ PAGE_HANGS_S = 2.0
 class NotInControl(Exception):
     """The client may not move the robot now; ``code`` is a key of the page's texts."""
 
-    def __init__(self, code, text):
+    def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
         self.code = code
 
@@ -24,41 +25,41 @@ class NotInControl(Exception):
 class Control:
     """At most one client holds the control; a client that takes it takes it from the holder."""
 
-    def __init__(self, silence_s=SILENCE_S):
+    def __init__(self, silence_s: float = SILENCE_S) -> None:
         self._silence_s = silence_s
         self._heard_s = self._connected_s = 0.0
         #: The client that holds the control, or None.
         self.holder = None
 
-    def take(self, client, now_s):
+    def take(self, client: int, now_s: float) -> bool:
         """Make ``client`` the holder; returns whether that changed anything."""
         changed = self.holder != client
         self.holder, self._heard_s, self._connected_s = client, now_s, now_s
         return changed
 
-    def release(self, client):
+    def release(self, client: int) -> bool:
         """The client gives the control back, or has gone; returns whether it had it."""
         if self.holder != client:
             return False
         self.holder = None
         return True
 
-    def beat(self, client, now_s, page_answers=True):
+    def beat(self, client: int, now_s: float, page_answers: bool = True) -> None:
         """A heartbeat of ``client`` has come; of its connection alone where the page does not answer."""
         if self.holder == client:
             self._connected_s = now_s
             if page_answers:
                 self._heard_s = now_s
 
-    def is_alive(self, now_s):
+    def is_alive(self, now_s: float) -> bool:
         """Is there a holder, and has its page been heard recently?"""
         return self.holder is not None and now_s - self._heard_s <= self._silence_s
 
-    def is_connected(self, now_s):
+    def is_connected(self, now_s: float) -> bool:
         """Is there a holder, and has its connection been heard recently enough for a motion of one click?"""
         return self.holder is not None and now_s - self._connected_s <= max(self._silence_s, CONNECTION_SILENCE_S)
 
-    def check(self, client, now_s, is_stream=True):
+    def check(self, client: int, now_s: float, is_stream: bool = True) -> None:
         """Raise NotInControl unless ``client`` holds the control and its page is alive, or, for a motion of one click,
         connected.
         """

@@ -1,7 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The result of an exercise for pages, from the file that ``./baxter.sh check`` writes. No ROS."""
+from __future__ import annotations
+
 import json
 import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
 
 _LARGEST_BYTES = 1 << 20
 
@@ -9,11 +16,11 @@ _LARGEST_BYTES = 1 << 20
 class Results:
     """``path``: the file. What is there at first belongs to an earlier lab and is not shown."""
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         self._path = path
         self._seen = self._version()
 
-    def newest(self):
+    def newest(self) -> dict[str, Any] | None:
         """The result that has come since the last call, as pages show it, or None."""
         version = self._version()
         if version == self._seen:
@@ -26,7 +33,7 @@ class Results:
         except (OSError, ValueError):
             return None
 
-    def _version(self):
+    def _version(self) -> tuple[int, int, int] | None:
         try:
             found = self._path.stat()
         except OSError:
@@ -34,7 +41,7 @@ class Results:
         return found.st_mtime_ns, found.st_ino, found.st_size
 
 
-def shown_of(text):
+def shown_of(text: str) -> dict[str, Any]:
     """A result's JSON text as pages show it: ``exercise``, ``passed``, ``points`` (None: not graded), ``due``,
     ``why`` (of what is not graded), ``hint``, ``runs`` [{call, criteria [{name, points, of, found}]}]. All
     numbers are finite. Raises ValueError.
@@ -53,7 +60,7 @@ def shown_of(text):
         raise ValueError("no result of an exercise: %s" % error) from None
 
 
-def _number(value):
+def _number(value: Any) -> float:
     """A finite number. JSON as Python reads it has NaN, and 1e999 is infinity: no browser reads either."""
     number = float(value)
     if not math.isfinite(number):

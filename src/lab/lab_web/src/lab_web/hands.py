@@ -1,10 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where the arms would be for a pose of a hand, for pages that drag one; nothing moves. No ROS."""
+from __future__ import annotations
+
 import threading
+from typing import TYPE_CHECKING
 
 from arm_kinematics import Budget, Chain, KinematicsError, NoSolution, pose_from_quaternion, solve, warm_up
 from urdf_model import UrdfError
 from urdf_model.transforms import inverse, quaternion_from_matrix
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    import numpy as np
+
+    from lab_web.scene import Picture
+    from sensor_renderer.mirror import Body
+    from urdf_model import Robot
 
 # The nearest of 16 postures: 1 ms, and a hand that is dragged steadily does not make the elbow jump.
 _BUDGET = Budget(candidates=16)
@@ -18,7 +31,9 @@ class Hands:
     operation)``.
     """
 
-    def __init__(self, measured, ghost, answer):
+    def __init__(self, measured: Callable[[], dict[str, float]],
+                 ghost: Callable[[Chain, dict[str, float]], dict[str, Any] | None],
+                 answer: Callable[[int, dict[str, Any]], object]) -> None:
         self._measured = measured
         self._ghost = ghost
         self._answer = answer
@@ -27,11 +42,11 @@ class Hands:
         self._asked = threading.Condition()
 
     @property
-    def sides(self):
+    def sides(self) -> list[str]:
         """The hands that can be asked about."""
         return list(self._chains)
 
-    def know(self, robot, links, warn):
+    def know(self, robot: Robot, links: Mapping[str, tuple[str, str]], warn: Callable[[str], object]) -> None:
         """The arms of an urdf_model.Robot; ``links``: {side: (base link, tip link)}; ``warn(text)`` of arms without."""
         chains = {}
         for side, (base, tip) in links.items():
@@ -42,7 +57,7 @@ class Hands:
                 warn("the page cannot move the %s hand: %s" % (side, error))
         self._chains = chains
 
-    def base(self, picture):
+    def base(self, picture: Picture | None) -> np.ndarray | None:
         """The pose of the arms' base frame in the scene ``picture`` (4 x 4), or None."""
         measured = self._measured()
         for chain in self._chains.values():
@@ -50,14 +65,14 @@ class Hands:
                 return base_of(picture, chain, {name: measured[name] for name in chain.joint_names})
         return None
 
-    def pose(self, side, measured):
+    def pose(self, side: str, measured: Mapping[str, float]) -> np.ndarray | None:
         """The pose (4, 4) of a hand in its arm's base frame at ``measured`` {joint: [rad]}, or None."""
         chain = self._chains.get(side)
         if chain is None or not all(name in measured for name in chain.joint_names):
             return None
         return chain.fk([measured[name] for name in chain.joint_names])
 
-    def ask(self, client, question):
+    def ask(self, client: int, question: dict[str, Any]) -> None:
         """An operation "reach" of a page: ``side``, ``number``, and ``position`` [m], ``orientation`` (x, y, z, w) of
         the hand in the robot's base frame; without them, the hand as it is. Does not wait.
         """
@@ -66,7 +81,7 @@ class Hands:
             self._questions[client, str(question.get("side"))] = question
             self._asked.notify()
 
-    def run(self, ends):
+    def run(self, ends: Callable[[], bool]) -> None:
         """Answer until ``ends()``."""
         while not ends():
             with self._asked:
@@ -77,7 +92,7 @@ class Hands:
             self._answer(client, {"op": "reach", "side": side, "number": question.get("number"),
                                   **self.reached(side, question)})
 
-    def reached(self, side, question):
+    def reached(self, side: str, question: dict[str, Any]) -> dict[str, Any]:
         """The answer: ``why`` ("" if the hand gets there, else a key of the page's texts), ``text``, and where known
         ``position``, ``orientation``, ``joints`` {name: [rad]} (the nearest posture where it does not), ``ghost``.
         """
@@ -104,7 +119,7 @@ class Hands:
                 "orientation": quaternion_from_matrix(pose[:3, :3]).tolist(), "ghost": self._ghost(chain, joints)}
 
 
-def ghost(picture, chain, joints):
+def ghost(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) -> dict[str, Any] | None:
     """Drawing of an arm of the scene ``picture`` (:class:`lab_web.scene.Picture`, or None) at other ``joints``:
     ``revision``; ``base``, the pose of the chain's base in the world, and ``links`` {number in the scene: pose}, as the
     upper three rows, 12 numbers. None where the scene has no such arm.
@@ -118,13 +133,13 @@ def ghost(picture, chain, joints):
             "links": {first + number: _rows(pose) for number, pose in moved.items()}}
 
 
-def base_of(picture, chain, joints):
+def base_of(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) -> np.ndarray | None:
     """The pose of the chain's base in the scene ``picture`` (4 x 4), or None where the scene has no such arm."""
     found = _body_of(picture, joints)
     return None if found is None else _base(found[1], {}, chain, joints)
 
 
-def _body_of(picture, joints):
+def _body_of(picture: Picture | None, joints: Mapping[str, float]) -> tuple[int, Body] | None:
     """(number of its first link in the scene, body) of the robot with these joints, or None."""
     first = 0
     for body in picture.bodies.values() if picture else ():
@@ -134,7 +149,7 @@ def _body_of(picture, joints):
     return None
 
 
-def _base(body, moved, chain, joints):
+def _base(body: Body, moved: Mapping[int, np.ndarray], chain: Chain, joints: Mapping[str, float]) -> np.ndarray:
     frames = chain.link_frames([joints[name] for name in chain.joint_names])
     # The one that is nearest to the base.
     link = next(name for name in chain.link_names if name in body.link_names)
@@ -142,5 +157,5 @@ def _base(body, moved, chain, joints):
     return moved.get(number, body.matrices[number]) @ inverse(frames[link])
 
 
-def _rows(pose):
+def _rows(pose: np.ndarray) -> list[float]:
     return [round(float(value), 5) for value in pose[:3].ravel()]

@@ -3,6 +3,8 @@
 
 `python3 -m lab_web.jupyter ROOT BASE_URL`: runs it until standard input ends; its first line is the socket.
 """
+from __future__ import annotations
+
 import argparse
 import contextlib
 import http.client
@@ -16,9 +18,14 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from disk_cache.files import replace_text
 from processes import keeper
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from typing import Any
 
 #: The kernel that the labs' notebooks name.
 KERNEL = "baxter"
@@ -38,13 +45,13 @@ class JupyterError(Exception):
     """JupyterLab does not run; the text says why."""
 
 
-def notebooks(root):
+def notebooks(root: str | Path) -> list[Path]:
     """The labs' notebooks below a workspace, in the order of the course [list of Path]."""
     return sorted(path for path in Path(root).glob("src/*/*/notebooks/*.ipynb")
                   if ".ipynb_checkpoints" not in path.parts)
 
 
-def write_kernel(folder, command):
+def write_kernel(folder: str | Path, command: Iterable[str]) -> None:
     """Register the kernel `Baxter lab` by a file below ``folder``; ``command``: its first words."""
     kernel = Path(folder) / "kernels" / KERNEL
     kernel.mkdir(parents=True, exist_ok=True)
@@ -53,7 +60,7 @@ def write_kernel(folder, command):
     replace_text(kernel / "kernel.json", json.dumps(spec, indent=1) + "\n")
 
 
-def environment(state, kernels):
+def environment(state: Path, kernels: str | Path) -> dict[str, str]:
     """The environment of Jupyter: its files in the folder ``state``; the kernel of ``kernels`` beside its own."""
     folders = {"JUPYTER_CONFIG_DIR": "config", "JUPYTER_DATA_DIR": "data", "JUPYTER_RUNTIME_DIR": "runtime",
                "IPYTHONDIR": "ipython", "MPLCONFIGDIR": "matplotlib"}
@@ -67,7 +74,7 @@ def environment(state, kernels):
     return made
 
 
-def command(root, options):
+def command(root: str | Path, options: Mapping[str, Any]) -> list[str]:
     """JupyterLab with the topmost folder ``root`` and further ``options``. It checks for no updates, asks no questions,
     and prints only warnings.
     """
@@ -85,7 +92,7 @@ class Server:
     root: its topmost folder; base_url: path of its pages, "/notebook/". Raises OSError.
     """
 
-    def __init__(self, root, base_url):
+    def __init__(self, root: str | Path, base_url: str) -> None:
         # A separate session: Ctrl-C in a terminal reaches only the owner, which then ends the server once.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "lab_web.jupyter", str(root), base_url], stdin=subprocess.PIPE,
@@ -95,10 +102,10 @@ class Server:
         self.socket = None
 
     @property
-    def has_ended(self):
+    def has_ended(self) -> bool:
         return self._process.poll() is not None
 
-    def wait(self):
+    def wait(self) -> None:
         """Wait until it answers at ``socket`` [Path]. Raises JupyterError."""
         with self._process.stdout as lines:
             path = Path(os.fsdecode(lines.readline().rstrip(b"\n")))
@@ -111,18 +118,18 @@ class Server:
         raise JupyterError("JupyterLab has ended; its messages are in the terminal of this page" if self.has_ended
                            else "JupyterLab did not start within %g s" % START_TIMEOUT_S)
 
-    def join(self):
+    def join(self) -> None:
         """Wait until it has ended."""
         self._process.wait()
 
-    def close(self):
+    def close(self) -> None:
         """End it, with all of its kernels, terminals and simulators."""
         with contextlib.suppress(OSError):
             self._process.stdin.close()
         self._process.wait()
 
 
-def _answers(path, url):
+def _answers(path: Path, url: str) -> bool:
     """Does the server at a socket answer? Raises OSError, http.client.HTTPException."""
     with socket.socket(socket.AF_UNIX) as connection:
         connection.settimeout(5.0)
@@ -133,7 +140,7 @@ def _answers(path, url):
         return answer.status == http.client.OK
 
 
-def main():
+def main() -> int:
     """Run JupyterLab until standard input ends; returns the exit code."""
     parser = argparse.ArgumentParser(prog="lab_web.jupyter")
     parser.add_argument("root", type=Path)

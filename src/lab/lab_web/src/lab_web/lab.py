@@ -7,12 +7,24 @@
 - ``command(setpoints)``: {joint: [rad], of a recording also SIDE_gripper: [%]}; ``stop()``, ``enable()``,
   ``disable()``, ``grip(side, action)``: do not wait, and raise RobotError
 """
+from __future__ import annotations
+
 import math
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from lab_web.control import SILENCE_S, Control, NotInControl
 from lab_web.motion import Motion, MotionError, Standstill, held
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from lab_web.motion import Limits
+    from lab_web.playback import Playback
+    from lab_web.robot import Baxter
+    from lab_web.steering import Steering
 
 #: Period of commands to the robot while it moves [s].
 TICK_S = 0.01
@@ -31,7 +43,9 @@ class Lab:
     A motion is a stream, which follows a slider, or what one click has begun: a page may be silent for longer then.
     """
 
-    def __init__(self, robot, changed, told, silence_s=SILENCE_S, clock=time.monotonic, rested=lambda client: None):
+    def __init__(self, robot: Baxter, changed: Callable[[], object], told: Callable[[int | None, str, str], object],
+                 silence_s: float = SILENCE_S, clock: Callable[[], float] = time.monotonic,
+                 rested: Callable[[int | None], object] = lambda client: None) -> None:
         self._robot = robot
         self._changed = changed
         self._told = told
@@ -50,7 +64,8 @@ class Lab:
         self._releases = []
         self._releases_of_silent = []
 
-    def add(self, name, serve, needs_control=True, for_viewers=False, needs_power=False):
+    def add(self, name: str, serve: Callable[[int, dict[str, Any]], object], needs_control: bool = True,
+            for_viewers: bool = False, needs_power: bool = False) -> None:
         """An operation beside those of this module: ``serve(client, operation)`` does not wait, and raises RobotError;
         with ``needs_control`` only for the page that has the control, with ``for_viewers`` also for one that may not
         act, with ``needs_power`` only while the robot is enabled.
@@ -63,7 +78,7 @@ class Lab:
         if for_viewers:
             self._for_viewers.add(name)
 
-    def when_lost(self, release, when_silent=True):
+    def when_lost(self, release: Callable[[], object], when_silent: bool = True) -> None:
         """``release()`` is called when the robot is stopped, and when a page loses the control, goes or (with
         ``when_silent``) falls silent: it ends what the page holds. It does not wait, and may have nothing to end.
         """
@@ -72,15 +87,15 @@ class Lab:
             self._releases_of_silent.append(release)
 
     @property
-    def holder(self):
+    def holder(self) -> int | None:
         """The client that has the control, or None."""
         return self._control.holder
 
     @property
-    def is_moving(self):
+    def is_moving(self) -> bool:
         return self._moving.is_set()
 
-    def serve(self, client, may_act, operation):
+    def serve(self, client: int, may_act: bool, operation: dict[str, Any]) -> None:
         """One operation of a page, a dict with "op". Errors are told to the client."""
         op = operation.get("op")
         if op == "stop":
@@ -99,7 +114,7 @@ class Lab:
             except (MotionError, RobotError) as error:
                 self._told(client, "refused", str(error))
 
-    def stop(self, client):
+    def stop(self, client: int) -> None:
         """Stop the robot; every page may."""
         # Before the lock: nothing must hold this up.
         self._robot.stop()
@@ -107,12 +122,12 @@ class Lab:
             self._halt()
         self._told(None, "stopped", "a page has pressed stop")
 
-    def beat(self, client, page_answers=True):
+    def beat(self, client: int, page_answers: bool = True) -> None:
         """A page has shown that it is there, or its connection that it is, while the page does not answer."""
         with self._lock:
             self._control.beat(client, self._clock(), page_answers)
 
-    def gone(self, client):
+    def gone(self, client: int) -> None:
         """A page has gone: what it moved stops."""
         with self._lock:
             had = self._control.release(client)
@@ -121,7 +136,7 @@ class Lab:
         if had:
             self._changed()
 
-    def tick(self, dt):
+    def tick(self, dt: float) -> None:
         """Send the next set-points, ``dt`` [s] after the last ones; stop where the page or the robot is not ready."""
         with self._lock:
             client, now_s = self._control.holder, self._clock()
@@ -157,7 +172,7 @@ class Lab:
         else:
             self._told(client, "page_silent", "the arms were stopped: no sign of life of the page that moved them")
 
-    def run(self, ends):
+    def run(self, ends: Callable[[], bool]) -> None:
         """Tick until ``ends()``; for a separate thread."""
         last = self._clock()
         while not ends():
@@ -173,7 +188,7 @@ class Lab:
             self.tick(min(now - last, 5.0 * TICK_S))
             last = now
 
-    def _halt(self):
+    def _halt(self) -> None:
         if self._motion.stop():
             if not self._robot.why_not_ready():
                 self._robot.command(held(self._motion.limits, self._setpoints, self._measured()))
@@ -182,11 +197,11 @@ class Lab:
         for release in self._releases:
             release()
 
-    def _measured(self):
+    def _measured(self) -> dict[str, float]:
         # A broken sensor, or another node under the robot's topic.
         return {joint: position for joint, position in self._robot.measured().items() if math.isfinite(position)}
 
-    def _take(self, client, _operation):
+    def _take(self, client: int, _operation: dict[str, Any]) -> None:
         with self._lock:
             taken = self._control.take(client, self._clock())
             if taken:
@@ -194,23 +209,24 @@ class Lab:
         if taken:
             self._changed()
 
-    def _release(self, client, _operation):
+    def _release(self, client: int, _operation: dict[str, Any]) -> None:
         self.gone(client)
 
-    def _move(self, client, operation):
+    def _move(self, client: int, operation: dict[str, Any]) -> None:
         self._aim(client, _joints_of(operation), is_stream=True)
 
-    def _go(self, client, operation):
+    def _go(self, client: int, operation: dict[str, Any]) -> None:
         self._aim(client, _joints_of(operation), is_stream=False)
 
-    def _pose(self, client, operation):
+    def _pose(self, client: int, operation: dict[str, Any]) -> None:
         name = operation.get("name")
         targets = self._robot.poses.get(name) if isinstance(name, str) else None
         if targets is None:
             raise MotionError("there is no pose %r; there are %s" % (name, ", ".join(self._robot.poses)))
         self._aim(client, targets, is_stream=False)
 
-    def start(self, client, make, is_stream=False):
+    def start(self, client: int, make: Callable[[dict[str, Limits], dict[str, float]], Motion | Playback | Steering],
+              is_stream: bool = False) -> None:
         """Move by ``make(limits, measured)``, which has what Motion has, in place of what is under way. Raises
         NotInControl, MotionError.
         """
@@ -219,25 +235,25 @@ class Lab:
             self._replace(make(self._robot.limits, self._measured()))
             self._begin(is_stream)
 
-    def let_go(self, client, motion):
+    def let_go(self, client: int, motion: Motion | Playback | Steering) -> None:
         """End ``motion`` where it is that of this page."""
         with self._lock:
             if self._control.holder == client and self._motion is motion:
                 motion.stop()
 
-    def _replace(self, motion):
+    def _replace(self, motion: Motion | Playback | Steering) -> None:
         if motion is not self._motion:
             self._motion.stop()
             self._setpoints = {}
         self._motion = motion
 
-    def _begin(self, is_stream):
+    def _begin(self, is_stream: bool) -> None:
         if not (is_stream and self._moving.is_set()):
             self._standstill = Standstill()
         self._is_stream = is_stream
         self._moving.set()
 
-    def _aim(self, client, targets, is_stream):
+    def _aim(self, client: int, targets: dict[str, float], is_stream: bool) -> None:
         with self._lock:
             self._require_ready(client, is_stream)
             if not isinstance(self._motion, Motion) or self._motion.limits != self._robot.limits:
@@ -245,28 +261,28 @@ class Lab:
             self._motion.aim(targets, self._measured())
             self._begin(is_stream)
 
-    def _require_ready(self, client, is_stream):
+    def _require_ready(self, client: int, is_stream: bool) -> None:
         self._control.check(client, self._clock(), is_stream)
         why = self._robot.why_not_ready()
         if why:
             raise NotInControl("not_ready", why)
 
-    def _enable(self, client, _operation):
+    def _enable(self, client: int, _operation: dict[str, Any]) -> None:
         self._check(client)
         self._robot.enable()
 
-    def _disable(self, client, _operation):
+    def _disable(self, client: int, _operation: dict[str, Any]) -> None:
         self._check(client)
         self._robot.disable()
 
-    def _grip(self, client, operation):
+    def _grip(self, client: int, operation: dict[str, Any]) -> None:
         side, action = operation.get("side"), operation.get("action")
         if not isinstance(side, str) or not isinstance(action, str):
             raise RobotError("\"side\" and \"action\" must be texts")
         self._check(client, needs_power=True)
         self._robot.grip(side, action)
 
-    def _check(self, client, needs_power=False):
+    def _check(self, client: int, needs_power: bool = False) -> None:
         with self._lock:
             if needs_power:
                 self._require_ready(client, is_stream=True)
@@ -274,7 +290,7 @@ class Lab:
                 self._control.check(client, self._clock())
 
 
-def _joints_of(operation):
+def _joints_of(operation: dict[str, Any]) -> dict[str, Any]:
     targets = operation.get("joints")
     if not isinstance(targets, dict):
         raise MotionError("\"joints\" must be an object of joints and angles")

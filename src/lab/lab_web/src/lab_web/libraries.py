@@ -4,6 +4,8 @@
 npm fetches them, since it knows the user's proxies and mirrors. A machine without it downloads the same archives from
 the registry that the environment names.
 """
+from __future__ import annotations
+
 import base64
 import contextlib
 import fcntl
@@ -16,8 +18,12 @@ import subprocess
 import tarfile
 import urllib.request
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from disk_cache.files import cache_home
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _TIMEOUT_S = 300.0
 
@@ -26,12 +32,13 @@ class LibrariesError(Exception):
     """The libraries are not here and cannot be fetched; the text says why, and what helps."""
 
 
-def kept_in():
+def kept_in() -> Path:
     """The folder of fetched libraries: ``$XDG_CACHE_HOME/lab_web``, by default ``~/.cache/lab_web``."""
     return cache_home() / "lab_web"
 
 
-def fetched(page, parent=None, run=subprocess.run, tell=print):
+def fetched(page: str | Path, parent: str | Path | None = None, run: Callable[..., object] = subprocess.run,
+            tell: Callable[[str], object] = print) -> Path:
     """The folder ``node_modules`` of what ``page``/package.json lists; fetched if this version is not in ``parent``.
 
     ``tell(text)`` is called before something is fetched, which takes a while. Raises LibrariesError without a network.
@@ -59,7 +66,7 @@ def fetched(page, parent=None, run=subprocess.run, tell=print):
     return folder / "node_modules"
 
 
-def _install(folder, run):
+def _install(folder: Path, run: Callable[..., object]) -> None:
     try:
         run(["npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=folder, check=True, capture_output=True,
             text=True, timeout=_TIMEOUT_S)
@@ -72,7 +79,7 @@ def _install(folder, run):
                              % last[0]) from None
 
 
-def _download(folder):
+def _download(folder: Path) -> None:
     """As ``npm ci`` for packages without scripts: fetch the archives that package-lock.json names, by their hashes."""
     registry = os.environ.get("NPM_CONFIG_REGISTRY", "").rstrip("/")
     if not registry:
@@ -97,7 +104,7 @@ def _download(folder):
         _unpack(archive, folder / path)
 
 
-def _unpack(archive, target):
+def _unpack(archive: bytes, target: Path) -> None:
     """Write the files of an archive below ``target``, without the archive's own first folder."""
     with tarfile.open(fileobj=io.BytesIO(archive)) as files:
         for member in files:

@@ -2,10 +2,17 @@
 """Set-points on the way to targets: slowly, within the joints' limits, all joints of one request at the same time. No
 ROS.
 """
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from web_bridge.errors import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from urdf_model import Joint
 
 #: Share of a joint's velocity limit that the page's motions use.
 SPEED_SHARE = 0.25
@@ -36,7 +43,7 @@ class Limits(NamedTuple):
     velocity: float
 
 
-def limits_of(joints, names):
+def limits_of(joints: Mapping[str, Joint], names: Iterable[str]) -> dict[str, Limits]:
     """{name: Limits} of those ``names`` in ``joints`` {name: urdf_model.Joint} that have bounds and a speed; others
     cannot be moved.
     """
@@ -49,7 +56,7 @@ class MotionError(Exception):
     """A target that no joint can take; the text says which, and what is possible."""
 
 
-def check_not_lost(setpoints, measured):
+def check_not_lost(setpoints: Mapping[str, float], measured: Mapping[str, float]) -> None:
     """Raise MotionError where something else has moved a joint away from its set-point; both {joint: [rad]}."""
     for joint, position in setpoints.items():
         if abs(position - measured.get(joint, position)) > LOST_RAD:
@@ -60,10 +67,10 @@ def check_not_lost(setpoints, measured):
 class Standstill:
     """Notices a joint that does not follow its set-points."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._since = {}  # joint -> (time [s], position [rad])
 
-    def look(self, time_s, setpoints, measured):
+    def look(self, time_s: float, setpoints: Mapping[str, float], measured: Mapping[str, float]) -> str:
         """A joint that stands still, or "". ``time_s``: the robot's time, which may pause [s]; ``setpoints``,
         ``measured``: {joint: [rad]}.
         """
@@ -75,7 +82,7 @@ class Standstill:
         return next((joint for joint, (since_s, _) in self._since.items() if time_s - since_s >= STILL_S), "")
 
 
-def held(joints, setpoints, measured):
+def held(joints: Iterable[str], setpoints: Mapping[str, float], measured: Mapping[str, float]) -> dict[str, float]:
     """Where ``joints`` that move stop: {joint: [rad]} of those with a measured position, at once and without turning
     back. ``setpoints``: the last ones; both {joint: [rad]}.
 
@@ -88,24 +95,24 @@ def held(joints, setpoints, measured):
 class _Course:
     """One joint's way: position [rad] and velocity [rad/s] of the set-point."""
 
-    def __init__(self, position):
+    def __init__(self, position: float) -> None:
         self.position = position
         self.velocity = 0.0
         self.target = position
         self.speed = self.rate = 0.0
 
-    def way(self, target, full_speed):
+    def way(self, target: float, full_speed: float) -> float:
         """The way to ``target`` [rad]; a joint that moves passes the place where it can come to rest."""
         rest = self.position + 0.5 * RAMP_S / full_speed * self.velocity * abs(self.velocity)
         return max(abs(target - self.position), abs(target - rest))
 
-    def aim(self, target, speed):
+    def aim(self, target: float, speed: float) -> None:
         """Go to ``target`` [rad] at ``speed`` [rad/s]."""
         self.target, self.speed = target, speed
         # A slow course after a fast one still brakes as quickly as the fast one would have.
         self.rate = max(speed, abs(self.velocity)) / RAMP_S
 
-    def step(self, dt, limits):
+    def step(self, dt: float, limits: Limits) -> bool:
         """Advance by ``dt`` [s]; returns whether the target is reached."""
         rate = self.rate
         away = self.target - self.position
@@ -121,15 +128,15 @@ class _Course:
 class Motion:
     """``limits`` {joint: Limits}. Not safe for threads."""
 
-    def __init__(self, limits):
+    def __init__(self, limits: Mapping[str, Limits]) -> None:
         self.limits = dict(limits)
         self._courses = {}
 
     @property
-    def is_moving(self):
+    def is_moving(self) -> bool:
         return bool(self._courses)
 
-    def aim(self, targets, measured):
+    def aim(self, targets: Mapping[str, float], measured: Mapping[str, float]) -> None:
         """Go to ``targets`` {joint: [rad]} from ``measured`` {joint: [rad]}, or from where the set-points are now.
 
         Raises MotionError for an unknown joint, a target outside of its limits and a joint without a measured position;
@@ -157,12 +164,12 @@ class Motion:
             course.aim(float(targets[joint]), ways[joint] / duration or full[joint])
         self._courses.update(courses)
 
-    def stop(self):
+    def stop(self) -> bool:
         """Forget all targets; returns whether there were any."""
         moved, self._courses = bool(self._courses), {}
         return moved
 
-    def step(self, dt, measured):
+    def step(self, dt: float, measured: Mapping[str, float]) -> dict[str, float]:
         """The set-points {joint: [rad]} after ``dt`` [s]; joints that have arrived are in it for the last time.
 
         Raises MotionError where something else has moved a joint; nothing changes then.

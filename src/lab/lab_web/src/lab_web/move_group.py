@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Plans of a move_group for :class:`lab_web.planning.Planning`, in rospy."""
+from __future__ import annotations
+
 import threading
 import time
+from typing import TYPE_CHECKING
 
 import actionlib
 import rospy
@@ -11,6 +14,11 @@ from moveit_msgs.msg import Constraints, JointConstraint, MoveGroupAction, MoveG
 from baxter_model import SIDES, joint_names
 from lab_web.motion import SPEED_SHARE
 from lab_web.planning import Plan, PlanFailed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from moveit_msgs.msg import MoveGroupResult
 
 #: The action of a move_group, and the topic by which one is known to be there.
 ACTION = "/move_group"
@@ -28,11 +36,11 @@ _CODES = {value: name.lower() for name, value in vars(MoveItErrorCodes).items()
 class MoveGroup:
     """One goal at a time."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._client = None
         self._cancelled = threading.Event()
 
-    def plan(self, targets):
+    def plan(self, targets: Mapping[str, float]) -> Plan:
         """The Plan to ``targets`` {joint: [rad]} of the arms. Waits. Raises PlanFailed."""
         self._cancelled.clear()
         goal = goal_of(targets)
@@ -52,11 +60,11 @@ class MoveGroup:
                 raise PlanFailed("no_answer", "move_group has not answered for %g s" % _ANSWER_S)
         return plan_of(self._client.get_state(), self._client.get_result(), self._client.get_goal_status_text())
 
-    def cancel(self):
+    def cancel(self) -> None:
         """End the wait of ``plan`` in another thread."""
         self._cancelled.set()
 
-    def _require_server(self):
+    def _require_server(self) -> None:
         client, deadline = self._client.action_client, time.monotonic() + _CONNECT_S
         while not (client.pub_goal.get_num_connections() and client.result_sub.get_num_connections()):
             if time.monotonic() > deadline or self._cancelled.is_set():
@@ -64,7 +72,7 @@ class MoveGroup:
             time.sleep(0.05)
 
 
-def goal_of(targets):
+def goal_of(targets: Mapping[str, float]) -> MoveGroupGoal:
     """The action's goal for ``targets`` {joint: [rad]}: a plan alone, from where the arms are. Raises PlanFailed."""
     sides = tuple(side for side in SIDES if not set(joint_names(side)).isdisjoint(targets))
     others = set(targets).difference(*map(joint_names, SIDES))
@@ -83,7 +91,7 @@ def goal_of(targets):
     return goal
 
 
-def plan_of(state, result, text):
+def plan_of(state: int, result: MoveGroupResult | None, text: str) -> Plan:
     """The Plan in a result of the action. Raises PlanFailed."""
     code = result.error_code.val if result is not None else MoveItErrorCodes.FAILURE
     if state != GoalStatus.SUCCEEDED or code != MoveItErrorCodes.SUCCESS:

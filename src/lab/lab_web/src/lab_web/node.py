@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node lab_web: serves the page beside a running lab, and prints its address."""
+from __future__ import annotations
+
 import argparse
 import contextlib
 import importlib.util
@@ -14,7 +16,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 import rosgraph
@@ -70,6 +72,9 @@ from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer
 from web_bridge.websocket import Clients, SocketOptions
 from world_picture.snapshot import SnapshotError
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 FIRST_PORT = 8090
 _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
@@ -91,7 +96,7 @@ class Failure(Exception):
     """The page cannot be served; the text says why, and what helps."""
 
 
-def main():
+def main() -> int:
     """Returns the exit code."""
     options = _parser().parse_args(rospy.myargv()[1:])
     try:
@@ -110,7 +115,7 @@ def main():
     return 0
 
 
-def _parser():
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="./baxter.sh web", description="The lab's page in a browser, beside a "
                                      "running lab, until Ctrl-C or until the lab ends.")
     parser.add_argument("--port", type=_port_number, help="the port; default: the first free one from %d" % FIRST_PORT)
@@ -130,31 +135,31 @@ def _parser():
     return parser
 
 
-def _port_number(text):
+def _port_number(text: str) -> int:
     if not (text.isdecimal() and int(text) <= _LARGEST_PORT):
         raise argparse.ArgumentTypeError("%r is no port; 0 (any free one) to %d are" % (text, _LARGEST_PORT))
     return int(text)
 
 
-def _token(text):
+def _token(text: str) -> str:
     if not text.isprintable() or not text:
         raise argparse.ArgumentTypeError("%r is no token; letters, digits and signs are expected" % text)
     return text
 
 
-def _below(text):
+def _below(text: str) -> str:
     if not re.fullmatch(r"(/[\w-]+)*", text):
         raise argparse.ArgumentTypeError("%r is no path of an address; /anna is one, without a slash at its end" % text)
     return text
 
 
-def _require_lab():
+def _require_lab() -> None:
     if not rosgraph.is_master_online():
         raise Failure("no lab runs at %s. Start one in another terminal: "
                       "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch" % rosgraph.get_master_uri())
 
 
-def serve(options, page, libraries):
+def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
     """Serve until the node or the lab ends. Raises Failure."""
     tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
     if tokens[0] == tokens[1]:
@@ -235,7 +240,7 @@ def serve(options, page, libraries):
         loop_thread.stop()
 
 
-def _notebooks(options, pages):
+def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
     """The Notebooks of the page, or None where it offers none. Raises Failure."""
     offered = not options.public if options.notebook is None else options.notebook
     if not offered or importlib.util.find_spec("jupyterlab") is None:
@@ -279,7 +284,7 @@ class _Equipment(NamedTuple):
     loops: dict
 
 
-def _equip(pages, robot, faults):
+def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
     """Add the operations of all parts to the lab."""
     lab = pages.lab
     hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
@@ -328,7 +333,7 @@ def _findings():
     return findings_of(physical_robot(), lambda robot: read(robot, _MESSAGES_S), rosgraph.is_master_online, NO_ANSWER)
 
 
-def _port(options):
+def _port(options: argparse.Namespace) -> int:
     if options.port is not None:
         return options.port
     try:
@@ -346,7 +351,7 @@ def _require_free(port: int, network: str) -> None:
         raise _no_port(port, error) from None
 
 
-def _no_port(port, error):
+def _no_port(port: int, error: OSError) -> Failure:
     return Failure("port %d cannot be opened: %s; name another one by --port" % (port, error))
 
 
@@ -371,7 +376,7 @@ def _serve_securely(loop_thread: LoopThread, application: Any, port: int, networ
         return None
 
 
-def _announce(port, tokens, public, secure_port=None):
+def _announce(port: int, tokens: tuple[str, str], public: bool, secure_port: int | None = None) -> str:
     """Make the addresses known, and print them once the lab has started; returns the operator's."""
     host = _host() if public else "localhost"
     address = (forwarded_address(os.environ, port) or "http://%s:%d" % (host, port)) + "/"
@@ -407,7 +412,7 @@ def announcement(operators: str, viewers: str, public_port: int | None, is_launc
     return text + "Open in a browser:\n\n    %s" % operators
 
 
-def _print_when_started(text):
+def _print_when_started(text: str) -> None:
     """Print a text once no process of the lab is starting any more, or after _START_S."""
     watch, deadline = StartWatch(rosgraph.get_master_uri(), rospy.get_name()), time.monotonic() + _START_S
     # A lab that ends meanwhile says so itself.
@@ -418,7 +423,8 @@ def _print_when_started(text):
         print(text, flush=True)
 
 
-def _watch(robot, equipment, pages, is_needed, ends):
+def _watch(robot: Baxter, equipment: _Equipment, pages: Pages, is_needed: Callable[[], bool],
+           ends: Callable[[], bool]) -> None:
     """Look after what changes rarely, until the node or the lab ends; at once when somebody needs it (``is_needed``)
     after a time without."""
     told, types, results = None, {}, Results(page_files.result_file())
@@ -451,7 +457,7 @@ def _watch(robot, equipment, pages, is_needed, ends):
             pages.present.wait(_UNSEEN_S)
 
 
-def _described(robot, equipment, published):
+def _described(robot: Baxter, equipment: _Equipment, published: Mapping[str, str]) -> dict[str, Any]:
     """Description of the robot for pages: the operation "robot". ``published``: {topic: type}."""
     return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
                        for name, limits in robot.limits.items()],
@@ -463,7 +469,7 @@ def _described(robot, equipment, published):
             "has_scene": isinstance(rospy.get_param(_SNAPSHOT, None), str), "things": equipment.simulation.things}
 
 
-def _snapshot_folder():
+def _snapshot_folder() -> str:
     """The folder of the simulator's state. Raises SnapshotError where there is none."""
     folder = rospy.get_param(_SNAPSHOT, None)
     if folder is not None and not isinstance(folder, str):
@@ -474,7 +480,7 @@ def _snapshot_folder():
     return folder
 
 
-def _follow(pages, ends):
+def _follow(pages: Pages, ends: Callable[[], bool]) -> None:
     """Send poses to the pages; across restarts of the simulator."""
     follower, picture = None, None
     while not ends():

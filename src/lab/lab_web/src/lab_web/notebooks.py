@@ -5,11 +5,14 @@ ROS.
 Its server listens on a Unix socket. Requests reach it only with the operator's token, because Jupyter runs any code;
 a page that has shown the token goes on with a cookie.
 """
+from __future__ import annotations
+
 import hmac
 import secrets
 import shutil
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlencode
 
 from lab_web import jupyter
@@ -18,13 +21,21 @@ from web_bridge.errors import Refused
 from web_bridge.passing import PassingHandler
 from web_bridge.websocket import token_of
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    from tornado.httputil import HTTPHeaders
+
+    from web_bridge.access import Access
+
 #: The path of the notebooks at the page's address.
 PATH = "/notebook/"
 # A browser without the page asks again after this time [s].
 _AGAIN_S = 2
 
 
-def labs_notebooks(folders, root):
+def labs_notebooks(folders: Mapping[str, Path], root: str | Path) -> list[str]:
     """Copies of the labs' notebooks below ``root``/notebooks, made where they are missing: paths below ``root``.
 
     ``folders``: {package: its folder "notebooks" [Path]}. Raises OSError.
@@ -48,7 +59,8 @@ class Notebooks:
     told, from any thread; below: the path at which a front door shows this page, "" or "/anna".
     """
 
-    def __init__(self, start, files, changed, below=""):
+    def __init__(self, start: Callable[[], jupyter.Server], files: list[str],
+                 changed: Callable[[dict[str, Any]], object], below: str = "") -> None:
         self.below = below
         self._start, self._files, self._changed = start, files, changed
         self._lock = threading.Lock()
@@ -57,12 +69,12 @@ class Notebooks:
         self._tell("off")
 
     @property
-    def socket(self):
+    def socket(self) -> Path | None:
         """The socket of the running server [Path], or None."""
         server = self._server
         return None if server is None or server.has_ended else server.socket
 
-    def ask(self, *_):
+    def ask(self, *_: Any) -> None:
         """Start the server if it does not run."""
         with self._lock:
             if self._ends or self._thread is not None and self._thread.is_alive():
@@ -70,7 +82,7 @@ class Notebooks:
             self._thread = threading.Thread(target=self._run)
             self._thread.start()
 
-    def close(self):
+    def close(self) -> None:
         """End the server and everything that runs in it."""
         with self._lock:
             self._ends = True
@@ -80,7 +92,7 @@ class Notebooks:
         if thread is not None:
             thread.join()
 
-    def _run(self):
+    def _run(self) -> None:
         self._tell("starting")
         try:
             server = self._start()
@@ -100,21 +112,21 @@ class Notebooks:
             if self._server is not None:
                 self._server.close()
 
-    def _tell(self, state, why="", number=""):
+    def _tell(self, state: str, why: str = "", number: str = "") -> None:
         self._changed({"state": state, "why": why, "number": number, "files": self._files})
 
 
 class Door:
     """Access control of the notebooks. ``access``: web_bridge.access.Access."""
 
-    def __init__(self, access, notebooks):
+    def __init__(self, access: Access, notebooks: Notebooks) -> None:
         self.notebooks = notebooks
         self._access = access
         # A browser has one cookie of a name for all ports of a host, where other labs may be.
         self.cookie = "lab_notebook_" + secrets.token_hex(4)
         self.secret = secrets.token_urlsafe(24)
 
-    def refusal(self, token, cookie):
+    def refusal(self, token: str, cookie: str) -> str:
         """Why a request may not go on, or ""."""
         if token:
             try:
@@ -130,12 +142,12 @@ class NotebookHandler(PassingHandler):
 
     SERVER = "JupyterLab"
 
-    def initialize(self, door):
+    def initialize(self, door: Door) -> None:
         super().initialize()
         self._door = door
         self.OWN_COOKIE = door.cookie
 
-    async def prepare(self):
+    async def prepare(self) -> None:
         token, notebooks = token_of(self.request), self._door.notebooks
         refusal = self._door.refusal(token, self.get_cookie(self._door.cookie, ""))
         if refusal:
@@ -157,7 +169,7 @@ class NotebookHandler(PassingHandler):
         else:
             await self.pass_to(notebooks.socket, notebooks.below + self.request.uri)
 
-    def _go_on_with_cookie(self):
+    def _go_on_with_cookie(self) -> None:
         """The same address without the token, which would get into histories."""
         self.set_cookie(self._door.cookie, self._door.secret, path=self._door.notebooks.below + PATH, httponly=True,
                         samesite="Strict")
@@ -165,5 +177,5 @@ class NotebookHandler(PassingHandler):
                 for value in values]
         self.redirect(self.request.path + ("?" + urlencode(rest) if rest else ""))
 
-    def answer_headers(self, headers):
+    def answer_headers(self, headers: HTTPHeaders) -> list[tuple[str, str]]:
         return http_text.passed_on(headers, "", self._door.notebooks.below, self._door.cookie)

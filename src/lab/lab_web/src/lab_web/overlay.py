@@ -7,12 +7,23 @@ graph is an argument, with
 - ``frames()``: names in tf; ``pose(frame)``: a frame in the robot's base frame (4 x 4), or None
 - ``base()``: the pose of the robot's base frame in the scene (4 x 4), or None
 """
+from __future__ import annotations
+
 import threading
 import time
+from typing import TYPE_CHECKING
 
 from lab_web.clouds import CloudError, packed, points_of
 from lab_web.lab import RobotError
 from web_bridge.errors import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from sensor_msgs.msg import PointCloud2
+
+    from lab_web.sights import Sights
 
 #: Period of frames [s], and the shortest time between two clouds of a topic [s].
 FRAMES_S, CLOUD_S = 0.2, 0.2
@@ -23,7 +34,9 @@ class Overlay:
     error to a page.
     """
 
-    def __init__(self, graph, show, answer, told, clock=time.monotonic):
+    def __init__(self, graph: Sights, show: Callable[[int, bytes], object],
+                 answer: Callable[[int, dict[str, Any]], object], told: Callable[[int, str, str], object],
+                 clock: Callable[[], float] = time.monotonic) -> None:
         self._graph = graph
         self._show, self._answer, self._told = show, answer, told
         self._clock = clock
@@ -33,7 +46,7 @@ class Overlay:
         self._due_s = {}  # topic -> time of its next cloud
         self._wrong = {}  # topic -> what was wrong with its last message
 
-    def watch(self, client, operation):
+    def watch(self, client: int, operation: dict[str, Any]) -> None:
         """``points``: a topic with points, or ""; ``frames``: true to see the frames of tf. Does not wait. Raises
         RobotError.
         """
@@ -43,12 +56,12 @@ class Overlay:
         with self._lock:
             self._wishes[client] = topic, frames
 
-    def forget(self, client):
+    def forget(self, client: int) -> None:
         """The page has gone. Does not wait."""
         with self._lock:
             self._wishes.pop(client, None)
 
-    def run(self, ends):
+    def run(self, ends: Callable[[], bool]) -> None:
         """Follow what pages want until ``ends()``; for a separate thread."""
         while not ends():
             began = self._clock()
@@ -58,7 +71,7 @@ class Overlay:
         while self._subscriptions:
             self._subscriptions.popitem()[1].close()
 
-    def settle(self):
+    def settle(self) -> None:
         """Subscribe to the topics that somebody wants, and to no others; one thread calls it."""
         with self._lock:
             wanted = {topic for topic, _ in self._wishes.values()} - {""}
@@ -78,11 +91,11 @@ class Overlay:
                         self._wishes[client] = "", self._wishes[client][1]
                 self._told(client, "refused", text)
 
-    def _clients_of(self, topic):
+    def _clients_of(self, topic: str) -> list[int]:
         with self._lock:
             return [client for client, (wanted, _) in self._wishes.items() if wanted == topic]
 
-    def send_frames(self):
+    def send_frames(self) -> None:
         """Send the frames of now to the pages that want them."""
         with self._lock:
             clients = [client for client, (_, frames) in self._wishes.items() if frames]
@@ -95,7 +108,7 @@ class Overlay:
         for client in clients:
             self._answer(client, {"op": "frames", "frames": frames})
 
-    def _take(self, topic, message):
+    def _take(self, topic: str, message: PointCloud2) -> None:
         now = self._clock()
         if now < self._due_s.get(topic, now):
             return

@@ -4,6 +4,8 @@
 Files, and not topics: the address holds a token, which only this user may read, and an exercise is checked in a
 separate network, from which no master of the user is reached.
 """
+from __future__ import annotations
+
 import contextlib
 import os
 import re
@@ -16,19 +18,19 @@ from disk_cache.files import replace_text
 _CONNECT_S = 1.0
 
 
-def folder():
+def folder() -> Path:
     """The folder of these files, below ROS's own; only its user can enter it."""
     path = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "lab_page"
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
     return path
 
 
-def write_address(master_uri, address):
+def write_address(master_uri: str, address: str) -> None:
     """The page of this master's lab is at ``address``, which holds a token. Raises OSError."""
     replace_text(_address_file(master_uri), address)
 
 
-def remove_address(master_uri, address):
+def remove_address(master_uri: str, address: str) -> None:
     """The page at ``address`` has ended; that of another one, which has taken its place, stays."""
     with contextlib.suppress(OSError):
         file = _address_file(master_uri)
@@ -36,7 +38,7 @@ def remove_address(master_uri, address):
             file.unlink()
 
 
-def address(master_uri):
+def address(master_uri: str) -> str | None:
     """The address of the page of this master's lab, or None where no page answers."""
     try:
         found = _address_file(master_uri).read_text(encoding="utf-8")
@@ -48,15 +50,15 @@ def address(master_uri):
     return found
 
 
-def result_file():
+def result_file() -> Path:
     """Where the result of the last checked exercise is, as the JSON of ``./baxter.sh check --json``."""
     return folder() / "exercise.json"
 
 
-def write_result(text):
+def write_result(text: str) -> None:
     """An exercise has been checked. Raises OSError."""
     replace_text(result_file(), text)
 
 
-def _address_file(master_uri):
+def _address_file(master_uri: str) -> Path:
     return folder() / ("address-" + re.sub(r"[^\w.-]+", "_", master_uri))

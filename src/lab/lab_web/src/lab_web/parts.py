@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's buttons, outputs, head and screen for pages, in rospy."""
+from __future__ import annotations
+
 import contextlib
+from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
@@ -11,6 +14,10 @@ from std_msgs.msg import Bool, UInt16
 
 from lab_web.lab import RobotError
 from lab_web.serving import SCREEN
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
 
 PRESS_SERVICE = "/robot/sim/press"
 #: What the screen of a simulated robot shows.
@@ -23,7 +30,7 @@ _LARGEST_ANALOG = 65535
 class Parts:
     """Publishers of all parts; what they show, pages read from the robot's topics."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._press = rospy.ServiceProxy(PRESS_SERVICE, Press)
         self._digital = rospy.Publisher("/robot/digital_io/command", DigitalOutputCommand, queue_size=10)
         self._analog = rospy.Publisher("/robot/analog_io/command", AnalogOutputCommand, queue_size=10)
@@ -31,18 +38,18 @@ class Parts:
         self._nod = rospy.Publisher("/robot/head/command_head_nod", Bool, queue_size=1)
         self._screen = rospy.Publisher("/robot/xdisplay", Image, queue_size=1, latch=True)
 
-    def operations(self):
+    def operations(self) -> dict[str, Callable[[int, dict[str, Any]], None]]:
         """{operation: method} of those that need no power, for :meth:`lab_web.lab.Lab.add`."""
         return {"output": self.output, "sonars": self.sonars, "screen": self.screen}
 
     @staticmethod
-    def can_press():
+    def can_press() -> bool:
         """Are there buttons to press? Only a simulated robot has them. Waits for the master."""
         with contextlib.suppress(rosgraph.MasterError):
             return bool(rosgraph.Master(rospy.get_name()).lookupService(PRESS_SERVICE))
         return False
 
-    def switch(self, action, name, steps):
+    def switch(self, action: str, name: str, steps: int) -> None:
         """Press or release a button, turn a wheel; waits. Raises RobotError."""
         try:
             answer = self._press(component=name, action=action, steps=steps)
@@ -51,7 +58,7 @@ class Parts:
         if not answer.success:
             raise RobotError(answer.status_message)
 
-    def output(self, _client, operation):
+    def output(self, _client: int, operation: dict[str, Any]) -> None:
         """Switch a digital output (``value`` true or false), or set an analog one. Raises RobotError."""
         name, value = operation.get("name"), operation.get("value")
         if not isinstance(name, str) or not name:
@@ -64,15 +71,15 @@ class Parts:
             raise RobotError("%s cannot be set to %r; true, false, or a whole number from 0 to %d is expected"
                              % (name, value, _LARGEST_ANALOG))
 
-    def sonars(self, _client, operation):
+    def sonars(self, _client: int, operation: dict[str, Any]) -> None:
         """All sonars on or off."""
         self._sonars.publish(UInt16(_SONARS if operation.get("on") is True else 0))
 
-    def nod(self, _client, _operation):
+    def nod(self, _client: int, _operation: dict[str, Any]) -> None:
         """Nod once."""
         self._nod.publish(Bool(True))
 
-    def screen(self, _client, operation):
+    def screen(self, _client: int, operation: dict[str, Any]) -> None:
         """Show a picture on the head's screen: ``content``, bytes (600, 1024, 3), red first. Raises RobotError."""
         width, height = SCREEN
         rows = operation.get("content")

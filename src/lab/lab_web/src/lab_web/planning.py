@@ -2,7 +2,9 @@
 """Motions around obstacles for pages: somebody else plans them, the lab plays them, so that they stop as any other
 motion does. No ROS.
 """
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,16 @@ from lab_web.control import NotInControl
 from lab_web.lab import RobotError
 from lab_web.motion import Motion, MotionError
 from lab_web.playback import Playback, Tape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    from lab_web.errands import Errands
+    from lab_web.lab import Lab
+    from lab_web.motion import Limits
+    from lab_web.move_group import MoveGroup
+    from lab_web.robot import Baxter
 
 #: A plan is played from samples so far apart [s].
 SAMPLE_S = 0.02
@@ -21,7 +33,7 @@ START_RAD = 0.05
 class PlanFailed(Exception):
     """There is no plan; ``code``, with "plan_" before it, is a key of the page's texts, or of no text at all."""
 
-    def __init__(self, code, text):
+    def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
         self.code = code
 
@@ -37,7 +49,7 @@ class Plan(NamedTuple):
     velocities: list | None
 
 
-def tape_of(plan):
+def tape_of(plan: Plan) -> Tape:
     """The plan as a recording, sampled. Raises PlanFailed where it is none."""
     try:
         times_s, positions = np.array(plan.times_s, float), np.array(plan.positions, float)
@@ -65,7 +77,8 @@ class Planning:
     ``answer(client, operation)``.
     """
 
-    def __init__(self, lab, robot, planner, errands, answer):
+    def __init__(self, lab: Lab, robot: Baxter, planner: MoveGroup, errands: Errands,
+                 answer: Callable[[int, dict[str, Any]], object]) -> None:
         self._lab = lab
         self._robot = robot
         self._planner = planner
@@ -73,7 +86,7 @@ class Planning:
         self._answer = answer
         self._wanted = None
 
-    def plan(self, client, operation):
+    def plan(self, client: int, operation: dict[str, Any]) -> None:
         """An operation "plan" of a page: ``joints`` {name: [rad]}, or the ``name`` of a pose. The arms go there when
         there is a plan. Raises RobotError, MotionError.
         """
@@ -90,13 +103,13 @@ class Planning:
         self._wanted = wanted = object()
         self._errands.add(client, self._plan_and_go, client, dict(targets), wanted)
 
-    def cancel(self):
+    def cancel(self) -> None:
         """The robot is stopped, or the page has lost the control: nothing moves when there is a plan."""
         if self._wanted is not None:
             self._wanted = None
             self._planner.cancel()
 
-    def _plan_and_go(self, client, targets, wanted):
+    def _plan_and_go(self, client: int, targets: dict[str, float], wanted: object) -> None:
         if wanted is not self._wanted:
             return
         self._tell(client, "busy")
@@ -114,7 +127,8 @@ class Planning:
             if wanted is self._wanted:
                 self._wanted = None
 
-    def _played(self, wanted, limits, tape, measured):
+    def _played(self, wanted: object, limits: Mapping[str, Limits], tape: Tape,
+                measured: Mapping[str, float]) -> Playback:
         # Here the lab lets nobody stop it: what was stopped before does not move now.
         if wanted is not self._wanted:
             raise PlanFailed("preempted", "the planning was stopped")
@@ -123,5 +137,5 @@ class Planning:
                 raise MotionError("%s is not where the plan begins, at %.2f rad; plan again" % (name, angle))
         return Playback(limits, tape, measured)
 
-    def _tell(self, client, why, text="", **values):
+    def _tell(self, client: int, why: str, text: str = "", **values: Any) -> None:
         self._answer(client, {"op": "plan", "why": why, "text": text, **values})

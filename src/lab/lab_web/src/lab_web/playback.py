@@ -1,11 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Recordings of the arms and their playback, in the format of joint_recorder. No ROS."""
+from __future__ import annotations
+
 import io
 import threading
+from typing import TYPE_CHECKING
 
 from baxter_examples.recording import COLUMNS, BadRecording, Recording, parse, write_row
 from lab_web.lab import RobotError
 from lab_web.motion import LEAD_RAD, Motion, MotionError, check_not_lost
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    from lab_web.lab import Lab
+    from lab_web.motion import Limits
 
 #: The longest recording [s].
 LONGEST_S = 600.0
@@ -20,7 +30,7 @@ class Tape(Recording):
     moment; to play it then takes none.
     """
 
-    def __init__(self, names, times_s, rows):
+    def __init__(self, names: list[str], times_s: list[float], rows: list[dict[str, float]]) -> None:
         super().__init__(names, times_s, rows)
         self.extremes = {name: (min(values), max(values)) for name in names
                          for values in [[(row[name], time_s) for time_s, row in zip(times_s, rows, strict=True)]]}
@@ -31,7 +41,7 @@ class Recorder:
     None where there is nothing.
     """
 
-    def __init__(self, changed):
+    def __init__(self, changed: Callable[[dict[str, Any]], object]) -> None:
         self._changed = changed
         self._lock = threading.Lock()
         self._rows = None
@@ -39,11 +49,11 @@ class Recorder:
         self.recording = None
 
     @property
-    def is_running(self):
+    def is_running(self) -> bool:
         """Whether a recording is under way."""
         return self._rows is not None
 
-    def record(self, _client, operation):
+    def record(self, _client: int, operation: dict[str, Any]) -> None:
         """An operation "record" of a page: ``on``, begin or end. Raises RobotError."""
         with self._lock:
             if operation.get("on") is True:
@@ -55,7 +65,7 @@ class Recorder:
                 self._end()
         self._tell()
 
-    def take(self, time_s, values):
+    def take(self, time_s: float, values: Mapping[str, float]) -> None:
         """The robot at a time [s]: {joint: [rad], SIDE_gripper: [%]}."""
         rows = self._rows
         if rows is None:
@@ -71,31 +81,31 @@ class Recorder:
             self._end()
         self._tell()
 
-    def load(self, _client, operation):
+    def load(self, _client: int, operation: dict[str, Any]) -> None:
         """An operation "load" of a page, by an upload: ``content``, a Tape. Raises RobotError."""
         recording = operation.get("content")
         if not isinstance(recording, Tape):
             raise RobotError("a recording is loaded by an upload of its file")
         self.keep(recording)
 
-    def keep(self, recording):
+    def keep(self, recording: Tape) -> None:
         """Make this the recording; ends one that is under way."""
         with self._lock:
             self._rows, self.recording = None, recording
         self._tell()
 
-    def _end(self):
+    def _end(self) -> None:
         rows, self._rows = self._rows, None
         if rows:
             begin_s = rows[0][0]
             self.recording = Tape(COLUMNS[1:], [time_s - begin_s for time_s, _ in rows], [row for _, row in rows])
 
-    def _tell(self):
+    def _tell(self) -> None:
         kept = self.recording
         self._changed({"running": self._rows is not None, "seconds": kept and round(kept.duration_s, 2)})
 
 
-def text_of(recording):
+def text_of(recording: Recording) -> str:
     """The file of a recording."""
     stream = io.StringIO()
     write_row(stream, ["time", *recording.names])
@@ -104,7 +114,7 @@ def text_of(recording):
     return stream.getvalue()
 
 
-def recording_of(content):
+def recording_of(content: bytes) -> Tape:
     """The Tape in the bytes of a file. Raises MotionError."""
     try:
         found = parse(io.StringIO(content.decode(), newline=""), "the recording")
@@ -119,7 +129,7 @@ class Playback:
     Used as a :class:`lab_web.motion.Motion`; values of grippers come out as they are.
     """
 
-    def __init__(self, limits, recording, measured):
+    def __init__(self, limits: Mapping[str, Limits], recording: Tape, measured: Mapping[str, float]) -> None:
         """Raises MotionError for a recording that leaves the limits."""
         self.limits = dict(limits)
         self._recording = recording
@@ -136,12 +146,12 @@ class Playback:
         self._approach.aim({joint: self._now[joint] for joint in self._joints}, measured)
         self.is_moving = True
 
-    def stop(self):
+    def stop(self) -> bool:
         """End; returns whether it was under way."""
         moved, self.is_moving = self.is_moving, False
         return moved
 
-    def step(self, dt, measured):
+    def step(self, dt: float, measured: Mapping[str, float]) -> dict[str, float]:
         """The set-points {name: [rad or %]} after ``dt`` [s]. Raises MotionError where something else has moved a
         joint.
         """
@@ -154,7 +164,7 @@ class Playback:
             self.is_moving = False
         return dict(self._now)
 
-    def _advance(self, step_s, dt):
+    def _advance(self, step_s: float, dt: float) -> None:
         """Go on in the recording by ``step_s`` [s], or by less where a joint would exceed its speed limit in ``dt``."""
         while step_s > 0.0:
             after = self._at(self._time_s + step_s)
@@ -166,14 +176,14 @@ class Playback:
                 return
             step_s /= excess
 
-    def _at(self, time_s):
+    def _at(self, time_s: float) -> dict[str, float]:
         values = self._recording.at(time_s)
         for joint in self._joints:
             values[joint] = min(max(values[joint], self.limits[joint].lower), self.limits[joint].upper)
         return values
 
 
-def play(lab, client, recorder):
+def play(lab: Lab, client: int, recorder: Recorder) -> None:
     """Play the recording for a page of a :class:`lab_web.lab.Lab`. Raises RobotError, MotionError, NotInControl."""
     recording = recorder.recording
     if recording is None:

@@ -4,40 +4,46 @@
 A small process beside the server. It reads which buttons are held, a line of JSON for each change, and releases those
 of the last line when the server has gone without a word. It loads rospy only then.
 """
+from __future__ import annotations
+
 import contextlib
 import json
 import signal
 import subprocess
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 class ReleaseGuard:
     """The server's side; one thread at a time."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         # A session of its own: what ends the server's group of processes does not end this one.
         self._process = subprocess.Popen([sys.executable, "-m", "lab_web.release_guard"], stdin=subprocess.PIPE,
                                          start_new_session=True)
 
-    def pressed(self, names):
+    def pressed(self, names: Iterable[str]) -> None:
         """These buttons are pressed now."""
         self._write(json.dumps(sorted(names)).encode() + b"\n")
 
-    def close(self):
+    def close(self) -> None:
         """The server has released everything by itself."""
         self.pressed([])
         with contextlib.suppress(OSError):
             self._process.stdin.close()
         self._process.wait()
 
-    def _write(self, line):
+    def _write(self, line: bytes) -> None:
         # Where somebody has ended it, the buttons work without it.
         with contextlib.suppress(OSError, ValueError):
             self._process.stdin.write(line)
             self._process.stdin.flush()
 
 
-def pressed_at_the_end(lines):
+def pressed_at_the_end(lines: Iterable[bytes]) -> list[str]:
     """The names in the last whole line; what is cut off counts as not written."""
     names = []
     for line in lines:
@@ -46,7 +52,7 @@ def pressed_at_the_end(lines):
     return names
 
 
-def main():
+def main() -> None:
     """Wait until the server has gone, then release."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -55,7 +61,7 @@ def main():
         release(names)
 
 
-def release(names):
+def release(names: Iterable[str]) -> None:
     """Release buttons of the simulated robot. Errors go to stderr: nobody else is left to hear them."""
     import rospy
     from bullet_sim_msgs.srv import Press

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter for :class:`lab_web.lab.Lab`, in rospy."""
+from __future__ import annotations
+
 import json
 import threading
 import time
+from typing import TYPE_CHECKING
 
 import rospy
 from baxter_core_msgs.msg import (
@@ -26,6 +29,12 @@ from lab_web.motion import limits_of
 from urdf_model import UrdfError, parse_urdf
 from web_bridge.errors import shown
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
+
+    from urdf_model import Robot
+
 #: Poses that both arms can go to from each other on a straight line between joint angles.
 SAFE_POSES = ("neutral", "untucked")
 #: Base and tip of the arms, for :class:`lab_web.hands.Hands`.
@@ -41,7 +50,7 @@ class Baxter:
     """Advertises at once, subscribes with :meth:`listen`; what is not known yet is empty. ``told(text)``: an error of a
     switch."""
 
-    def __init__(self, told):
+    def __init__(self, told: Callable[[str], object]) -> None:
         self._told = told
         self._positions = {}
         self._state = None
@@ -67,7 +76,7 @@ class Baxter:
                                              queue_size=10) for side in SIDES}
         self._subscriptions = []
 
-    def listen(self):
+    def listen(self) -> None:
         """Subscribe to the robot's states, which a simulator does not make for nobody. Not called
         together with :meth:`rest`."""
         self.rest()
@@ -80,7 +89,7 @@ class Baxter:
                 self._subscriptions.append(rospy.Subscriber(
                     "/robot/end_effector/%s_gripper/%s" % (side, topic), kind, callback, side, queue_size=1))
 
-    def rest(self):
+    def rest(self) -> None:
         """Hear nothing until the next :meth:`listen`; what was heard of states is forgotten."""
         subscriptions, self._subscriptions = self._subscriptions, []
         for subscription in subscriptions:
@@ -94,17 +103,17 @@ class Baxter:
                 enabler.close()
 
     @property
-    def poses(self):
+    def poses(self) -> dict[str, dict[str, float]]:
         """{name: {joint: angle [rad]}} of both arms."""
         return {name: {joint: angle for side in SIDES for joint, angle in poses().angles(name, side).items()}
                 for name in SAFE_POSES} if self.limits else {}
 
     @property
-    def grippers(self):
+    def grippers(self) -> list[str]:
         """The sides with an electric gripper."""
         return [side for side in SIDES if self._grippers_of_kind.get(side) == EndEffectorProperties.ELECTRIC_GRIPPER]
 
-    def read_description(self):
+    def read_description(self) -> Robot | None:
         """Read the joints' limits from robot_description, if it is there and has changed. Waits for the master.
 
         Returns an urdf_model.Robot if it is another one than at the last call, else None.
@@ -124,23 +133,23 @@ class Baxter:
         self.limits = limits_of(robot.joints, [*(name for side in SIDES for name in joint_names(side)), HEAD_JOINT])
         return robot
 
-    def look_after(self):
+    def look_after(self) -> None:
         """Forget the state of a robot that has gone: the next one may stand elsewhere. A paused one is still there.
         Waits for the master.
         """
         if self._state is not None and self._presence.is_gone():
             self._state, self._positions = None, {}
 
-    def measured(self):
+    def measured(self) -> dict[str, float]:
         """{joint: position [rad]}; a joint_states message may hold only some of the joints."""
         return dict(self._positions)
 
-    def why_not_ready(self):
+    def why_not_ready(self) -> str:
         """Why the robot does not move, or ""."""
         state = self._state
         return "nothing is heard of the robot" if state is None else why_not_ready(state)
 
-    def command(self, setpoints):
+    def command(self, setpoints: Mapping[str, float]) -> None:
         """Position commands [rad] to the arms and the head."""
         for side, publisher in self._limbs.items():
             names = [name for name in joint_names(side) if name in setpoints]
@@ -152,23 +161,23 @@ class Baxter:
             self._head.publish(HeadPanCommand(setpoints[HEAD_JOINT], HeadPanCommand.MAX_SPEED_RATIO,
                                               HeadPanCommand.REQUEST_PAN_ENABLE))
 
-    def explain(self, joint, tell):
+    def explain(self, joint: str, tell: Callable[[str], object]) -> None:
         """Ask the robot what keeps a joint from moving, and ``tell(sentence)`` on a separate thread."""
         threading.Thread(target=lambda: tell(_what_holds(joint)), daemon=True).start()
 
-    def stop(self):
+    def stop(self) -> None:
         """As the stop button."""
         self._stop.publish(Empty())
 
-    def enable(self):
+    def enable(self) -> None:
         """Reset where needed, then enable; in a thread."""
         self._switch(RobotEnable.enable)
 
-    def disable(self):
+    def disable(self) -> None:
         """Switch the drives off; in a thread."""
         self._switch(RobotEnable.disable)
 
-    def grip(self, side, action):
+    def grip(self, side: str, action: str) -> None:
         """Open, close or calibrate an electric gripper. Raises RobotError."""
         if side not in self.grippers:
             raise RobotError("there is no electric gripper on the side %r" % (side,))
@@ -182,7 +191,7 @@ class Baxter:
         self._gripped.pop(side, None)
         self._send(side, *_ACTIONS[action])
 
-    def _follow_with(self, side, percent):
+    def _follow_with(self, side: str, percent: float | None) -> None:
         state = self._grippers.get(side)
         if percent is None or state is None or state.calibrated == EndEffectorState.STATE_FALSE:
             return
@@ -190,18 +199,18 @@ class Baxter:
             self._gripped[side] = percent
             self._send(side, "go", {"position": percent})
 
-    def _send(self, side, command, arguments):
+    def _send(self, side: str, command: str, arguments: dict[str, Any]) -> None:
         state = self._grippers[side]
         self._sequence += 1
         self._hands[side].publish(EndEffectorCommand(id=state.id, command=command, args=json.dumps(arguments),
                                                      sender=_SENDER, sequence=self._sequence))
 
-    def _switch(self, method):
+    def _switch(self, method: Callable[[RobotEnable], object]) -> None:
         if not self._switching.acquire(blocking=False):
             raise RobotError("the last switch of the robot has not ended yet")
         threading.Thread(target=self._switch_now, args=(method,), daemon=True).start()
 
-    def _switch_now(self, method):
+    def _switch_now(self, method: Callable[[RobotEnable], object]) -> None:
         try:
             if self._enabler is None:
                 # Once, because each one subscribes to the robot's state.
@@ -212,24 +221,24 @@ class Baxter:
         finally:
             self._switching.release()
 
-    def _on_joints(self, message):
+    def _on_joints(self, message: JointState) -> None:
         self._positions.update(zip(message.name, message.position, strict=False))
         grippers = {"%s_gripper" % side: self._grippers[side].position for side in self.grippers
                     if side in self._grippers}
         self.time_s = message.header.stamp.to_sec()
         self.heard(self.time_s, {**self._positions, **grippers})
 
-    def _on_state(self, message):
+    def _on_state(self, message: AssemblyState) -> None:
         self._state, self._heard_s = message, time.monotonic()
 
-    def _on_gripper(self, message, side):
+    def _on_gripper(self, message: EndEffectorState, side: str) -> None:
         self._grippers[side] = message
 
-    def _on_kind(self, message, side):
+    def _on_kind(self, message: EndEffectorProperties, side: str) -> None:
         self._grippers_of_kind[side] = message.ui_type
 
 
-def _what_holds(joint):
+def _what_holds(joint: str) -> str:
     side = joint.partition("_")[0]
     why = ask_what_holds(side, is_kept_away=True) if side in SIDES else ""
     return why or "something is in its way, or another program moves it"

@@ -4,12 +4,21 @@
 The world comes from the simulator's shared memory, as for the cameras; so robots, objects and their meshes are those
 that the cameras see.
 """
+from __future__ import annotations
+
 import hashlib
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sensor_renderer.following import WorldFollower
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+    from os import PathLike
+
+    from sensor_renderer.mirror import Body, Mirror
 
 # How far the triangles that a browser gets may be from the mesh [m].
 _WITHIN_M = 0.003
@@ -25,7 +34,8 @@ class Picture:
     ``bodies``: {name: sensor_renderer.mirror.Body} in the scene's order.
     """
 
-    def __init__(self, revision, text, shapes, bodies=None):
+    def __init__(self, revision: int, text: str, shapes: dict[str, bytes],
+                 bodies: dict[str, Body] | None = None) -> None:
         self.revision = revision
         self.text = text
         self.shapes = shapes
@@ -35,14 +45,14 @@ class Picture:
 class SceneFollower(WorldFollower):
     """Follows one simulator; for one thread. ``warn(text)``."""
 
-    def __init__(self, folder, warn):
+    def __init__(self, folder: str | PathLike[str], warn: Callable[[str], object]) -> None:
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         super().__init__(folder, warn)
         self._shown = None  # poses that follow() told of
         #: The newest :class:`Picture`, or None.
         self.picture = None
 
-    def follow(self):
+    def follow(self) -> bool:
         """Read the newest state. Returns whether there is anything new to see. Raises SnapshotError."""
         if not super().follow():
             return False
@@ -54,17 +64,17 @@ class SceneFollower(WorldFollower):
         self._shown = poses
         return True
 
-    def poses(self):
+    def poses(self) -> bytes:
         """Bytes: the revision [uint32], then for each link in the scene's order the upper three rows of its pose in the
         world [float32, (3, 4)].
         """
         return np.uint32(self.revision).astype("<u4").tobytes() + self._matrices().astype("<f4").tobytes()
 
-    def _matrices(self):
+    def _matrices(self) -> np.ndarray:
         return np.concatenate([np.empty((0, 3, 4)), *(body.matrices[:, :3, :] for body in self.mirror.bodies.values())])
 
 
-def picture_of(mirror, revision):
+def picture_of(mirror: Mirror, revision: int) -> Picture:
     """The Picture of all bodies; equal triangles are one shape, floors are left out."""
     names, shapes, bodies = {}, {}, []
     for name, body in mirror.bodies.items():
@@ -88,7 +98,7 @@ def picture_of(mirror, revision):
                    dict(mirror.bodies))
 
 
-def bodies_of(picture, joints):
+def bodies_of(picture: Picture | None, joints: Collection[str]) -> dict[str, bool]:
     """{name of a body of ``picture`` (or of None) that is more than a floor: whether it has one of the ``joints``}."""
     return {name: not set(joints).isdisjoint(body.joint_names)
             for name, body in (picture.bodies.items() if picture else ())

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The page's files and its socket, on tornado. No ROS."""
+from __future__ import annotations
+
 import asyncio
 import base64
 import hashlib
 import json
 import re
 import threading
+from typing import TYPE_CHECKING
 
 from tornado import web
 
@@ -14,6 +17,16 @@ from lab_web.motion import MotionError
 from lab_web.playback import recording_of, text_of
 from web_bridge.errors import Refused
 from web_bridge.websocket import BufferedSocket, token_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+    from typing import Any
+
+    from lab_web import scene
+    from lab_web.playback import Recorder
+    from web_bridge.access import Access
+    from web_bridge.loop_thread import LoopThread
 
 #: Pages at a time.
 MAX_PAGES = 100
@@ -28,7 +41,7 @@ _POLICY = "default-src 'self'; script-src 'self'%s; img-src 'self' data:; connec
           "frame-src 'self'; frame-ancestors 'self'"
 
 
-def policy(page_text=""):
+def policy(page_text: str = "") -> str:
     """The Content-Security-Policy of a page with this text: the only script inside of it is its import map."""
     inline = re.findall(r'<script type="importmap">(.*?)</script>', page_text, re.DOTALL)
     return _POLICY % "".join(" 'sha256-%s'" % base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
@@ -38,7 +51,7 @@ def policy(page_text=""):
 class Pages:
     """The connected pages. ``access``: web_bridge.access.Access; ``lab``: set by the owner before the first page."""
 
-    def __init__(self, access, loop_thread):
+    def __init__(self, access: Access, loop_thread: LoopThread) -> None:
         self.access = access
         self.loop_thread = loop_thread
         self.lab = None
@@ -51,24 +64,24 @@ class Pages:
         self._shared = {"robot": {"op": "robot"}}
         self._sockets = {}
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._sockets)
 
     @property
-    def shared(self):
+    def shared(self) -> list[dict[str, Any]]:
         """The first messages to every page."""
         return list(self._shared.values())
 
     @property
-    def is_full(self):
+    def is_full(self) -> bool:
         return len(self._sockets) >= MAX_PAGES
 
-    def opened(self, socket):
+    def opened(self, socket: PageSocket) -> None:
         self._sockets[socket.number] = socket
         self.present.set()
         self.control_changed()
 
-    def closed(self, socket):
+    def closed(self, socket: PageSocket) -> None:
         if self._sockets.pop(socket.number, None) is not None:
             if not self._sockets:
                 self.present.clear()
@@ -77,31 +90,31 @@ class Pages:
 
     # From any thread.
 
-    def control_changed(self):
+    def control_changed(self) -> None:
         """Tell all pages who has the control."""
         self.loop_thread.soon(self._send_control)
 
-    def tell(self, number, code, text):
+    def tell(self, number: int | None, code: str, text: str) -> None:
         """Tell one page, or all (None)."""
         self.loop_thread.soon(self._tell, number, code, text)
 
-    def answer(self, number, operation):
+    def answer(self, number: int, operation: dict[str, Any]) -> None:
         """An answer to one page."""
         self.loop_thread.soon(self._send_one, number, operation)
 
-    def share(self, name, values):
+    def share(self, name: str, values: Mapping[str, Any]) -> None:
         """Tell all pages the operation ``name`` with ``values``, and each page that comes later."""
         operation = {"op": name, **values}
         self._shared[name] = operation
         self.loop_thread.soon(self._send_all, operation)
 
-    def show_poses(self, picture, poses):
+    def show_poses(self, picture: scene.Picture, poses: bytes) -> None:
         """New poses of the scene ``picture``."""
         self.picture, self.poses = picture, poses
         for socket in list(self._sockets.values()):
             socket.outgoing.offer([poses], "poses", 1)
 
-    def show(self, number, data):
+    def show(self, number: int, data: bytes) -> None:
         """Bytes to one page, in the place of older ones that it has not got yet."""
         socket = self._sockets.get(number)
         if socket is not None:
@@ -109,21 +122,21 @@ class Pages:
 
     # In the loop.
 
-    def _send_all(self, operation):
+    def _send_all(self, operation: dict[str, Any]) -> None:
         for socket in self._sockets.values():
             socket.send(operation)
 
-    def _send_one(self, number, operation):
+    def _send_one(self, number: int, operation: dict[str, Any]) -> None:
         if number in self._sockets:
             self._sockets[number].send(operation)
 
-    def _send_control(self):
+    def _send_control(self) -> None:
         holder = self.lab.holder
         for number, socket in self._sockets.items():
             socket.send({"op": "control", "mine": holder == number, "free": holder is None,
                          "pages": len(self._sockets)})
 
-    def _tell(self, number, code, text):
+    def _tell(self, number: int | None, code: str, text: str) -> None:
         sockets = self._sockets.values() if number is None else filter(None, [self._sockets.get(number)])
         for socket in sockets:
             socket.send({"op": "told", "code": code, "text": text})
@@ -132,17 +145,17 @@ class Pages:
 class _WithToken(web.RequestHandler):
     """Files that need a token, of either kind."""
 
-    def initialize(self, pages):
+    def initialize(self, pages: Pages) -> None:
         self.pages = pages
 
-    def prepare(self):
+    def prepare(self) -> None:
         try:
             self.pages.access.may_act(token_of(self.request))
         except Refused:
             self.set_status(403)
             self.finish("This address needs the token that ./baxter.sh web printed: …/?token=…\n")
 
-    def set_default_headers(self):
+    def set_default_headers(self) -> None:
         self.set_header("Referrer-Policy", "no-referrer")
         self.set_header("X-Content-Type-Options", "nosniff")
         self.set_header("Cache-Control", "no-store")
@@ -151,11 +164,11 @@ class _WithToken(web.RequestHandler):
 class Index(_WithToken):
     """The page."""
 
-    def initialize(self, pages, text):
+    def initialize(self, pages: Pages, text: str) -> None:
         super().initialize(pages)
         self._text = text
 
-    def get(self):
+    def get(self) -> None:
         self.set_header("Content-Security-Policy", policy(self._text))
         self.finish(self._text)
 
@@ -163,7 +176,7 @@ class Index(_WithToken):
 class Scene(_WithToken):
     """Which shapes there are, as JSON."""
 
-    def get(self):
+    def get(self) -> None:
         if self.pages.picture is None:
             self.set_status(404)
             return
@@ -174,7 +187,7 @@ class Scene(_WithToken):
 class Shape(_WithToken):
     """The triangles of one shape of the scene."""
 
-    def get(self, name):
+    def get(self, name: str) -> None:
         content = self.pages.picture and self.pages.picture.shapes.get(name)
         if content is None:
             self.set_status(404)
@@ -191,12 +204,12 @@ class Upload(_WithToken):
     MotionError. Nothing is read without the token.
     """
 
-    def initialize(self, pages, operation, read=bytes):
+    def initialize(self, pages: Pages, operation: str, read: Callable[[bytes], Any] = bytes) -> None:
         super().initialize(pages)
         self._operation, self._read = operation, read
         self._body = bytearray()
 
-    def prepare(self):
+    def prepare(self) -> None:
         super().prepare()
         if self._finished:
             return
@@ -213,10 +226,10 @@ class Upload(_WithToken):
             self.set_status(403)
             self.finish("this address only watches\n")
 
-    def data_received(self, chunk):
+    def data_received(self, chunk: bytes) -> None:
         self._body += chunk
 
-    async def post(self):
+    async def post(self) -> None:
         number = self.get_query_argument("page", "")
         # Python refuses to read a number of thousands of digits.
         number = int(number) if number.isdecimal() and len(number) < 20 else 0
@@ -235,11 +248,11 @@ class Upload(_WithToken):
 class RecordingFile(_WithToken):
     """The recording as a file; ``get_text()``: its text, or None."""
 
-    def initialize(self, pages, get_text):
+    def initialize(self, pages: Pages, get_text: Callable[[], str | None]) -> None:
         super().initialize(pages)
         self._get_text = get_text
 
-    async def get(self):
+    async def get(self) -> None:
         text = await asyncio.get_running_loop().run_in_executor(None, self._get_text)
         if text is None:
             self.set_status(404)
@@ -253,12 +266,12 @@ class Files(web.StaticFileHandler):
     """The page's scripts, styles and texts, and its libraries: nothing of the lab, so no token."""
 
     @classmethod
-    def get_absolute_path(cls, root, path):
+    def get_absolute_path(cls, root: str, path: str) -> str:
         if "\0" in path:
             raise web.HTTPError(404)
         return super().get_absolute_path(root, path)
 
-    def set_extra_headers(self, path):
+    def set_extra_headers(self, path: str) -> None:
         self.set_header("Cache-Control", "no-cache")
         self.set_header("X-Content-Type-Options", "nosniff")
         # A worker has the policy of its own file.
@@ -270,14 +283,14 @@ class PageSocket(BufferedSocket):
 
     _numbers = iter(range(1, 1 << 62))
 
-    def initialize(self, pages):
+    def initialize(self, pages: Pages) -> None:
         self._pages = pages
         self.number = next(self._numbers)
 
-    def prepare(self):
+    def prepare(self) -> None:
         self.let_in(self._pages.access, self._pages.is_full, MAX_PAGES)
 
-    def open(self, *_):
+    def open(self, *_: str) -> None:
         self.start_writing(self._pages.loop_thread)
         self.send({"op": "hello", "number": self.number, "may_act": self.may_act,
                    "heartbeat_ms": 1000.0 * HEARTBEAT_S, "hangs_ms": 1000.0 * PAGE_HANGS_S})
@@ -287,11 +300,11 @@ class PageSocket(BufferedSocket):
             self.outgoing.offer([self._pages.poses], "poses", 1)
         self._pages.opened(self)
 
-    def send(self, operation):
+    def send(self, operation: dict[str, Any]) -> None:
         """An operation to the page."""
         self.outgoing.keep([json.dumps(operation)])
 
-    async def on_message(self, message):
+    async def on_message(self, message: str | bytes) -> None:
         lab = self._pages.lab
         # Most frames are heartbeats.
         if message in ("beat", "busy"):
@@ -308,7 +321,7 @@ class PageSocket(BufferedSocket):
             return
         lab.serve(self.number, self.may_act, operation)
 
-    def on_close(self):
+    def on_close(self) -> None:
         if self.outgoing is None:
             return
         self.stop_writing()
@@ -316,7 +329,7 @@ class PageSocket(BufferedSocket):
         self._pages.lab.gone(self.number)
 
 
-def upload_routes(pages, recorder):
+def upload_routes(pages: Pages, recorder: Recorder) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:
     """The routes of files to and from pages; ``recorder``: :class:`lab_web.playback.Recorder`."""
     def text():
         recording = recorder.recording
@@ -326,7 +339,7 @@ def upload_routes(pages, recorder):
             (r"/recording.csv", RecordingFile, {"pages": pages, "get_text": text})]
 
 
-def routes(pages, page, libraries):
+def routes(pages: Pages, page: Path, libraries: Path) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:
     """The routes of the page; ``page``: the folder of its files, ``libraries``: of node_modules [pathlib.Path]."""
     text = (page / "index.html").read_text(encoding="utf-8")
     return [(r"/", Index, {"pages": pages, "text": text}), (r"/lab", PageSocket, {"pages": pages}),
