@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The compiled functions of a tick: read from the cache, or compiled, before the first tick needs them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from baxter_sim_hardware.arms import avoidance
@@ -18,8 +23,11 @@ from baxter_sim_hardware.arms.setpoint import (
     shares_in_step,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
-def load():
+
+def load() -> None:
     """Those of every robot. In a new process this takes a second: numba prepares itself with the first of them."""
     here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
     approach(here, at_rest, here, bound, bound, 1.0)
@@ -37,7 +45,7 @@ def load():
     cruising_speeds(speeds.numbers, np.zeros(1, dtype=int), points.braking, here, points.speed)
 
 
-def load_of_effects(numbers):
+def load_of_effects(numbers: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
     """Those of a robot with every effect of the physical one; numbers: what ``effects.read`` returns."""
     here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
     sensors = JointSensors(numbers["noise"], ["left_s0"], 0, 0)
@@ -50,6 +58,6 @@ def load_of_effects(numbers):
     avoidance.around(blocks_of(numbers["body"]), frames, rates, 1.0, 1.0)
 
 
-def _arm():
+def _arm() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(rotations, origins, rates) of an arm whose frames all coincide."""
     return np.zeros((8, 3, 3)), np.zeros((8, 3)), np.zeros(7)

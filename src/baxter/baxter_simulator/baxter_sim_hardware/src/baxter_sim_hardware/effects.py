@@ -3,7 +3,11 @@
 
 The numbers stand in config/physical_robot.yaml, each with its source.
 """
+
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import yaml
@@ -13,6 +17,9 @@ from urdf_model import bounds, read_text
 
 from .errors import HardwareError
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
 NAMES = ("lag", "noise", "safety", "delay", "states", "uncalibrated")
 #: Sections of the file: those of the effects; "senses", of the effect "noise" beside the joints; "body", of the effect
 #: "safety"; "serial", how robots differ.
@@ -20,12 +27,12 @@ SECTIONS = (*NAMES, "senses", "body", "serial")
 ALL, NONE = "all", "none"
 
 
-def physical_robot():
+def physical_robot() -> Path:
     """Path of the numbers."""
     return Path(find_packages().get_path("baxter_sim_hardware")) / "config" / "physical_robot.yaml"
 
 
-def chosen(words):
+def chosen(words: str) -> set[str]:
     """The set of effects that a text such as "lag,noise", "all" or "none" names. Raises HardwareError."""
     if not isinstance(words, str):
         raise HardwareError("effects is %r; it must be a text such as 'lag,noise', 'all' or 'none'" % (words,))
@@ -39,7 +46,7 @@ def chosen(words):
     return names
 
 
-def read(path):
+def read(path: str | Path) -> dict[str, dict[str, dict[str, float]]]:
     """{section: {number: {name: value}}} of a YAML file, by names of joints and others.
 
     Raises HardwareError for what is missing or no number.
@@ -64,7 +71,7 @@ def read(path):
     return found
 
 
-def row(rows, number):
+def row(rows: Mapping[str, Mapping[str, float]], number: str) -> Mapping[str, float]:
     """{name: value} of `number`. Raises HardwareError where it is missing."""
     try:
         return rows[number]
@@ -72,7 +79,7 @@ def row(rows, number):
         raise HardwareError("there is no '%s' among %s" % (number, ", ".join(sorted(rows)))) from None
 
 
-def positive(rows, number, name):
+def positive(rows: Mapping[str, Mapping[str, float]], number: str, name: str) -> float:
     """The value of `number` for `name`. Raises HardwareError for what is missing or not greater than 0."""
     value = row(rows, number).get(name)
     if value is None or value <= 0.0:
@@ -80,7 +87,7 @@ def positive(rows, number, name):
     return float(value)
 
 
-def per_joint(rows, number, names):
+def per_joint(rows: Mapping[str, Mapping[str, float]], number: str, names: Iterable[str]) -> np.ndarray:
     """(n,) the value of `number` for the joints `names`, such as left_s0: that of the joint itself, or else that of s0.
 
     Raises HardwareError for what is missing.

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The head: it pans, and it nods."""
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +12,9 @@ from baxter_model import HEAD_JOINT
 
 from .arms.setpoint import approach
 from .errors import CommandRefused
+
+if TYPE_CHECKING:
+    from bullet_sim import Model
 
 FULL_SPEED = 8.4  # [rad/s] at speed ratio 1: the physical robot's
 ACCELERATION = 30.0  # [rad/s^2] of the set-point; the joint follows that without overshooting
@@ -22,24 +29,24 @@ class Head:
     from its target it stops [rad], and it does not start for less.
     """
 
-    def __init__(self, lower, upper, pan, dt=0.002, dead_band=0.0):
+    def __init__(self, lower: float, upper: float, pan: float, dt: float = 0.002, dead_band: float = 0.0) -> None:
         self._lower, self._upper, self._dt, self._dead_band = lower, upper, dt, dead_band
         self._acceleration = np.array([ACCELERATION])
         self.reset(pan)
 
-    def reset(self, pan):
+    def reset(self, pan: float) -> None:
         """Forget every command and hold `pan` [rad]."""
         self.pan_enabled = True
         self._nod_start = None
         self.stop(pan)
 
-    def stop(self, pan):
+    def stop(self, pan: float) -> None:
         """Hold `pan` [rad] at once, and take the next command from there."""
         self._position, self._rate = np.array([pan]), np.zeros(1)
         self._target, self._speed = self._position.copy(), np.array([FULL_SPEED])
         self._resting = False
 
-    def command_pan(self, target, speed_ratio, enable=None):
+    def command_pan(self, target: float, speed_ratio: float, enable: bool | None = None) -> None:
         """Turn to `target` [rad], clamped to the limits, at `speed_ratio` (0 to 1) of FULL_SPEED.
 
         A ratio of 0 means full speed: the vendor's simulator turned at its own speed whatever the ratio, and clients
@@ -61,25 +68,25 @@ class Head:
             self._target[0] = self._position[0]
         self._resting = False
 
-    def nod(self, time_s):
+    def nod(self, time_s: float) -> None:
         """Start to nod at time_s [s]; a running nod is not restarted."""
         if not self.is_nodding(time_s):
             self._nod_start = time_s
 
-    def is_nodding(self, time_s):
+    def is_nodding(self, time_s: float) -> bool:
         return self._nod_start is not None and 0.0 <= time_s - self._nod_start < NOD_S
 
     @property
-    def commanded_position(self):
+    def commanded_position(self) -> float:
         """Where the set-point is now [rad]."""
         return float(self._position[0])
 
     @property
-    def commanded(self):
+    def commanded(self) -> tuple[np.ndarray, np.ndarray]:
         """(position (1,) [rad], velocity (1,) [rad/s]) of the set-point now."""
         return self._position, self._rate
 
-    def update(self):
+    def update(self) -> tuple[np.ndarray, np.ndarray] | None:
         """One tick: the set-point's (position (1,) [rad], velocity (1,) [rad/s]); None once it rests."""
         if self._resting:
             return None
@@ -96,12 +103,12 @@ class PanDrive:
     Attributes: `head`, its `Head`; `joint`, the number of the joint in the model.
     """
 
-    def __init__(self, model, dt: float, dead_band: float = 0.0):
+    def __init__(self, model: Model, dt: float, dead_band: float = 0.0) -> None:
         self._model, self._index = model, model.index([HEAD_JOINT])
         self.joint = self._index[0]
         self.head = Head(model.lower[self.joint], model.upper[self.joint], self._pan(), dt, dead_band)
 
-    def _pan(self):
+    def _pan(self) -> float:
         return self._model.read_joints()[0][self.joint]
 
     def stop(self) -> None:
@@ -122,5 +129,5 @@ class PanDrive:
         """Send the joint where it was sent last."""
         self._drive(*self.head.commanded)
 
-    def _drive(self, position, velocity):
+    def _drive(self, position: np.ndarray, velocity: np.ndarray) -> None:
         self._model.drive_position(self._index, position, self._model.max_effort[self._index], velocity=velocity)

@@ -4,8 +4,11 @@
 Robot 0 is the drawing. Every difference follows from the serial number and the name of the part, so a robot is the same
 on every machine, with or without its other parts.
 """
+
+from __future__ import annotations
+
 import zlib
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,6 +17,12 @@ from baxter_model import SIDES
 
 from . import effects
 from .errors import HardwareError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from sensor_renderer.pinhole import Pinhole
 
 #: Differences are normally distributed, and cut off at so many standard deviations: parts pass an inspection.
 CUT_OFF = 2.0
@@ -32,17 +41,17 @@ ROBOT_CONFIG = "/robot_config/jcb_urdf_config/torso_t0/joint/"
 LARGEST_SERIAL = 2 ** 31 - 1
 
 
-def is_file(serial):
+def is_file(serial: int | str) -> bool:
     """Whether `serial` names a file of numbers, as `./baxter.sh sysid` writes it, and no number."""
     return str(serial).endswith((".yaml", ".yml"))
 
 
-def numbers_of(serial):
+def numbers_of(serial: int | str) -> str | Path:
     """Path of the numbers of the robot `serial`: its file, or those that all numbered robots have."""
     return str(serial) if is_file(serial) else effects.physical_robot()
 
 
-def checked(serial):
+def checked(serial: int | str) -> int:
     """A serial number as an integer; of a robot with a file of its own, that of the drawing.
 
     Raises HardwareError unless it is a YAML file or a whole number from 0 to LARGEST_SERIAL.
@@ -59,7 +68,7 @@ def checked(serial):
     return number
 
 
-def difference(serial, part, rows, number):
+def difference(serial: int, part: str, rows: Mapping[str, Mapping[str, float]], number: str) -> dict[str, float]:
     """{name: value} by how much `part`, any text, of the robot `serial` differs; zeros for robot 0.
 
     rows: section "serial" of `effects.read`; number: a row of it, whose values are standard deviations. Raises
@@ -72,12 +81,12 @@ def difference(serial, part, rows, number):
     return {name: float(deviations[name] * value) for name, value in zip(sorted(deviations), values, strict=True)}
 
 
-def drawn(serial, part, number):
+def drawn(serial: int, part: str, number: str) -> np.random.Generator:
     """The random numbers of one property (`number`, any text) of `part` of the robot `serial`."""
     return np.random.default_rng([serial, zlib.crc32(("%s %s" % (part, number)).encode())])
 
 
-def described(urdf_xml, serial, rows):
+def described(urdf_xml: str, serial: int, rows: Mapping[str, Mapping[str, float]]) -> str:
     """The description (URDF text) of the robot `serial`: mounts of arms, cameras and grippers are where its own are.
 
     rows: as for `difference`. Robot 0's is the text as given. Raises HardwareError for a text that is no XML.
@@ -100,7 +109,7 @@ def described(urdf_xml, serial, rows):
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def robot_config(urdf_xml):
+def robot_config(urdf_xml: str) -> dict[str, str]:
     """{parameter: text} of what the factory has measured: origins of the arms' mounts as the description has them.
 
     Raises HardwareError for a text that is no XML.
@@ -124,20 +133,20 @@ class Lens(NamedTuple):
     cy: float
 
     @classmethod
-    def of(cls, serial, camera, rows):
+    def of(cls, serial: int, camera: str, rows: Mapping[str, Mapping[str, float]]) -> Lens:
         """The lens of `camera`, "left_hand_camera" for instance. Raises HardwareError."""
         focal = difference(serial, camera, rows, "focal_length")
         centre = difference(serial, camera, rows, "principal_point")
         both = 1.0 + focal["both"]
         return cls(both, both * (1.0 + focal["aspect"]), centre["x"], centre["y"])
 
-    def before(self, pinhole, scale):
+    def before(self, pinhole: Pinhole, scale: float) -> Pinhole:
         """The pinhole (of sensor_renderer) behind this lens; scale: pixels of its picture for one of the array."""
         return pinhole._replace(fx=self.fx * pinhole.fx, fy=self.fy * pinhole.fy, cx=pinhole.cx + scale * self.cx,
                                 cy=pinhole.cy + scale * self.cy)
 
 
-def _parsed(urdf_xml):
+def _parsed(urdf_xml: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(urdf_xml)
     except ElementTree.ParseError as error:

@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Random numbers that follow from a number, such as that of a tick, whatever was drawn before."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 
 class NumberedRandom:
@@ -9,11 +17,11 @@ class NumberedRandom:
     A new generator for each number would give the same; this one is made once, which is five times as quick.
     """
 
-    def __init__(self, key):
+    def __init__(self, key: int | Sequence[int]) -> None:
         self._bits = np.random.Philox(key=key)
         self._state, self._generator = self._bits.state, np.random.Generator(self._bits)
 
-    def at(self, *counter):
+    def at(self, *counter: int) -> np.random.Generator:
         """The numpy Generator at counter, three integers from 0; valid until the next call."""
         self._state["state"]["counter"][1:] = counter
         self._bits.state = self._state

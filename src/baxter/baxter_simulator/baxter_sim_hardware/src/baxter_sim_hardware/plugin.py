@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter as a model plugin of /gazebo: connects the robot's parts to the simulated model. It makes no decisions."""
+
+from __future__ import annotations
+
 import math
 from types import MethodType
+from typing import TYPE_CHECKING, Any
 
 import roslib.message
 
@@ -30,6 +34,12 @@ from .topics.sensors import SensorTopics
 from .topics.status import StatusTopics
 from .warnings import Warnings
 
+if TYPE_CHECKING:
+    import numpy as np
+
+    from gazebo_ros.model_plugin import PluginContext
+    from urdf_model import Robot
+
 PARAMETERS = "/baxter_sim_hardware/"
 QUEUE_DEPTH = 400  # messages between two ticks: 20 ms, the longest turn, of a client that writes at 20 kHz
 
@@ -41,13 +51,13 @@ class BaxterPlugin(ModelPlugin):
     keeps_step = True
 
     @classmethod
-    def spawn_options(cls, robot, element):
+    def spawn_options(cls, robot: Robot, element: Any) -> dict[str, Any]:
         # This is called outside the loop, which would stand still for the second that it takes.
         compiled.load()
         # The pedestal stands on the floor and stays there.
         return {"static": True, **spawn_options(robot.links)}
 
-    def __init__(self, context, before=None):
+    def __init__(self, context: PluginContext, before: State | None = None) -> None:
         """``before``: the robot_state.State of the plugin that this one replaces, or None."""
         super().__init__(context)
         try:
@@ -56,7 +66,7 @@ class BaxterPlugin(ModelPlugin):
             raise PluginError("model '%s' cannot be driven as a Baxter: %s" % (context.model.name, error)) from error
         self._open_topics(context)
 
-    def _build(self, context, before):
+    def _build(self, context: PluginContext, before: State | None) -> None:
         which = Which(self._parameter("profile", "sim"), self._parameter("effects", None),
                       self._parameter("serial", individual.DRAWING), self._parameter("disabled", "hold"))
         simulated = self._simulated = SimulatedBaxter(context.world, context.model, context.robot, which, before,
@@ -73,7 +83,7 @@ class BaxterPlugin(ModelPlugin):
         #: Called in the loop with (side, message, JointCommand or None where it was refused) for each joint command.
         self.command_observers = self._arms.command_observers
 
-    def _build_parts(self, context, simulated):
+    def _build_parts(self, context: PluginContext, simulated: SimulatedBaxter) -> None:
         baxter, limb_index = simulated.baxter, simulated.limb_index
         self._robot = RobotTopics(simulated, self._set_joint_state_rate, context, self._warnings,
                                   "states" in simulated.chosen)
@@ -91,10 +101,10 @@ class BaxterPlugin(ModelPlugin):
             self._procedures, senses, ScreenTopics(context),
             StatusTopics(baxter, limb_index, context.robot.links, context.urdf_xml, context.log))
 
-    def _parameter(self, name, default):
+    def _parameter(self, name: str, default: Any) -> Any:
         return self.context.param(PARAMETERS + name, default)
 
-    def _switch(self, name, default):
+    def _switch(self, name: str, default: bool) -> bool:
         """A parameter that is true or false. Another word in a launch file arrives as a non-empty string, which Python
         takes as true."""
         value = self._parameter(name, default)
@@ -102,7 +112,7 @@ class BaxterPlugin(ModelPlugin):
             raise PluginError("%s is %r; it must be true or false" % (name, value))
         return bool(value)
 
-    def _open_topics(self, context):
+    def _open_topics(self, context: PluginContext) -> None:
         """Open every row of the interface table; `sim/started` last: its subscribers find all others open."""
         parts = {type(part): part for part in self._parts}
         owners = {row.key: parts[part] for part in interface.PARTS for row in part.TOPICS}
@@ -132,22 +142,22 @@ class BaxterPlugin(ModelPlugin):
                     self._handling.add(subscription, order.index(row.key), row.key, component, function,
                                        row.key in interface.DELAYED)
 
-    def _delay_of(self, stream):
+    def _delay_of(self, stream: int) -> float:
         return self._delay.of(stream, self.context.world.tick)
 
-    def _set_joint_state_rate(self, hz):
+    def _set_joint_state_rate(self, hz: float) -> None:
         self._publishing.set_rate(interface.JOINT_STATE_RATE, hz)
 
     # -- the tick
 
-    def update(self, time_s, dt):
+    def update(self, time_s: float, dt: float) -> None:
         self._simulated.measure(time_s, self._missing(time_s))
         pending = self.context.pending()
         if pending or self._handling.waits:
             self._handling.handle(pending, time_s)
         self._simulated.update()
 
-    def _missing(self, time_s):
+    def _missing(self, time_s: float) -> float | None:
         """`Measured.missing_s`. Where several ticks follow each other at once, a command that comes during them is read
         after the last one: it is missing only if it is not there one read later, either."""
         reads = self.context.reads()
@@ -156,7 +166,7 @@ class BaxterPlugin(ModelPlugin):
         before_s, self._reads, self._read_s = self._read_s, reads, time_s
         return before_s if 1.5 * self._dt < time_s - before_s else time_s
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> None:
         self._procedures.update(time_s, self._feel_torques)
         self._update_lights(time_s)
         if self._publishing.publish(time_s) and not self._has_started:
@@ -164,26 +174,26 @@ class BaxterPlugin(ModelPlugin):
             self._has_started = True
             compiler_pages.release()
 
-    def _feel_torques(self, side):
+    def _feel_torques(self, side: str) -> np.ndarray:
         return self._simulated.feel(side, self._simulated.snapshot())[0]
 
     # -- when it has raised
 
-    def hold(self):
+    def hold(self) -> None:
         self._simulated.hold()
 
-    def restarted(self):
+    def restarted(self) -> BaxterPlugin:
         before = self._baxter.state.state
         return self.successor(State.DISABLED if before is State.FAILED else before)
 
-    def while_failed(self, time_s):
+    def while_failed(self, time_s: float) -> bool:
         self._simulated.before = self._simulated.model.read_joints()
         # Messages that arrive now are dropped; but a reset is what the failed robot waits for.
         keys = self._handling.drop(self.context.pending())
         self._publishing.publish(time_s)
         return "set_super_reset" in keys
 
-    def joints_set(self):
+    def joints_set(self) -> None:
         # Messages that have arrived by now are from before the joints were moved.
         self._simulated.measure_now()
         self._handling.handle(self.context.pending(), self.context.world.time_s)
@@ -192,7 +202,7 @@ class BaxterPlugin(ModelPlugin):
         self._simulated.put_elsewhere()
         self._robot.announce_reset()
 
-    def reset(self):
+    def reset(self) -> None:
         self.joints_set()
         self._simulated.guarding.reset()
         for part in self._parts:
@@ -201,21 +211,21 @@ class BaxterPlugin(ModelPlugin):
 
     # -- for other plugins of the model, and for tests
 
-    def read_joints(self):
+    def read_joints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(position, velocity, effort) of all joints as the robot's own sensors have them, in the model's order."""
         return self._simulated.snapshot().sensed
 
     @property
-    def is_enabled(self):
+    def is_enabled(self) -> bool:
         """Whether the arms obey commands."""
         return self._baxter.state.enabled
 
     @property
-    def held(self):
+    def held(self) -> dict[str, tuple[str, ...]]:
         """{side: names of the links that collision avoidance holds that arm away from now}, empty for a free arm."""
         return dict(self._simulated.guarding.held)
 
-    def start_over(self):
+    def start_over(self) -> None:
         """Disable the robot; release and clear stops; restore the start's speeds and time-outs. The joints stay where
         they are."""
         for event in (Event.ESTOP_RELEASE, Event.RESET):

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's control logic: arbitrates arm commands and defines the behaviour while disabled."""
+
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -9,6 +12,16 @@ from .arms.actuators import Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from baxter_model.description import LimbModel
+
+    from .arms.drives import Drives
+    from .arms.joint_command import JointCommand, JointLimits
+    from .arms.measured import Measured
+    from .robot_state import Event, State
 
 INERTIA_TICKS = 50  # the inertias of links about their joints change that slowly
 DISABLED_BEHAVIOURS = ("hold", "sink")
@@ -32,7 +45,8 @@ class Baxter:
     `Measured` that the caller updates before each tick, and before each event between two ticks.
     """
 
-    def __init__(self, limbs, limits, measured, dt=0.002, behaviour=Behaviour(), state=None):  # noqa: B008 (a tuple)
+    def __init__(self, limbs: Sequence[LimbModel], limits: JointLimits, measured: Measured, dt: float = 0.002,
+                 behaviour: Behaviour = Behaviour(), state: State | None = None) -> None:  # noqa: B008 (a tuple)
         profile, disabled, actuators = behaviour
         if profile not in SPEED_RATIO:
             raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
@@ -50,12 +64,12 @@ class Baxter:
         self._speed_ratio = SPEED_RATIO[profile]
         self._halted_until = {}  # {side: [s]}
 
-    def take_over(self):
+    def take_over(self) -> None:
         """Start with moving arms: forget every command, bring them to rest, and hold them."""
         self.arms.take_over()
         self.arms.stop()
 
-    def put_elsewhere(self):
+    def put_elsewhere(self) -> None:
         """The joints were put elsewhere: forget every command, and hold them there."""
         self.arms.reset()
         self._halted_until.clear()
@@ -63,7 +77,7 @@ class Baxter:
             self.actuators.forget()
             self._inertia_due = 0
 
-    def apply(self, event):
+    def apply(self, event: Event) -> None:
         """Take an enable, disable, stop, reset ... event. Raises CommandRefused if the state does not allow it."""
         was_enabled = self.state.enabled
         self.state.apply(event)
@@ -71,13 +85,13 @@ class Baxter:
             # Earlier commands are forgotten.
             self.arms.stop()
 
-    def restore_settings(self):
+    def restore_settings(self) -> None:
         """Speed ratios and command time-outs of all limbs as they were at the start."""
         for side in self.arms.sides:
             self.arms.set_speed_ratio(side, self._speed_ratio)
             self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
-    def command(self, side, mode, names, values):
+    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
         """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled, and while the
         limb stands after a collision."""
         self.state.require_enabled()
@@ -86,7 +100,7 @@ class Baxter:
                                  % (self._halted_until[side] - self.measured.time_s))
         return self.arms.command(side, mode, names, values)
 
-    def halt(self, side, seconds):
+    def halt(self, side: str, seconds: float) -> None:
         """One limb has collided: hold it where it is now, and refuse its commands for so long."""
         self.arms.hold_here(side)
         if self.actuators is not None:
@@ -94,16 +108,16 @@ class Baxter:
             self.actuators.hold(joints, self.measured.position[joints])
         self._halted_until[side] = self.measured.time_s + seconds
 
-    def halted(self, side):
+    def halted(self, side: str) -> bool:
         """Whether a limb stands because it has collided."""
         return self.measured.time_s < self._halted_until.get(side, -math.inf)
 
     @property
-    def moves_by_gravity(self):
+    def moves_by_gravity(self) -> bool:
         """Whether drives follow from the torque that balances gravity, so that `update` needs its present value."""
         return self.actuators is not None or self.arms.needs_gravity or (self._sinks and not self.state.enabled)
 
-    def update(self):
+    def update(self) -> Drives:
         """Drives of the arms for this tick; measured.gravity counts only where `moves_by_gravity`."""
         if self._sinks and not self.state.enabled:
             if self.actuators is not None:
@@ -112,7 +126,7 @@ class Baxter:
         drives = self.arms.update()
         return drives if self.actuators is None else self._through_actuators(drives)
 
-    def _through_actuators(self, drives):
+    def _through_actuators(self, drives: Drives) -> Drives:
         arms, measured, index = self.arms, self.measured, drives.position_driven
         driven, effort = np.zeros(len(measured.position), dtype=bool), np.zeros(len(measured.position))
         driven[index], effort[index] = True, drives.effort

@@ -5,6 +5,9 @@ The wire fields of each state follow the physical robot: `ready` is true while e
 unknown button and an unknown source, a released emergency stop stays stopped until it is reset, and a robot that
 failed is stopped with an error whose source is a fault.
 """
+
+from __future__ import annotations
+
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
@@ -128,28 +131,28 @@ REFUSALS = {
 class RobotState:
     """The table with a current row."""
 
-    def __init__(self, state=State.DISABLED):
+    def __init__(self, state: State = State.DISABLED) -> None:
         self.state = state
 
     @property
-    def enabled(self):
+    def enabled(self) -> bool:
         return self.state is State.ENABLED
 
     @property
-    def assembly(self):
+    def assembly(self) -> Assembly:
         """The AssemblyState fields that belong to the current state."""
         return ASSEMBLY[self.state]
 
-    def fail(self):
+    def fail(self) -> None:
         """The robot's own software has failed."""
         self.state = State.FAILED
 
-    def require_enabled(self):
+    def require_enabled(self) -> None:
         """Raises CommandRefused unless the robot is enabled."""
         if not self.enabled:
             raise CommandRefused(NOT_ENABLED)
 
-    def apply(self, event):
+    def apply(self, event: Event) -> None:
         """Take one event. Raises CommandRefused, which says what to do, if the state does not allow it."""
         refusal = REFUSALS.get((self.state, event))
         if refusal is not None:

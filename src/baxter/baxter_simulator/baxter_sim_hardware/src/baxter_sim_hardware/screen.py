@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The head's screen: pictures of any usual encoding, put into its upper left corner."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from urdf_model import Box
 
 from .errors import CommandRefused
+
+if TYPE_CHECKING:
+    from urdf_model import Robot
 
 WIDTH, HEIGHT = 1024, 600
 #: The link whose only shape is the glass, a thin box that looks along its z.
@@ -17,7 +25,7 @@ ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 
              "bgra8": (4, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0))}
 
 
-def on_glass(robot):
+def on_glass(robot: Robot) -> tuple[np.ndarray, tuple[float, float]] | None:
     """The picture's place on GLASS_LINK of a urdf_model.Robot: (pose (4, 4), x to the right and y up for a viewer;
     width and height [m]), as wide as the glass. None for a robot without one."""
     shapes = robot.links[GLASS_LINK].visuals if GLASS_LINK in robot.links else []
@@ -35,12 +43,12 @@ class Screen:
     def __init__(self):
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """A dark screen."""
         self.pixels = np.zeros((HEIGHT, WIDTH, 3), dtype=np.uint8)
         self.pictures = 0
 
-    def show(self, width, height, encoding, step, data):
+    def show(self, width: int, height: int, encoding: str, step: int, data: bytes) -> None:
         """Show a picture, dark around it; `step`: bytes per row. Raises CommandRefused and keeps the last picture."""
         if encoding not in ENCODINGS:
             raise CommandRefused("picture has encoding '%s'; choices are %s" % (encoding, ", ".join(ENCODINGS)))

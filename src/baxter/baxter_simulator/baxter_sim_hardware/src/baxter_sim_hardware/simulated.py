@@ -3,8 +3,11 @@
 
 `plugin.BaxterPlugin` runs it in /gazebo, behind topics; `baxter_lab` runs it without ROS.
 """
+
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,6 +33,13 @@ from .robot_state import Event
 from .sensing.noise import HandSensors
 from .snapshot import Snapshot
 
+if TYPE_CHECKING:
+    from bullet_sim import Model, World
+    from urdf_model import Robot
+
+    from .arms.safety import Felt
+    from .robot_state import State
+
 kernels.load()  # not within a tick
 
 
@@ -46,7 +56,7 @@ class Which(NamedTuple):
     disabled: str = "hold"
 
 
-def _never(side):
+def _never(side: str) -> bool:
     return False
 
 
@@ -64,8 +74,8 @@ class SimulatedBaxter:
     none since they were put where they are.
     """
 
-    def __init__(self, world, model, robot, which: Which = Which(), before=None,  # noqa: B008 (a tuple)
-                 is_squeezed: Callable = _never):
+    def __init__(self, world: World, model: Model, robot: Robot, which: Which = Which(),  # noqa: B008 (a tuple)
+                 before: State | None = None, is_squeezed: Callable[[str], bool] = _never) -> None:
         self.world, self.model, self._robot = world, model, robot
         limbs = limbs_of(robot)
         names = tuple(name for limb in limbs for name in limb.joint_names)
@@ -100,7 +110,7 @@ class SimulatedBaxter:
             self.measure_now()
             self.baxter.take_over()
 
-    def _hold_other_joints(self):
+    def _hold_other_joints(self) -> None:
         """Hold the head straight, the fingers open, and all other joints."""
         model, fingers = self.model, finger_openings(self._robot)
         if fingers:
@@ -109,11 +119,11 @@ class SimulatedBaxter:
         model.drive_position(others, model.read_joints()[0][others], model.max_effort[others])
         model.mark_start()
 
-    def _is_calibrated(self, side):
+    def _is_calibrated(self, side: str) -> bool:
         return "uncalibrated" not in self.chosen or bool(
             effects.row(self.numbers["uncalibrated"], "calibrated").get(side))
 
-    def _make_safe(self):
+    def _make_safe(self) -> None:
         model, robot, numbers = self.model, self._robot, self.numbers["safety"]
         surface = [effects.positive(numbers, number, "arm") for number in ("contact_stiffness", "contact_damping")]
         links = {side: [robot.joints[name].child for name in chain.joint_names] for side, chain in self.chains.items()}
@@ -208,7 +218,7 @@ class SimulatedBaxter:
         """The joints after a step."""
         return Snapshot(self.model, self.before, self.dt, self._sense, self._as_known)
 
-    def feel(self, side: str, snapshot) -> tuple[np.ndarray, np.ndarray]:
+    def feel(self, side: str, snapshot: Snapshot | Felt) -> tuple[np.ndarray, np.ndarray]:
         """External (torques (7,) [Nm], wrench (6,) [N, Nm] in `base`) on one arm's joints and on its tip."""
         index = self.limb_index[side]
         jacobian = self.chains[side].jacobian(snapshot.position[index])
@@ -217,23 +227,24 @@ class SimulatedBaxter:
 
     # -- inside
 
-    def _dynamics(self, velocity):
+    def _dynamics(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The function `dynamics` of `Measured`."""
         model, arm = self.model, self.arm_index
         position, velocities = model.read_joints()[0], np.zeros(len(model.joint_names))
         velocities[arm] = velocity
         return model.mass_matrix(position)[np.ix_(arm, arm)], model.inverse_dynamics(position, velocities)[arm]
 
-    def _as_known(self, efforts, position):
+    def _as_known(self, efforts: np.ndarray, position: np.ndarray) -> None:
         """Make efforts (n,), which balance all that the description has, those that the controllers know of."""
         if self._loads is not None:
             self._loads.correct(efforts, position, self._gravity_in_base)
 
-    def _gravity_in_base(self):
+    def _gravity_in_base(self) -> np.ndarray:
         to_base = self.model.link_pose(BASE_FRAME).matrix()[:3, :3].T
         return to_base @ np.array(self.world.gravity)
 
-    def _sense(self, position, velocity, effort):
+    def _sense(self, position: np.ndarray, velocity: np.ndarray,
+               effort: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The robot's readings of its joints, (n,) each, where they are as given."""
         arm, actuators = self.arm_index, self.baxter.actuators
         if actuators is not None:
@@ -245,7 +256,7 @@ class SimulatedBaxter:
                 self.world.tick, position[arm], velocity[arm], effort[arm])
         return position, velocity, effort
 
-    def _felt(self):
+    def _felt(self) -> np.ndarray:
         """(n,) [rad] where the arms' joints are, as their controllers have it."""
         position = self.model.read_joints()[0][self.arm_index]
         return position if self._sensors is None else self._sensors.felt(position)

@@ -1,6 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's joints after a physics step, for the messages."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+
+    from bullet_sim import Model
+
 
 class Snapshot:
     """The model's joints after a step; expensive values are computed once, and only on demand.
@@ -11,7 +22,9 @@ class Snapshot:
     description those that the robot's controllers know of.
     """
 
-    def __init__(self, model, before, dt, sense, correct):
+    def __init__(self, model: Model, before: tuple[np.ndarray, np.ndarray, np.ndarray] | None, dt: float,
+                 sense: Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]],
+                 correct: Callable[[np.ndarray, np.ndarray], None]) -> None:
         self.position, self.velocity, self.effort = model.read_joints()
         self.before = (self.position, self.velocity, self.effort) if before is None else before
         self._has_stepped = before is not None
@@ -20,14 +33,14 @@ class Snapshot:
         self._gravity = self._own_effort = self._sensed = None
 
     @property
-    def sensed(self):
+    def sensed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(position, velocity, effort) as the robot's own sensors have them, (n,) each."""
         if self._sensed is None:
             self._sensed = self._sense(self.position, self.velocity, self.effort)
         return self._sensed
 
     @property
-    def gravity(self):
+    def gravity(self) -> np.ndarray:
         """(n,) effort that balances gravity, as far as the robot knows it [Nm, N]."""
         if self._gravity is None:
             self._gravity = self._model.gravity_efforts(self.position)
@@ -35,7 +48,7 @@ class Snapshot:
         return self._gravity
 
     @property
-    def own_effort(self):
+    def own_effort(self) -> np.ndarray:
         """(n,) effort for the robot's own weight, motion and joint damping in the last step [Nm, N]; the rest of the
         effort acts on touched bodies."""
         if self._own_effort is None and not self._has_stepped:

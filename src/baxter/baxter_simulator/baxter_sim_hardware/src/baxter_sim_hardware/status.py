@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's status: levels of its diagnostics, checks of its description."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from .errors import CommandRefused
 from .robot_state import State
 
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
 OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus
 
 
-def level_of(state):
+def level_of(state: State) -> tuple[int, str]:
     """(level, text) of a robot_state.State: a stopped robot needs a person."""
     return (OK if state in (State.ENABLED, State.DISABLED) else ERROR), state.value
 
 
-def check_fragment(link, joint, xml, links):
+def check_fragment(link: str, joint: str, xml: str, links: Collection[str]) -> None:
     """Raises CommandRefused unless `xml` is a robot description and `link` one of the robot's links."""
     if link not in links:
         raise CommandRefused("urdf fragment for link '%s'; it must name one of the robot's links" % link)

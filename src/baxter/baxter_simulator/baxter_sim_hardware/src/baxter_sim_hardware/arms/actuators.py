@@ -20,13 +20,19 @@ all of `effort_hysteresis` is added to it, in that direction.
 A bare wrist is so light that its spring would shake it at the length of a tick. So the spring's torque is that of the
 tick's end, where a link of the given inertia will be (linearly implicit Euler).
 """
+
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from baxter_sim_hardware import effects
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
@@ -67,7 +73,7 @@ class Actuators:
     rows: {number: {joint: value}} as `effects.read` has them for "lag"; names: of the joints. Raises HardwareError.
     """
 
-    def __init__(self, rows, names):
+    def __init__(self, rows: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> None:
         self._numbers = np.array([effects.per_joint(rows, number, names) for number in NUMBERS])
         for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6),
                               ("motor_speed", 0.1)):
@@ -81,16 +87,16 @@ class Actuators:
         self._state = np.zeros((7, len(names)))
         self._begun = np.zeros(len(names), dtype=bool)
 
-    def forget(self):
+    def forget(self) -> None:
         """The joints were put elsewhere: begin where they are."""
         self._begun[:] = False
         self._state[5] = 0.0
 
-    def hold(self, joints, position):
+    def hold(self, joints: np.ndarray, position: np.ndarray) -> None:
         """Forget what the set-points of `joints` were: they are at position (k,) [rad]."""
         self._state[2, joints] = position
 
-    def torques(self, wanted, links, dt):
+    def torques(self, wanted: Wanted, links: np.ndarray, dt: float) -> np.ndarray:
         """(n,) [Nm] what drives the links in this tick, the counterbalance among it; 0 for joints that are not driven.
 
         links: (3, n), their angles [rad], speeds [rad/s], and inertias about their joints, at least [kg m^2]; dt [s]. A
@@ -98,49 +104,50 @@ class Actuators:
         """
         return turn(self._state, self._begun, self._numbers, wanted, links, dt)
 
-    def counterbalance(self, position):
+    def counterbalance(self, position: np.ndarray) -> np.ndarray:
         """(n,) [Nm] what springs beside the actuators take off them at `position` (n,) [rad]."""
         return self.known_counterbalance(position) * (1.0 + self._numbers[_EXCESS])
 
-    def known_counterbalance(self, position):
+    def known_counterbalance(self, position: np.ndarray) -> np.ndarray:
         """(n,) [Nm] the same as the controllers know it."""
         return self._numbers[_OFFSET] + self._numbers[_STIFFNESS] * position
 
-    def bounded(self, torque, position, joints):
+    def bounded(self, torque: np.ndarray, position: np.ndarray, joints: np.ndarray) -> np.ndarray:
         """(k,) [Nm] what the motors of `joints`, with what springs beside them carry, can do of `torque` (k,) at
         position (n,) [rad]."""
         carried, limit = self.counterbalance(position)[joints], self._numbers[_LIMIT][joints]
         return np.minimum(np.maximum(torque, -limit - carried), limit - carried)
 
     @property
-    def limit(self):
+    def limit(self) -> np.ndarray:
         """(n,) [Nm] of the motors' torque."""
         return self._numbers[_LIMIT]
 
     @property
-    def free_speed(self):
+    def free_speed(self) -> np.ndarray:
         """(n,) [rad/s] of motors without load."""
         return FREE_SPEED * self._numbers[_SPEED]
 
     @property
-    def hysteresis_share(self):
+    def hysteresis_share(self) -> np.ndarray:
         """(n,) -1 to 1, how much of its hysteresis a joint's effort has now, and in which direction."""
         return self._state[5]
 
     @property
-    def hysteresis(self):
+    def hysteresis(self) -> np.ndarray:
         """(n,) [Nm] what hysteresis adds to the efforts that are told."""
         return self._numbers[_HYSTERESIS] * self._state[5]
 
     @property
-    def added(self):
+    def added(self) -> np.ndarray:
         """(n,) [Nm] what the controllers asked for beside the known load in the last tick; 0 for joints that are not
         driven."""
         return self._state[6]
 
 
 @_compiled
-def turn(state, begun, numbers, wanted, links, dt):
+def turn(state: np.ndarray, begun: np.ndarray, numbers: np.ndarray, wanted: Wanted, links: np.ndarray,
+         dt: float) -> np.ndarray:
     motor, speed, filtered, integral, last = state[0], state[1], state[2], state[3], state[4]
     torques = np.zeros(links.shape[1])
     share, added = state[5], state[6]

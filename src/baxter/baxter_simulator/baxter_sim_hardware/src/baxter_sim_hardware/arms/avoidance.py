@@ -7,6 +7,9 @@ ball, all joints of the arm are slowed, so that the approach speed is at most pr
 free. With the effect `safety` the capsules of the other arm, and blocks in place of the torso and its pedestal, are
 approached in the same way.
 """
+
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -56,7 +59,7 @@ class Field(NamedTuple):
 FREE = Field((), 1.0)
 
 
-def field(guards, rotations, origins, rates):
+def field(guards: Guards, rotations: np.ndarray, origins: np.ndarray, rates: np.ndarray) -> Field:
     """The `Field` of an arm.
 
     rotations (n + 1, 3, 3), origins (n + 1, 3): frames in base of its joints, whose z are the axes, and of the tip;
@@ -98,7 +101,8 @@ def _distances(centres, radii, rotations, origins, rates):
     return distances, distances.min(), slowing
 
 
-def between(own, other, rates, apart, closing_s):
+def between(own: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray], rates: np.ndarray, apart: float,
+            closing_s: float) -> tuple[np.ndarray, float]:
     """How one arm is kept away from the other.
 
     own, other: (rotations (n + 1, 3, 3), origins (n + 1, 3)) as for `field`; rates (n,): the speeds at which its own
@@ -142,7 +146,8 @@ def _share(rotations, origins, rates, link, near, away, distance):
     return allowed / closing if closing > allowed else 1.0
 
 
-def around(blocks, own, rates, apart, closing_s):
+def around(blocks: Blocks, own: tuple[np.ndarray, np.ndarray], rates: np.ndarray, apart: float,
+           closing_s: float) -> tuple[np.ndarray, float]:
     """How one arm is kept away from the body.
 
     blocks: `Blocks`; own, rates, apart, closing_s: as for `between`. Returns ((k,) distance that is left to each block

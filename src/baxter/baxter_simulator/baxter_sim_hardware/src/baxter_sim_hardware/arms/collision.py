@@ -6,8 +6,18 @@ drives push with a fraction of their effort, in the modes in which the physical 
 velocity). Detection concerns everything: an arm is in a collision when the torques on its joints exceed those of its
 own weight and motion, or the load on its hand exceeds its limit.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_model import JOINTS, is_part_of_arm
 from baxter_model.self_collision import BODY
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy as np
 
 SUPPRESSION_S = 0.6  # [simulated s] validity of one suppress message, as on the physical robot
 AVOIDANCE, BODY_AVOIDANCE = "suppress_collision_avoidance", "suppress_body_avoidance"
@@ -35,7 +45,7 @@ class Held:
     def __init__(self):
         self._since = None
 
-    def look(self, time_s, share):
+    def look(self, time_s: float, share: float) -> bool:
         """Whether the arm is held at time_s [s]; share: of its speed that it may keep, 0 to 1."""
         if share >= HELD_SHARE:
             self._since = None
@@ -50,18 +60,18 @@ class Suppressions:
     def __init__(self):
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         self._until = {}
 
-    def take(self, kind, time_s):
+    def take(self, kind: str, time_s: float) -> None:
         """A message of SUPPRESSIONS' `kind` came at time_s [s]."""
         self._until[kind] = time_s + SUPPRESSION_S
 
-    def active(self, kind, time_s):
+    def active(self, kind: str, time_s: float) -> bool:
         return time_s < self._until.get(kind, 0.0)
 
 
-def touched(contacts, side):
+def touched(contacts: Iterable[tuple[str, str]], side: str) -> tuple[list[str], bool]:
     """(links that one arm touches, whether the other arm is among them), from contacts within the robot.
 
     contacts: iterable of (link, other link), each one that overlaps or presses.
@@ -76,11 +86,11 @@ def touched(contacts, side):
     return sorted(links), any(link != BODY and not is_part_of_arm(link, side) for link in links)
 
 
-def is_squeezed(torques):
+def is_squeezed(torques: np.ndarray) -> bool:
     """Whether (7,) torques from outside [Nm], torso to wrist, are more than occur in free motion."""
     return any(abs(torque) > bound for torque, bound in zip(torques, SQUISH_NM.values(), strict=True))
 
 
-def is_overloaded(wrench):
+def is_overloaded(wrench: np.ndarray) -> bool:
     """Whether (6,) force [N] and torque [Nm] at the tip exceed the limits of a hand."""
     return bool(sum(wrench[:3] ** 2) > HAND_FORCE_N ** 2 or sum(wrench[3:] ** 2) > HAND_TORQUE_NM ** 2)

@@ -22,7 +22,11 @@ other joints continue with their last command; a command in another mode makes t
 A set-point never runs away from its joint: while a joint is pushed or blocked, its set-point stays near, so the arm
 returns at the speed of its mode, without a jump.
 """
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -46,6 +50,14 @@ from .setpoint import (
 )
 from .stopping import hardest_stop
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from baxter_model.description import LimbModel
+
+    from .joint_command import JointCommand, JointLimits
+    from .measured import Measured
+
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
 
@@ -68,7 +80,7 @@ SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanish
 class _Limb:
     """The state of one arm that is separate from the other's."""
 
-    def __init__(self, model, limits):
+    def __init__(self, model: LimbModel, limits: JointLimits) -> None:
         self.parser = CommandParser(limits, model.joint_names)
         self.index = np.array([limits.names.index(name) for name in model.joint_names])
         self.joints = np.zeros(len(limits.names), dtype=bool)  # the same as a mask
@@ -89,7 +101,8 @@ class Arms:
     load, or None for ideal drives, which a set-point leads by REACH_RAD at most.
     """
 
-    def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002, free_speed=None):
+    def __init__(self, limbs: Sequence[LimbModel], limits: JointLimits, measured: Measured, speed_ratio: float = 1.0,
+                 dt: float = 0.002, free_speed: np.ndarray | None = None) -> None:
         self.limits = limits
         is_ideal = free_speed is None
         stream_speed = limits.velocity if is_ideal else free_speed
@@ -111,7 +124,7 @@ class Arms:
         self._is_settled = False  # every set-point rests on its target, until the next command or push
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget every command and hold the measured position: after a reset of the world, or a teleport."""
         everything = np.ones(len(self._all), dtype=bool)
         for limb in self._limbs.values():
@@ -125,98 +138,98 @@ class Arms:
         self._stream.reset()
         self._refresh_speed()
 
-    def take_over(self):
+    def take_over(self) -> None:
         """Forget every command, and put the set-points at the joints' positions and velocities."""
         self.reset()
         self._follow_joint(np.ones(len(self._all), dtype=bool))
         self._is_settled = False
 
     @property
-    def sides(self):
+    def sides(self) -> tuple[str, ...]:
         return tuple(self._limbs)
 
     @property
-    def dt(self):
+    def dt(self) -> float:
         """Length of a tick [s]."""
         return self._dt
 
-    def joints_of(self, side):
+    def joints_of(self, side: str) -> np.ndarray:
         """(k,) indices of one limb's joints, torso to wrist."""
         return self._limbs[side].index
 
-    def modes(self, side):
+    def modes(self, side: str) -> np.ndarray:
         """(k,) the Mode values that one limb's joints are in."""
         return self._modes.mode[self._limbs[side].index]
 
     @property
-    def in_torque(self):
+    def in_torque(self) -> bool:
         """Whether any joint is in torque mode."""
         return self._modes.any_in_torque
 
     @property
-    def needs_gravity(self):
+    def needs_gravity(self) -> bool:
         """Whether drives follow from the torque that balances gravity."""
         return self._modes.any_in_torque or self._efforts.any_yields
 
     @property
-    def in_position_mode(self):
+    def in_position_mode(self) -> np.ndarray:
         """(n,) bool, whether the joints are in position mode."""
         return self._modes.mode == POSITION
 
     @property
-    def said_velocity(self):
+    def said_velocity(self) -> np.ndarray:
         """(n,) [rad/s] the feed-forward velocities of joints that follow a stream of raw set-points, else 0."""
         if not self._points.streams.any():
             return self._still
         return np.where(self._points.streams, self._stream.said_velocity(self._measured.time_s), 0.0)
 
     @property
-    def known_gravity(self):
+    def known_gravity(self) -> np.ndarray:
         """(n,) [Nm] the torque that balances gravity, as far as compensation is not suppressed."""
         return self._efforts.balanced * self._measured.gravity
 
     @property
-    def commanded_position(self):
+    def commanded_position(self) -> np.ndarray:
         """(n,) [rad] where the set-points are now."""
         return self._points.output
 
     @property
-    def commanded_velocity(self):
+    def commanded_velocity(self) -> np.ndarray:
         """(n,) [rad/s] how fast the set-points move now."""
         return self._points.output_rate
 
     @property
-    def commanded_acceleration(self):
+    def commanded_acceleration(self) -> np.ndarray:
         """(n,) [rad/s^2] how fast that changes."""
         return self._points.output_change
 
     @property
-    def commanded_torque(self):
+    def commanded_torque(self) -> np.ndarray:
         """(n,) [Nm] what torque mode adds to gravity; zero for joints in other modes."""
         return np.where(self._modes.in_torque, self._modes.value, 0.0)
 
     # -- settings and commands of clients
 
-    def set_speed_ratio(self, side, ratio):
+    def set_speed_ratio(self, side: str, ratio: float) -> None:
         """Scale POSITION mode's speed; clipped to 0..1. Raises CommandRefused for NaN."""
         if np.isnan(ratio):
             raise CommandRefused("speed ratio is nan; it must be a number from 0 to 1")
         self._speeds.ratio[self._limbs[side].index] = min(max(float(ratio), 0.0), 1.0)
         self._refresh_speed()
 
-    def speed_ratio(self, side):
+    def speed_ratio(self, side: str) -> float:
         return float(self._speeds.ratio[self._limbs[side].index[0]])
 
-    def set_timeout(self, side, seconds):
+    def set_timeout(self, side: str, seconds: float) -> None:
         """How old a streamed command may get [s]. Raises CommandRefused unless it is a positive number."""
         if not seconds > 0.0:
             raise CommandRefused("joint command time-out is %s s; it must be greater than 0" % seconds)
         self._limbs[side].timeout_s = float(seconds)
 
-    def timeout(self, side):
+    def timeout(self, side: str) -> float:
         return self._limbs[side].timeout_s
 
-    def command(self, side, mode, names, values):
+    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
         """Take one JointCommand message; returns the checked JointCommand.
 
         Raises CommandRefused, in which case nothing has changed.
@@ -261,17 +274,17 @@ class Arms:
         self._refresh_speed()
         return command
 
-    def _expire_later(self, command, limb):
+    def _expire_later(self, command: JointCommand, limb: _Limb) -> None:
         self._modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
 
-    def set_yielding(self, side, yields):
+    def set_yielding(self, side: str, yields: bool) -> None:
         """Whether a limb, in position and velocity mode, pushes with a fraction of its effort limits only."""
         limb = self._limbs[side]
         if yields != limb.yields:
             limb.yields = yields
             self._efforts.set_yielding(limb.index, yields)
 
-    def wanted_rates(self, side):
+    def wanted_rates(self, side: str) -> np.ndarray:
         """(k,) [rad/s] the speeds at which one limb's joints would move if nothing slowed them.
 
         0 for joints in modes without collision avoidance.
@@ -280,21 +293,21 @@ class Arms:
         return approach_rates(self._limbs[side].index, points.target, points.position, points.acceleration,
                               self._speeds.nominal, self._modes.is_governed)
 
-    def set_slowing(self, side, share):
+    def set_slowing(self, side: str, share: float) -> None:
         """Set the share of the speed, 0 to 1, that a limb's set-points may have in position and velocity mode."""
         index = self._limbs[side].index
         if share != self._speeds.slowing[index[0]]:
             self._speeds.slowing[index] = share
             self._refresh_speed()
 
-    def set_gravity_compensation(self, side, on):
+    def set_gravity_compensation(self, side: str, on: bool) -> None:
         """Whether a limb's torque mode adds the torque that balances gravity."""
         limb = self._limbs[side]
         if on != limb.balanced:
             limb.balanced = on
             self._efforts.balanced[limb.index] = float(on)
 
-    def set_floating(self, side, floats):
+    def set_floating(self, side: str, floats: bool) -> None:
         """Make a limb float without resistance, or hold its present position. It takes no commands while it floats."""
         limb = self._limbs[side]
         if floats == limb.floats:
@@ -307,10 +320,10 @@ class Arms:
         else:
             self._hold(limb.joints)
 
-    def floats(self, side):
+    def floats(self, side: str) -> bool:
         return self._limbs[side].floats
 
-    def feed_forward(self, side, velocities):
+    def feed_forward(self, side: str, velocities: np.ndarray) -> None:
         """Take the velocities (7,) [rad/s] that belong to the raw set-points of this moment.
 
         A stream of set-points is then followed without the lag of one command. Raises CommandRefused unless there is
@@ -322,18 +335,18 @@ class Arms:
                                  % (list(velocities), len(index)))
         self._stream.feed_forward(index, velocities, self._measured.time_s)
 
-    def stop_limb(self, side):
+    def stop_limb(self, side: str) -> None:
         """Stop one limb's joints and hold them where they come to rest."""
         limb = self._limbs[side]
         limb.mode = Mode.POSITION
         self._hold(limb.joints)
 
-    def hold_here(self, side):
+    def hold_here(self, side: str) -> None:
         """Stop one limb's joints and hold them where they are, wherever their set-points were."""
         self._follow_joint(self._limbs[side].joints)
         self.stop_limb(side)
 
-    def stop(self):
+    def stop(self) -> None:
         """Stop every joint as hard as its torques allow, and hold it where it comes to rest."""
         self._follow_joint(self._modes.in_torque)
         stopping = self.stopping()
@@ -342,7 +355,7 @@ class Arms:
             limb.floats = False
         self._hold(np.ones(len(self._all), dtype=bool), stopping)
 
-    def stopping(self):
+    def stopping(self) -> np.ndarray:
         """(n,) [rad/s^2] deceleration of the set-points in a stop from their present velocities: see `stopping`."""
         points = self._points
         found = np.zeros(len(self._all))
@@ -356,7 +369,7 @@ class Arms:
 
     # -- one tick
 
-    def update(self):
+    def update(self) -> Drives:
         """Return the Drives for this tick, from the measured joints."""
         measured, points = self._measured, self._points
         if self._is_settled:
@@ -379,7 +392,7 @@ class Arms:
         return Drives(driven, points.output[driven], points.output_rate[driven], bound[driven],
                       pushed, *self._torque_drive(pushed))
 
-    def sink(self):
+    def sink(self) -> Drives:
         """Return the Drives for a tick without power: each joint sinks slowly, like a light body in a thick medium.
 
         The drive pushes with no more than the weight itself.
@@ -394,7 +407,7 @@ class Arms:
 
     # -- inside
 
-    def _torque_drive(self, joints):
+    def _torque_drive(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Command plus the torque that balances gravity, as (velocity [rad/s], effort [Nm]), both (k,), with a bounded
         speed.
 
@@ -412,7 +425,7 @@ class Arms:
         effort = np.where(at_limit, np.inf, np.abs(total))
         return np.copysign(limit, direction), np.minimum(effort, self.limits.effort[joints])
 
-    def _move_set_points(self):
+    def _move_set_points(self) -> bool:
         """One tick of the set-points; returns whether any leads its joint by more than it may."""
         points, smoothing = self._points, self._smoothing
         rests, braked, leads = follow(points.numbers, points.flags, smoothing.window, smoothing.oldest,
@@ -430,7 +443,7 @@ class Arms:
             self._modes.settle()
         return leads
 
-    def _keep_within_reach(self):
+    def _keep_within_reach(self) -> None:
         points, measured = self._points, self._measured
         # The joints have not made this tick's step yet.
         lead = points.output - points.output_rate * self._dt - measured.position
@@ -446,12 +459,12 @@ class Arms:
         slipped = far & points.braking
         points.target[slipped] = self._resting_point()[slipped]
 
-    def _resting_point(self):
+    def _resting_point(self) -> np.ndarray:
         """(n,) [rad] where the set-points come to rest if they brake now."""
         points = self._points
         return self._clamped(stopping_point(points.position, points.velocity, points.stopping))
 
-    def _hold(self, joints, stopping=None):
+    def _hold(self, joints: np.ndarray, stopping: np.ndarray | None = None) -> None:
         """Stop the joints in the mask and keep them where they come to rest; stopping: (n,) [rad/s^2]."""
         if not _any(joints):
             return
@@ -467,7 +480,7 @@ class Arms:
         points.braking |= joints
         self._refresh_speed()
 
-    def _follow_joint(self, joints):
+    def _follow_joint(self, joints: np.ndarray) -> None:
         """Put the set-points of torque-driven joints at the joints' positions, so that a mode change causes no jump."""
         if joints.any():
             points, measured = self._points, self._measured
@@ -475,27 +488,27 @@ class Arms:
             points.velocity[joints] = points.output_rate[joints] = measured.velocity[joints]
             self._smoothing.restart(joints, measured.position[joints])
 
-    def _move_in_step(self, command):
+    def _move_in_step(self, command: JointCommand) -> None:
         """Make the joints of a POSITION command arrive together."""
         if shares_in_step(command.index, command.values, self._points.position, self._speeds.numbers, MIN_SHARE):
             self._refresh_speed()
 
-    def _set_mode(self, joints, mode):
+    def _set_mode(self, joints: np.ndarray, mode: Mode) -> None:
         self._is_settled = False
         self._speeds.share[joints] = 1.0
         self._modes.set(joints, mode)
         self._points.streams[:] = self._modes.mode == RAW_POSITION
         self._points.braking &= ~joints
 
-    def _clamped(self, position):
+    def _clamped(self, position: np.ndarray) -> np.ndarray:
         return np.clip(position, self.limits.lower, self.limits.upper)
 
-    def _refresh_speed(self):
+    def _refresh_speed(self) -> None:
         """Cruising speed of each joint's set-point [rad/s], by mode."""
         points, modes = self._points, self._modes
         cruising_speeds(self._speeds.numbers, modes.mode, points.braking, modes.value, points.speed)
 
 
-def _any(mask):
+def _any(mask: np.ndarray) -> bool:
     """Whether any of ``mask``, (n,) bool, is set. numpy's own takes six times as long, and each command asks."""
     return b"\x01" in mask.tobytes()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How hard the joints' drives may push, and how far a set-point may lead its joint."""
+
+from __future__ import annotations
+
 import numpy as np
 
 from .joint_modes import RAW_POSITION
@@ -19,18 +22,18 @@ class EffortBounds:
     Attribute `balanced`: (n,) 1 where torque mode adds the torque that balances gravity, 0 where not.
     """
 
-    def __init__(self, limit):
+    def __init__(self, limit: np.ndarray) -> None:
         self._limit = limit
         self.balanced = np.ones(len(limit))
         self._yielding = np.zeros(len(limit), dtype=bool)
         self.any_yields = False
 
-    def set_yielding(self, index, yields):
+    def set_yielding(self, index: np.ndarray, yields: bool) -> None:
         """Whether joints `index`, in all modes but raw position, push with no more than YIELD_FACTOR of the limits."""
         self._yielding[index] = yields
         self.any_yields = bool(self._yielding.any())
 
-    def bound(self, gravity, mode):
+    def bound(self, gravity: np.ndarray, mode: np.ndarray) -> np.ndarray:
         """(n,) [Nm] largest effort of the drives; gravity: (n,) [Nm] the part that carries the weight; mode: (n,)."""
         if not self.any_yields:
             return self._limit

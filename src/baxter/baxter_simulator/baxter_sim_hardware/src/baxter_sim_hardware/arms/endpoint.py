@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Velocities and wrench of an arm's end point."""
+
+from __future__ import annotations
+
 import numpy as np
 
 # Added to the diagonal of J J^T: keeps the wrench finite where the arm is singular and changes it by less than 1e-4
@@ -10,12 +13,12 @@ _DAMPING = 1e-6
 SINGULARITY_DAMPING = 0.02
 
 
-def twist(jacobian, velocity):
+def twist(jacobian: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """(6,) linear [m/s] and angular [rad/s] velocity of the tip in base, from (6, k) Jacobian and (k,) joint speeds."""
     return jacobian @ velocity
 
 
-def joint_velocities(jacobian, tip_twist):
+def joint_velocities(jacobian: np.ndarray, tip_twist: np.ndarray) -> np.ndarray:
     """(k,) [rad/s] that move the tip at (6,) twist [m/s, rad/s], approximately near singularities, so that no joint
     gets too fast.
 
@@ -26,7 +29,7 @@ def joint_velocities(jacobian, tip_twist):
     return jacobian.T @ np.linalg.solve(gram, tip_twist)
 
 
-def contact_wrench(jacobian, effort, gravity):
+def contact_wrench(jacobian: np.ndarray, effort: np.ndarray, gravity: np.ndarray) -> np.ndarray:
     """(6,) external force [N] and torque [Nm] on the tip, in base, at the tip.
 
     jacobian: (6, k), linear rows first; effort: (k,) [Nm] what the drives apply; gravity: (k,) [Nm] what balances

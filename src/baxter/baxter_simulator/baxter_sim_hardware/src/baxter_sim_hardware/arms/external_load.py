@@ -3,7 +3,17 @@
 
 A blow changes the speed of an arm in one tick, between two looks at it. A mean since the last look does not miss it.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from bullet_sim import Model
 
 
 class ExternalLoad:
@@ -13,16 +23,16 @@ class ExternalLoad:
     Attribute `position`: (n,) [rad, m] where the joints were in the middle of the ticks, once there was a `mean`.
     """
 
-    def __init__(self, model, correct, dt):
+    def __init__(self, model: Model, correct: Callable[[np.ndarray, np.ndarray], None], dt: float) -> None:
         self._model, self._correct, self._dt = model, correct, dt
         self._lower, self._upper = model.lower, model.upper
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """The joints were put elsewhere: begin again."""
         self._ticks, self._begin = 0, None
 
-    def note(self, joints):
+    def note(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick has ended; joints: (position, velocity, effort) of the model, (n,) each."""
         if self._begin is None:
             self._begin = joints
@@ -32,7 +42,7 @@ class ExternalLoad:
         self._end = joints
         self._ticks += 1
 
-    def mean(self):
+    def mean(self) -> tuple[np.ndarray, np.ndarray] | None:
         """((n,) efforts that were exerted, (n,) those for the robot's own weight and motion) since the last call
         [Nm, N], or None if no tick has ended since. At the end of its way a joint is held from outside: nothing is told
         of it."""

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How arms yield, slow down, float, stop or fall by what they touch and come near to, and what clients suppress."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from baxter_model import SIDES
@@ -10,15 +15,24 @@ from sim_time.pace import Schedule
 
 from . import avoidance, collision, safety
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    from arm_kinematics import Chain
+    from baxter_sim_hardware.robot import Baxter
+    from baxter_sim_hardware.snapshot import Snapshot
+    from bullet_sim import Model, World
+    from urdf_model import Robot
+
 CHECK_RATE_HZ = 100.0  # rate of the checks of contacts and suppressions
 
 
-def _near(field):
+def _near(field: avoidance.Field) -> list[str]:
     """Names of the links that one arm is near to; field: `avoidance.Field`."""
     return sorted({*field.near, *field.other, *field.body})
 
 
-def guards_of(robot):
+def guards_of(robot: Robot) -> avoidance.Guards:
     """`avoidance.Guards` of an urdf_model.Robot."""
     balls = avoided_balls(robot)
     return avoidance.Guards(tuple(name for name, _, _ in balls),
@@ -35,7 +49,9 @@ class Guarding:
     kind, text) for the log; `held`: {side: names of the links that avoidance holds that arm away from now}.
     """
 
-    def __init__(self, world, model, baxter, chains, guards, feel, is_squeezed):
+    def __init__(self, world: World, model: Model, baxter: Baxter, chains: Mapping[str, Chain],
+                 guards: avoidance.Guards, feel: Callable[[str, Snapshot | safety.Felt], tuple[np.ndarray, np.ndarray]],
+                 is_squeezed: Callable[[str], bool]) -> None:
         self._world, self._model, self._baxter, self._arms = world, model, baxter, baxter.arms
         self._chains, self._guards = chains, guards
         self.fields = dict.fromkeys(SIDES, avoidance.FREE)
@@ -46,7 +62,7 @@ class Guarding:
         self._schedule = Schedule(CHECK_RATE_HZ)
         self.safety, self.warn = None, None
 
-    def forget(self):
+    def forget(self) -> None:
         """The joints were put elsewhere."""
         if self.safety is not None:
             self.safety.forget()
@@ -56,7 +72,7 @@ class Guarding:
         for suppressions in self.suppressions.values():
             suppressions.reset()
 
-    def update(self, time_s, enabled, joints):
+    def update(self, time_s: float, enabled: bool, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """Before a step: let the arms yield, float, stop or fall, depending on contacts, loads, cuffs and messages.
 
         joints: (position, velocity, effort) of the whole model.
@@ -85,7 +101,7 @@ class Guarding:
             for side in self.suppressions:
                 self._stop_if_it_collides(side, time_s, felt, enabled)
 
-    def _find_frames(self):
+    def _find_frames(self) -> None:
         """Where the arms are, and with safety also where they are commanded to be: {side: frames of joints} each."""
         postures = [self._baxter.measured.position]
         if self.safety is not None:
@@ -93,7 +109,7 @@ class Guarding:
         self._frames = [{side: chain.joint_frames(posture[self._arms.joints_of(side)])
                          for side, chain in self._chains.items()} for posture in postures]
 
-    def _stop_if_it_collides(self, side, time_s, felt, enabled):
+    def _stop_if_it_collides(self, side: str, time_s: float, felt: safety.Felt, enabled: bool) -> None:
         why = safety.reason(*self._feel(side, felt), lambda kind: self.suppressions[side].active(kind, time_s))
         self.safety.collides[side] = bool(why)
         if why and enabled and not self._arms.floats(side) and not self._baxter.halted(side):
@@ -101,7 +117,7 @@ class Guarding:
             self.warn(time_s, (side, "collision"), "%s limb stops, a collision: %s. It takes commands again in %g s" % (
                 side, why, self.safety.hold_s))
 
-    def _field(self, side, time_s):
+    def _field(self, side: str, time_s: float) -> avoidance.Field:
         active, rates = self.suppressions[side].active, self._arms.wanted_rates(side)
         if active(collision.AVOIDANCE, time_s):
             return avoidance.FREE
@@ -112,7 +128,7 @@ class Guarding:
                 found = self.safety.around(found, side, self._frames, rates)
         return found if self.safety is None else self.safety.between(found, side, self._frames, rates)
 
-    def too_near(self):
+    def too_near(self) -> str:
         """Which arms are in the field around the head, so that a physical robot could not be enabled; "" for none."""
         self._find_frames()
         near = ["the %s arm (%s)" % (side, ", ".join(field.near)) for side in SIDES
@@ -122,12 +138,12 @@ class Guarding:
         return "in the field of collision avoidance: %s; unfold the arms by %s, which suppresses it" % (
             " and ".join(near), UNFOLD)
 
-    def _contacts(self):
+    def _contacts(self) -> list[tuple[str, str]]:
         """[(link, link)] of the robot's own contacts that overlap or press."""
         return [(contact.link_a, contact.link_b) for contact in self._world.contacts(self._model, self._model)
                 if contact.distance <= 0.0 or contact.force > 0.0]
 
-    def _touched(self, contacts, side, time_s):
+    def _touched(self, contacts: Iterable[tuple[str, str]], side: str, time_s: float) -> tuple[list[str], bool]:
         suppressions = self.suppressions[side]
         if suppressions.active(collision.AVOIDANCE, time_s):
             contacts = []
@@ -135,13 +151,13 @@ class Guarding:
             contacts = [pair for pair in contacts if BODY not in pair]
         return collision.touched(contacts, side)
 
-    def near(self, side: str, time_s: float) -> tuple[list, bool]:
+    def near(self, side: str, time_s: float) -> tuple[list[str], bool]:
         """(names of the links that one arm touches or is near to, whether the other arm is among them)."""
         links, other_arm = self._touched(self._contacts(), side, time_s)
         field = self.fields[side]
         return sorted({*links, *_near(field)}), other_arm or bool(field.other)
 
-    def collides(self, side: str, time_s: float, snapshot) -> bool:
+    def collides(self, side: str, time_s: float, snapshot: Snapshot) -> bool:
         """Whether one arm is in a collision; snapshot: `snapshot.Snapshot`."""
         if self.safety is not None:
             return self.safety.collides[side] or self._baxter.halted(side)

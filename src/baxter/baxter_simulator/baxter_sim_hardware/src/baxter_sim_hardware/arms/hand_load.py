@@ -4,7 +4,10 @@
 Gravity compensation computes with a model of the robot. The vendor's grippers are in it, a client's tool is not until
 EndEffectorCommand `configure` says what it weighs.
 """
-from typing import NamedTuple
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +16,12 @@ from baxter_model.description import cup_of, openings_of
 from baxter_sim_hardware.errors import CommandRefused
 from urdf_model import merge_fixed
 from urdf_model.merge import combine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from arm_kinematics import Chain
+    from urdf_model import Robot
 
 # Bounds of what a client may say: ten times the payload of an arm, the length of an arm.
 MAX_KG, FARTHEST_M = 25.0, 1.0
@@ -29,7 +38,7 @@ class HandLoad(NamedTuple):
 NOTHING = HandLoad(0.0, np.zeros(3))
 
 
-def read_load(urdf):
+def read_load(urdf: Any) -> HandLoad:
     """The HandLoad that the value of `urdf` in the arguments of `configure` tells of. Raises CommandRefused.
 
     urdf: {"name": ..., "link": [{"name": ..., "inertial": {"mass": {"value": kg}, "origin": {"xyz": [x, y, z]}}}]}.
@@ -53,13 +62,13 @@ def read_load(urdf):
     return HandLoad(whole.mass, whole.centre)
 
 
-def _number(value, least, most):
+def _number(value: Any, least: float, most: float) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
         raise ValueError("%r" % (value,))
     return float(value)
 
 
-def unknown_tool(robot, side):
+def unknown_tool(robot: Robot, side: str) -> HandLoad:
     """The HandLoad of the links on one hand in the description that are not a gripper of the vendor's."""
     if openings_of(robot, side) or cup_of(robot, side):
         return NOTHING
@@ -84,14 +93,15 @@ class HandLoads:
     function(side) -> the `HandLoad` that a client has told of, or None.
     """
 
-    def __init__(self, robot, chains, index, told):
+    def __init__(self, robot: Robot, chains: Mapping[str, Chain], index: Mapping[str, np.ndarray],
+                 told: Callable[[str], HandLoad | None]) -> None:
         frames = merge_fixed(robot).frames
         self._chains, self._index, self._told = chains, index, told
         self._in_tip = {side: (np.linalg.inv(frames[tip_of(side)].offset) @ frames["%s_hand" % side].offset)
                         for side in chains}
         self._tools = {side: unknown_tool(robot, side) for side in chains}
 
-    def correct(self, efforts, position, gravity_in_base):
+    def correct(self, efforts: np.ndarray, position: np.ndarray, gravity_in_base: Callable[[], np.ndarray]) -> None:
         """Make `efforts` (n,) [Nm], which balance all that the description has, those that the controllers know of.
 
         position: (n,) [rad]; gravity_in_base: function -> (3,) [m/s^2].

@@ -5,16 +5,23 @@ A command is one decision: it is refused as a whole (`CommandRefused`) when it i
 value, when it exceeds the joints' limits. The physical robot does the same; its own tucked pose, for one, lies 0.03 rad
 outside the URDF's limits.
 """
+
+from __future__ import annotations
+
 import math
 from collections import Counter
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
 from command_line.options import counted
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
@@ -32,7 +39,7 @@ _UNITS = {Mode.POSITION: "rad", Mode.VELOCITY: "rad/s", Mode.TORQUE: "Nm", Mode.
 
 
 @_compiled
-def _clamp(index, values, lower, upper):
+def _clamp(index: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
     """Bring values (k,) of joints `index` (k,) inside lower and upper (n,); returns whether one was outside."""
     is_outside = False
     for i, joint in enumerate(index):
@@ -55,7 +62,7 @@ class JointLimits:
     velocity: np.ndarray
     effort: np.ndarray
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for field in ("lower", "upper", "velocity", "effort"):
             value = np.array(getattr(self, field), dtype=float)
             if value.shape != (len(self.names),):
@@ -63,7 +70,7 @@ class JointLimits:
             value.setflags(write=False)
             object.__setattr__(self, field, value)
 
-    def clamp(self, mode, index, values):
+    def clamp(self, mode: Mode, index: np.ndarray, values: np.ndarray) -> bool:
         """Bring `values` of the joints `index` inside what `mode` allows; returns whether one was outside."""
         if mode is Mode.VELOCITY:
             return _clamp(index, values, -self.velocity, self.velocity)
@@ -93,13 +100,13 @@ class CommandParser:
     limits: of all joints that the indices count in; names: the joints that this limb accepts.
     """
 
-    def __init__(self, limits, names):
+    def __init__(self, limits: JointLimits, names: Sequence[str]) -> None:
         self._limits = limits
         self._names = tuple(names)
         self._index = {name: limits.names.index(name) for name in names}
         self._last = [], np.zeros(0, dtype=int)  # the last valid names, and their indices
 
-    def parse(self, mode, names, values):
+    def parse(self, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
         """Check one command.
 
         mode: int; names: sequence of str; values: sequence of float, one for each name.
@@ -115,7 +122,7 @@ class CommandParser:
                             for i in np.flatnonzero(outside))
         return JointCommand(mode, index, inside, clamped)
 
-    def _check(self, mode, names, values):
+    def _check(self, mode: int, names: Sequence[str], values: Sequence[float]) -> None:
         """Raises CommandRefused; else `_last` holds the command's joints."""
         if mode not in Mode._value2member_map_:
             raise self._refusal("unknown mode %d; modes are %s" % (
@@ -142,5 +149,5 @@ class CommandParser:
                 if not math.isfinite(value):
                     raise self._refusal("the value for %s is %s, and it must be a finite number" % (name, value))
 
-    def _refusal(self, fault):
+    def _refusal(self, fault: str) -> CommandRefused:
         return CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))

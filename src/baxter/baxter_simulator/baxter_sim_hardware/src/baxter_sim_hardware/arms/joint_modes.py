@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command mode of each joint, its commanded value, and the time at which it expires."""
+
+from __future__ import annotations
+
 import numpy as np
 
 from .joint_command import Mode
@@ -14,34 +17,34 @@ class JointModes:
     in_torque: (n,) bool; is_governed: (n,) bool, in modes with collision avoidance; any_in_torque, all_in_position: of
     all joints."""
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         self.mode = np.full(count, POSITION)
         self.value = np.zeros(count)
         self._deadline = np.full(count, np.inf)
         self._may_expire = False
         self._look()
 
-    def set(self, joints, mode):
+    def set(self, joints: np.ndarray, mode: Mode) -> None:
         """Put the joints of a mask (n,) into `mode`, without a command so far."""
         self.mode[joints] = mode
         self.value[joints] = 0.0
         self._deadline[joints] = np.inf
         self._look()
 
-    def expire_at(self, index, time_s):
+    def expire_at(self, index: np.ndarray, time_s: float) -> None:
         """The commands of joints `index` expire at time_s [s]."""
         self._deadline[index] = time_s
         self._may_expire = True
 
-    def expired(self, time_s):
+    def expired(self, time_s: float) -> np.ndarray | None:
         """(n,) mask of the joints whose commands have expired by time_s [s], or None if no command can expire."""
         return self._deadline <= time_s + 1e-9 if self._may_expire else None
 
-    def settle(self):
+    def settle(self) -> None:
         """Every joint is in position mode and rests."""
         self._may_expire = False
 
-    def _look(self):
+    def _look(self) -> None:
         self.in_torque = self.mode == TORQUE
         self.is_governed = (self.mode == POSITION) | (self.mode == VELOCITY)
         self.any_in_torque = bool(self.in_torque.any())

@@ -4,7 +4,11 @@
 A joint's controller reads the same sensor. So the error of the gear is not in what joint states say of a joint at rest:
 it is the link that is elsewhere.
 """
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +16,9 @@ from baxter_sim_hardware import effects
 from baxter_sim_hardware.individual import DRAWING, drawn
 from baxter_sim_hardware.numbered_random import NumberedRandom
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
@@ -25,7 +32,7 @@ class JointSensors:
     noise, 0 or more; serial: of the robot, from which its gears follow; robot 0 has none. Raises HardwareError.
     """
 
-    def __init__(self, rows, names, seed, serial):
+    def __init__(self, rows: Mapping[str, Mapping[str, float]], names: Sequence[str], seed: int, serial: int) -> None:
         self._quanta = [effects.per_joint(rows, "%s_quantum" % quantity, names) for quantity in QUANTITIES]
         for quantity, quantum in zip(QUANTITIES, self._quanta, strict=True):
             if quantum.min() <= 0.0:
@@ -38,16 +45,16 @@ class JointSensors:
             self._gear[0] = 0.0
         self._random = NumberedRandom(seed)
 
-    def felt(self, position):
+    def felt(self, position: np.ndarray) -> np.ndarray:
         """(n,) [rad] where the sensors are, without noise, when the links are at position (n,) [rad]."""
         return position + _error(self._gear, position)
 
-    def reached(self, felt, joints):
+    def reached(self, felt: np.ndarray, joints: np.ndarray) -> np.ndarray:
         """(k,) [rad] where the links of `joints` are when their sensors are at felt (k,) [rad]."""
         gear = self._gear[:, joints]
         return felt - _error(gear, felt - _error(gear, felt))
 
-    def read(self, tick, position, velocity, effort):
+    def read(self, tick: int, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray) -> tuple[np.ndarray, ...]:
         """The joints' readings of this tick: the same three (n,), [rad], [rad/s] and [Nm].
 
         The noise of a tick follows from its number, so it does not depend on who listens, and when.
@@ -60,7 +67,7 @@ class JointSensors:
 
 
 @_compiled
-def _error(gear, position):
+def _error(gear: np.ndarray, position: np.ndarray) -> np.ndarray:
     """(k,) [rad] that gears add; gear: (3, k) size [rad], waves in a turn, phase [rad]; position: (k,) [rad]."""
     error = np.empty(len(position))
     for j in range(len(position)):

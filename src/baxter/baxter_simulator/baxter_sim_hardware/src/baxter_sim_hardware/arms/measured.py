@@ -1,6 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The measured state of the arms' joints at the start of a tick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
 
 
 class Measured:
@@ -15,7 +25,7 @@ class Measured:
 
     __slots__ = ("time_s", "missing_s", "position", "velocity", "gravity", "dynamics")
 
-    def __init__(self, position, dynamics):
+    def __init__(self, position: ArrayLike, dynamics: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> None:
         """At rest in ``position`` at time 0."""
         self.dynamics = dynamics
         self.time_s = self.missing_s = 0.0

@@ -5,14 +5,20 @@ A procedure runs while its client repeats the request and the robot is enabled. 
 the neutral one and measures its joints at rest in each. It succeeds when the mean efforts agree with the model, and
 fails when something presses on the arm or keeps it from a posture. The postures of the physical robot are not public.
 """
+
+from __future__ import annotations
+
 from enum import Enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from baxter_model import JOINTS, MIRROR_SIGNS, SIDES, poses
 
 from .collision import SQUISH_NM
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 STATUS_RATE_HZ = 10.0
 KEEP_ALIVE_S = 1.5  # [simulated s] the physical robot wants a message faster than 1 Hz; clients send two a second
@@ -34,7 +40,7 @@ PROCEDURES = {
 UPDATER_IDLE, UPDATER_INVALID = 0, 1  # UpdateStatus.status
 
 
-def postures(name, side):
+def postures(name: str, side: str) -> list[np.ndarray]:
     """The postures (7,) [rad], shoulder to wrist, of a procedure of PROCEDURES for one arm."""
     neutral = np.array(list(poses().angles("neutral", side).values()))
     signs = np.array([1 if side == SIDES[0] else MIRROR_SIGNS[joint] for joint in JOINTS])
@@ -62,11 +68,11 @@ class Procedure:
     way: sequence of postures (7,) [rad].
     """
 
-    def __init__(self, way):
+    def __init__(self, way: Sequence[np.ndarray]) -> None:
         self._way = way
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         self.is_enabled = self.timed_out = False
         self.complete, self.uid, self.errors = NOT_COMPLETE, "", []
         self._last = 0.0  # when the client asked for it
@@ -76,7 +82,7 @@ class Procedure:
         self._is_there = False
         self._sum, self._count = np.zeros(len(SQUISH_NM)), 0
 
-    def take(self, wanted, uid, time_s):
+    def take(self, wanted: bool, uid: str, time_s: float) -> None:
         """Take a client's request to run or to end the procedure, at time_s [s]."""
         if not wanted:
             self.is_enabled = False
@@ -86,11 +92,11 @@ class Procedure:
         self._last = time_s
 
     @property
-    def is_active(self):
+    def is_active(self) -> bool:
         """Whether `update` must be called."""
         return self.is_enabled or self._moves
 
-    def update(self, time_s, robot_enabled, arm):
+    def update(self, time_s: float, robot_enabled: bool, arm: Arm) -> Order | np.ndarray:
         """Continue the procedure at time_s [s]; arm: `Arm`. Returns an `Order`, or the next posture (7,) [rad] of the
         arm."""
         if self.is_enabled and time_s - self._last > KEEP_ALIVE_S:
@@ -103,7 +109,7 @@ class Procedure:
         self._moves = False
         return order
 
-    def _go_on(self, time_s, robot_enabled, arm):
+    def _go_on(self, time_s: float, robot_enabled: bool, arm: Arm) -> Order | np.ndarray:
         if not robot_enabled:
             return self._fail("the robot is disabled")
         if self._since is None:
@@ -128,7 +134,7 @@ class Procedure:
                 self._judge()
         return Order.NOTHING
 
-    def _judge(self):
+    def _judge(self) -> None:
         mean = np.abs(self._sum / self._count)
         bound = TOLERANCE * np.array(list(SQUISH_NM.values()))
         wrong = ["%s feels %.1f Nm too much, at most %.1f are allowed" % (name, found, allowed)
@@ -138,7 +144,7 @@ class Procedure:
         else:
             self.complete = SUCCESS
 
-    def _fail(self, *reasons):
+    def _fail(self, *reasons: str) -> Order:
         self.complete, self.errors = FAILURE, list(reasons)
         return Order.STOP
 
@@ -149,9 +155,9 @@ class Updater:
     def __init__(self):
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         self.status, self.description = UPDATER_IDLE, "idle"
 
-    def start(self, uuid):
+    def start(self, uuid: str) -> None:
         self.status = UPDATER_INVALID
         self.description = "there is no update '%s': no stick is plugged into a simulated robot" % uuid

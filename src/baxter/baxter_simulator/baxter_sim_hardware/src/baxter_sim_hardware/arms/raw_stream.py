@@ -1,8 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RAW_POSITION: a stream of set-points is followed at its own rate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .joint_modes import RAW_POSITION
+
+if TYPE_CHECKING:
+    from .joint_command import JointCommand, JointLimits
+    from .setpoint import SetPoints
 
 STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
 FEED_FORWARD_S = 0.05  # time that a feed-forward velocity belongs to the raw commands that come in
@@ -14,7 +23,7 @@ class RawStream:
     limits: JointLimits; speed: (n,) [rad/s] how fast set-points may go; dt: length of a tick [s].
     """
 
-    def __init__(self, limits, speed, dt):
+    def __init__(self, limits: JointLimits, speed: np.ndarray, dt: float) -> None:
         self._limits, self._speed, self._dt = limits, speed, dt
         count = len(limits.names)
         # Of the newest command, and of the newest one at an earlier time.
@@ -22,21 +31,21 @@ class RawStream:
         self._velocity = np.zeros(count)  # [rad/s]
         self._velocity_stamp = np.full(count, -np.inf)
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget all set-points: after a reset of the clock they would seem recent."""
         self._stamp[:] = self._earlier[:] = self._velocity_stamp[:] = -np.inf
 
-    def feed_forward(self, index, velocities, time_s):
+    def feed_forward(self, index: np.ndarray, velocities: np.ndarray, time_s: float) -> None:
         """At time_s [s] the set-points of joints `index` move at velocities [rad/s], clipped to the bounds."""
         limit = self._speed[index]
         self._velocity[index] = np.clip(velocities, -limit, limit)
         self._velocity_stamp[index] = time_s
 
-    def said_velocity(self, time_s):
+    def said_velocity(self, time_s: float) -> np.ndarray:
         """(n,) [rad/s] at what the set-points are said to move at time_s [s]; 0 for those of which nobody says so."""
         return np.where(time_s - self._velocity_stamp <= FEED_FORWARD_S, self._velocity, 0.0)
 
-    def take(self, points, mode, command, time_s):
+    def take(self, points: SetPoints, mode: np.ndarray, command: JointCommand, time_s: float) -> None:
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
         stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
         index = command.index

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The effect `safety`: an arm that collides stops; it keeps away from the other arm and from the body."""
-from typing import NamedTuple
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -8,6 +11,11 @@ from baxter_sim_hardware import effects
 from baxter_sim_hardware.errors import HardwareError
 
 from . import avoidance, collision
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from .external_load import ExternalLoad
 
 
 class Felt(NamedTuple):
@@ -27,7 +35,8 @@ class Safety:
     look}.
     """
 
-    def __init__(self, numbers, load, links, radius):
+    def __init__(self, numbers: Mapping[str, Mapping[str, Mapping[str, float]]], load: ExternalLoad,
+                 links: Mapping[str, Sequence[str]], radius: float) -> None:
         rows = numbers["safety"]
         self.load, self._links, self._blocks = load, links, blocks_of(numbers["body"])
         self.hold_s, self._closing_s, margin, body_margin = (
@@ -35,17 +44,18 @@ class Safety:
         self._apart_m, self._from_body_m = 2.0 * radius + margin, radius + body_margin
         self.collides = dict.fromkeys(links, False)
 
-    def forget(self):
+    def forget(self) -> None:
         """The joints were put elsewhere."""
         self.load.forget()
         self.collides = dict.fromkeys(self._links, False)
 
-    def felt(self):
+    def felt(self) -> Felt | None:
         """The `Felt` since the last call, or None if no tick has passed."""
         found = self.load.mean()
         return None if found is None else Felt(self.load.position, *found)
 
-    def between(self, field, side, frames, rates):
+    def between(self, field: avoidance.Field, side: str, frames: Sequence[Mapping[str, tuple[np.ndarray, np.ndarray]]],
+                rates: np.ndarray) -> avoidance.Field:
         """`field` of one arm with the other arm in it, too.
 
         frames: sequence of {side: (rotations, origins) of its joints}: where the arms are, where they are commanded to
@@ -59,7 +69,8 @@ class Safety:
             near.update(name for name, rest in zip(self._links[other], left, strict=True) if rest < avoidance.FIELD_M)
         return field._replace(slowing=slowing, other=tuple(sorted(near)))
 
-    def around(self, field, side, frames, rates):
+    def around(self, field: avoidance.Field, side: str, frames: Sequence[Mapping[str, tuple[np.ndarray, np.ndarray]]],
+               rates: np.ndarray) -> avoidance.Field:
         """`field` of one arm with the body in it, too; frames, rates: as for `between`."""
         slowing, near = field.slowing, set()
         for each in frames:
@@ -71,7 +82,7 @@ class Safety:
         return field._replace(slowing=slowing, body=tuple(sorted(near)))
 
 
-def blocks_of(rows):
+def blocks_of(rows: Mapping[str, Mapping[str, float]]) -> avoidance.Blocks:
     """The `avoidance.Blocks` of the body. rows: {block: {name: value}} as `effects.read` has them for "body"; a block's
     name begins with that of its link. Raises HardwareError."""
     names = ("x_least", "y_least", "z_least", "x_most", "y_most", "z_most", "first_joint")
@@ -87,7 +98,7 @@ def blocks_of(rows):
     return avoidance.Blocks(tuple(name.split("_")[0] for name in rows), values[:, 6].astype(np.int64), corners)
 
 
-def reason(torques, wrench, ignored):
+def reason(torques: np.ndarray, wrench: np.ndarray, ignored: Callable[[str], bool]) -> str:
     """Why the loads from outside, (7,) torques [Nm] and (6,) wrench [N, Nm] at the tip, are a collision, or "".
 
     ignored: function(kind of suppression) -> whether it is in force.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-points that move no faster and no harder than allowed, and arrive exactly."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -12,7 +15,8 @@ _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 
 @_compiled
-def _approach(position, velocity, target, speed, acceleration, dt):
+def _approach(position: float, velocity: float, target: float, speed: float, acceleration: float,
+              dt: float) -> tuple[float, float]:
     distance = target - position
     step = acceleration * dt
     left = abs(distance) / (step * dt)
@@ -25,7 +29,8 @@ def _approach(position, velocity, target, speed, acceleration, dt):
 
 
 @_compiled
-def approach(position, velocity, target, speed, acceleration, dt):
+def approach(position: np.ndarray, velocity: np.ndarray, target: np.ndarray, speed: np.ndarray,
+             acceleration: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """One tick of a trapezoidal velocity profile in discrete time, for n joints at once.
 
     position [rad], velocity [rad/s]: (n,) state of the set-point; target [rad]: (n,) where it comes to rest;
@@ -55,7 +60,7 @@ class SetPoints:
     moving fourteen joints.
     """
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         self.numbers, self.flags = np.zeros((12, count)), np.zeros((2, count), dtype=bool)
         (self.position, self.velocity, self.target, self.speed, self.acceleration, self.stopping, self.goal, self.pace,
          self.output, self.output_rate, self.output_change, self.stream_acceleration) = self.numbers
@@ -63,7 +68,8 @@ class SetPoints:
 
 
 @_compiled
-def follow(numbers, flags, window, oldest, measured, reach, dt):
+def follow(numbers: np.ndarray, flags: np.ndarray, window: np.ndarray, oldest: int, measured: np.ndarray, reach: float,
+           dt: float) -> tuple[bool, bool, bool]:
     """One tick of `approach`, smoothed, for set-points of which some brake and some follow a stream.
 
     numbers, flags: of `SetPoints`, moved in place; window: (k, n), the last k values of position, of which row `oldest`
@@ -110,7 +116,7 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
 
 
 @_compiled
-def any_beyond(reach, position, velocity, measured, dt):
+def any_beyond(reach: float, position: np.ndarray, velocity: np.ndarray, measured: np.ndarray, dt: float) -> bool:
     """Whether any set-point, `position` (n,) [rad] as it was a tick of `velocity` (n,) ago, is farther than reach [rad]
     from the measured position (n,)."""
     for i in range(len(position)):
@@ -120,7 +126,8 @@ def any_beyond(reach, position, velocity, measured, dt):
 
 
 @_compiled
-def approach_rates(index, target, position, acceleration, speed, moves):
+def approach_rates(index: np.ndarray, target: np.ndarray, position: np.ndarray, acceleration: np.ndarray,
+                   speed: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """(k,) [rad/s] speeds at which joints `index` (k,) of n would go to their targets, or slow before them; 0 where
     `moves` (n,) is false. The other arrays are (n,) [rad, rad/s, rad/s^2]."""
     rates = np.zeros(len(index))
@@ -139,14 +146,15 @@ class Speeds:
     speed if nothing slows the limb [rad/s]; stream: bound of a stream of raw set-points [rad/s].
     """
 
-    def __init__(self, limit, ratio, stream):
+    def __init__(self, limit: np.ndarray, ratio: float, stream: np.ndarray) -> None:
         self.numbers = np.ones((6, len(limit)))
         self.limit, self.share, self.ratio, self.slowing, self.nominal, self.stream = self.numbers
         self.limit[:], self.ratio[:], self.stream[:] = limit, ratio, stream
 
 
 @_compiled
-def shares_in_step(index, target, position, speeds, least):
+def shares_in_step(index: np.ndarray, target: np.ndarray, position: np.ndarray, speeds: np.ndarray,
+                   least: float) -> bool:
     """Make joints `index` (k,) of n arrive at target (k,) [rad] together: set their shares in `numbers` of `Speeds`, of
     which none falls below `least`. position: (n,) [rad] where they are. Returns whether one has changed."""
     limit, share = speeds[0], speeds[1]
@@ -164,7 +172,8 @@ def shares_in_step(index, target, position, speeds, least):
 
 
 @_compiled
-def cruising_speeds(speeds, mode, braking, value, speed):
+def cruising_speeds(speeds: np.ndarray, mode: np.ndarray, braking: np.ndarray, value: np.ndarray,
+                    speed: np.ndarray) -> None:
     """Set the nominal speeds of `numbers` of `Speeds`, and speed (n,) [rad/s], at which each set-point cruises now.
 
     mode: (n,) ints of `Mode`; braking: (n,) bool; value: (n,) [rad/s] commanded in velocity mode. Nothing slows a
@@ -184,7 +193,7 @@ def cruising_speeds(speeds, mode, braking, value, speed):
             speed[i] *= slowing[i]
 
 
-def stopping_point(position, velocity, acceleration):
+def stopping_point(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """Rest positions of set-points that start to brake now [rad]; all (n,)."""
     return position + velocity * np.abs(velocity) / (2.0 * acceleration)
 
@@ -197,19 +206,19 @@ class MovingAverage:
     It costs half a window of delay and still arrives exactly.
     """
 
-    def __init__(self, ticks, values):
+    def __init__(self, ticks: int, values: np.ndarray) -> None:
         #: (ticks, n), and the row in it that `follow` replaces next.
         self.window = np.tile(values, (ticks, 1))
         self.oldest = 0
 
-    def turn(self):
+    def turn(self) -> None:
         """End the tick: advance to the next oldest row."""
         self.oldest = (self.oldest + 1) % len(self.window)
 
-    def shift(self, mask, offset):
+    def shift(self, mask: np.ndarray, offset: np.ndarray) -> None:
         """Shift the history of the joints in `mask` by `offset`, so that their mean moves by exactly that."""
         self.window[:, mask] += offset
 
-    def restart(self, mask, values):
+    def restart(self, mask: np.ndarray, values: np.ndarray) -> None:
         """Forget the history of the joints in `mask`."""
         self.window[:, mask] = values

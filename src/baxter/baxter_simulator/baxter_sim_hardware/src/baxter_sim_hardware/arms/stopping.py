@@ -5,13 +5,16 @@ All joints of an arm slow down in step, on a straight line in joint space: with 
 h - k M v, with M the arm's inertia, v its joints' velocities and h the torques of gravity and velocity. The largest k
 within all joints' limits is the hardest stop; it ends after 1 / k, and each joint travels v / (2 k).
 """
+
+from __future__ import annotations
+
 import numpy as np
 
 # Share of the joints' torques that a stop uses: the rest is for changes on the way, and for following.
 SHARE = 0.9
 
 
-def hardest_stop(velocity, inertia, bias, limit):
+def hardest_stop(velocity: np.ndarray, inertia: np.ndarray, bias: np.ndarray, limit: np.ndarray) -> np.ndarray:
     """Decelerations (n,) [rad/s^2], not negative, with which joints at velocity (n,) [rad/s] stop together.
 
     inertia: (n, n) [kg m^2]; bias: (n,) [Nm] that keeps the joints at these velocities; limit: (n,) [Nm] effort limits.
@@ -26,6 +29,6 @@ def hardest_stop(velocity, inertia, bias, limit):
     return rate * np.abs(velocity)
 
 
-def travel(velocity, deceleration):
+def travel(velocity: np.ndarray, deceleration: np.ndarray) -> np.ndarray:
     """Stopping distances (n,) [rad] of joints at velocity (n,) [rad/s] with deceleration (n,) [rad/s^2]."""
     return velocity * velocity / (2.0 * np.maximum(deceleration, 1e-12))

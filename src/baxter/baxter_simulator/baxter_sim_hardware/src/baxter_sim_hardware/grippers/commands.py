@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Command handling of all kinds of gripper: check a message, echo it, pass it on."""
+
+from __future__ import annotations
+
 import math
+from typing import Any
 
 from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.arms.hand_load import read_load
@@ -26,16 +30,16 @@ class Gripper:
     COMMANDS = {}  # {command: (name of the method that takes the arguments as a dict, whether it needs power)}
     ONCE = ()  # commands that count once, however often the same message comes
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.forget()
 
-    def forget(self):
+    def forget(self) -> None:
         """As at the start: no command, parameters at their defaults."""
         self.load = None
         self.command, self.sender, self.sequence = "", "", 0
         self.parameters = {name: start for name, (start, _) in self.PARAMETERS.items()}
 
-    def take(self, command, args, sender, sequence, enabled):
+    def take(self, command: str, args: str, sender: str, sequence: int, enabled: bool) -> None:
         """One command message.
 
         args: JSON object (see rospy_nodes.json_object) or empty. sender, sequence: a client's mark; commands of ONCE
@@ -61,10 +65,10 @@ class Gripper:
             raise CommandRefused(NOT_ENABLED)
         getattr(self, method)(values)
 
-    def no_op(self, values):
+    def no_op(self, values: dict[str, Any]) -> None:
         """Do nothing; the command is still acknowledged."""
 
-    def configure(self, values):
+    def configure(self, values: dict[str, Any]) -> None:
         """Change all parameters in `values`, or none if one is invalid; `urdf` among them tells the weight on the hand
         (see `arms.hand_load.read_load`). Raises CommandRefused."""
         values = dict(values)
@@ -83,6 +87,6 @@ class CustomGripper(Gripper):
     COMMANDS = {"no_op": ("no_op", False), "set": ("configure", False), "configure": ("configure", False)}
 
 
-def is_number(value):
+def is_number(value: object) -> bool:
     """Whether a value from JSON is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

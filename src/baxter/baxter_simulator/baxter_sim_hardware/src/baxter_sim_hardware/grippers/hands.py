@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Grippers in the physics world: each connects a gripper's core with the bodies that it moves and touches."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from baxter_model import tip_of
@@ -8,6 +13,11 @@ from baxter_model.description import cup_of, openings_of
 from .commands import CustomGripper
 from .electric import OPEN, ElectricGripper
 from .suction import SuctionGripper
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from bullet_sim import Model, World
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle
 RIM_SHARE = 0.8  # of the cup's radius, at which they do
@@ -23,7 +33,8 @@ class FingersHand:
     Attribute `gripper`: its core.
     """
 
-    def __init__(self, model, side, openings, dt, calibrated=True):
+    def __init__(self, model: Model, side: str, openings: Mapping[str, float], dt: float,
+                 calibrated: bool = True) -> None:
         self._model = model
         self._index = model.index(openings)
         self._openings = np.array(list(openings.values()))
@@ -40,15 +51,15 @@ class FingersHand:
         self._unseen_ticks = 0
         self._driven = OPEN, 100.0  # to which share of the travel, how hard [%], as they begin
 
-    def opening(self, positions):
+    def opening(self, positions: np.ndarray) -> float:
         """How far it is open [%]; positions: of all joints of the model."""
         return 100.0 * min(max(self._share(positions), 0.0), 1.0)
 
-    def readings(self, positions):
+    def readings(self, positions: np.ndarray) -> tuple[float, float]:
         """(opening, force) [%] for the state message; positions: of all joints of the model."""
         return self.opening(positions), min(self._squeeze(), 100.0)
 
-    def _squeeze(self):
+    def _squeeze(self) -> float:
         """Force on the fingers along their travel, the mean of both [% of the joints' effort limit]."""
         forces = [force for link in self._links if (force := self._model.contact_force(link)).any()]
         if not forces:
@@ -56,7 +67,7 @@ class FingersHand:
         along = self._model.link_pose(self._tip).matrix()[:3, 1]
         return 100.0 * sum(abs(float(force @ along)) for force in forces) / float(self._max_effort.sum())
 
-    def update(self, joints):
+    def update(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick; joints: (position, velocity, effort) of the whole model."""
         self._unseen_ticks += 1
         if self.gripper.resting and self._unseen_ticks < LOOK_TICKS:
@@ -78,18 +89,18 @@ class FingersHand:
         setpoint, force = self._driven
         self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
 
-    def stop(self):
+    def stop(self) -> None:
         """The robot was disabled."""
         self.gripper.stop(self._position())
 
-    def reset(self):
+    def reset(self) -> None:
         """The world went back to its start, or the joints were put elsewhere."""
         self.gripper.reset(self._position())
 
-    def _position(self):
+    def _position(self) -> float:
         return self._share(self._model.read_joints()[0])
 
-    def _share(self, values):
+    def _share(self, values: np.ndarray) -> float:
         # Runs at every tick: numpy's sum would take ten times as long.
         share = 0.0
         for index, weight in self._weights:
@@ -104,7 +115,7 @@ class CupHand:
     Attribute `gripper`: its core.
     """
 
-    def __init__(self, world, model, cup, dt):
+    def __init__(self, world: World, model: Model, cup: tuple[str, float], dt: float) -> None:
         self._world, self._model = world, model
         self._frame, radius = cup
         self._area_m2 = np.pi * radius**2
@@ -114,15 +125,15 @@ class CupHand:
         model.grip_firmly(self._frame)
         self.gripper = SuctionGripper(dt)
 
-    def opening(self, positions):
+    def opening(self, positions: np.ndarray) -> float:
         """How far it is open [%]."""
         return 0.0
 
-    def readings(self, positions):
+    def readings(self, positions: np.ndarray) -> tuple[float, float]:
         """(opening, force) [%] for the state message: a cup has neither."""
         return 0.0, 0.0
 
-    def _covering(self):
+    def _covering(self) -> tuple[str, str] | None:
         """(model, link), names of the body that covers the whole cup within reach of the lip, or None."""
         pose = self._model.link_pose(self._frame).matrix()
         starts = (self._ring - (0.0, 0.0, INSIDE_M)) @ pose[:3, :3].T + pose[:3, 3]
@@ -132,7 +143,7 @@ class CupHand:
         met -= {met_here for met_here in met if met_here is not None and met_here[0] == self._model.name}
         return met.pop() if len(met) == 1 else None
 
-    def update(self, joints):
+    def update(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick."""
         if self.gripper.idle:
             return
@@ -146,11 +157,11 @@ class CupHand:
         self._world.models[model].apply_wrench(link, force, position=pose.position)
         self._model.apply_wrench(self._frame, -force, position=pose.position)
 
-    def stop(self):
+    def stop(self) -> None:
         """The robot was disabled."""
         self.gripper.end_attempt()
 
-    def reset(self):
+    def reset(self) -> None:
         """The world went back to its start, or the joints were put elsewhere."""
         self.gripper.reset()
 
@@ -164,26 +175,27 @@ class NoHand:
     def __init__(self):
         self.gripper = CustomGripper()
 
-    def opening(self, positions):
+    def opening(self, positions: np.ndarray) -> float:
         """How far it is open [%]."""
         return 0.0
 
-    def readings(self, positions):
+    def readings(self, positions: np.ndarray) -> tuple[float, float]:
         """(opening, force) [%] for the state message."""
         return 0.0, 0.0
 
-    def update(self, joints):
+    def update(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick."""
 
-    def stop(self):
+    def stop(self) -> None:
         """The robot was disabled."""
 
-    def reset(self):
+    def reset(self) -> None:
         """The world went back to its start, or the joints were put elsewhere."""
         self.gripper.forget()
 
 
-def hand_of(world, model, side, dt, calibrated=True):
+def hand_of(world: World, model: Model, side: str, dt: float,
+            calibrated: bool = True) -> FingersHand | CupHand | NoHand:
     """The hand of one arm in the description, an object of one of the classes above; calibrated: whether an electric
     gripper is, at the start."""
     openings, cup = openings_of(model.robot, side), cup_of(model.robot, side)

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The suction gripper: commands in, pressure in its cup out. Only that pressure holds an object."""
+
+from __future__ import annotations
+
 import json
 import math
+from typing import Any
 
 from baxter_model import SUCTION
 from baxter_sim_hardware.errors import CommandRefused
@@ -39,12 +43,12 @@ class SuctionGripper(Gripper):
     }
     ONCE = ("go", "grip", "release", "reboot")
 
-    def __init__(self, dt=0.002):
+    def __init__(self, dt: float = 0.002) -> None:
         self._dt = dt
         super().__init__()
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """As at the start: no vacuum, no command."""
         self.forget()
         self.missed = False
@@ -52,37 +56,37 @@ class SuctionGripper(Gripper):
         self._stop({})
 
     @property
-    def idle(self):
+    def idle(self) -> bool:
         """Whether the cup is at ambient pressure, and stays so."""
         return not (self.sucking or self.blowing or self._level)
 
     @property
-    def blowing(self):
+    def blowing(self) -> bool:
         return self._blow_left_s > 0.0
 
     @property
-    def vacuum(self):
+    def vacuum(self) -> bool:
         """Whether there is enough vacuum to hold something."""
         return 100.0 * self._level >= self.parameters["vacuum_sensor_threshold"] and self._level > 2.0 * LEAKING
 
     @property
-    def flags(self):
+    def flags(self) -> dict[str, bool]:
         # There is nothing to calibrate; clients read this as calibrated.
         return {"calibrated": True, "ready": True, "moving": False, "gripping": self.vacuum, "missed": self.missed,
                 "error": False}
 
     @property
-    def sensor(self):
+    def sensor(self) -> int:
         """Reading of the vacuum sensor, 0 to 255."""
         return round(SENSOR_MAX * self._level)
 
     @property
-    def details(self):
+    def details(self) -> str:
         """The JSON text in the state message."""
         return json.dumps({"vacuum sensor": self.sensor, "vacuum": self.vacuum, "blowing": self.blowing,
                            "sucking": self.sucking})
 
-    def update(self, is_closed):
+    def update(self, is_closed: bool) -> float:
         """One tick. Returns the pressure in the cup [Pa], negative for a vacuum.
 
         is_closed: whether something lies on the cup, all around its rim.
@@ -102,45 +106,45 @@ class SuctionGripper(Gripper):
                 self.sucking, self.missed = False, True
         return BLOW_PA if self.blowing else -FULL_VACUUM_PA * self._level
 
-    def end_attempt(self):
+    def end_attempt(self) -> None:
         """Continue to suck only if something is held, and stop blowing: a held object does not fall when the robot is
         disabled."""
         if not self.vacuum:
             self._stop({})
 
-    def set_pump(self, on):
+    def set_pump(self, on: bool) -> None:
         """Suck without a time limit, or end that: the function of the pump valve's digital output."""
         if on and not self.sucking:
             self._start(math.inf)
         elif not on and self.sucking:
             self._stop({})
 
-    def set_blow(self, on):
+    def set_blow(self, on: bool) -> None:
         """Blow without a time limit, or end that: the function of the blow-off valve's digital output."""
         if on:
             self._stop({})
         self._blow_left_s = math.inf if on else 0.0
 
-    def _go(self, values):
+    def _go(self, values: dict[str, Any]) -> None:
         seconds = values.get("grip_attempt_seconds", ATTEMPT_S)
         if set(values) - {"grip_attempt_seconds"} or not (is_number(seconds) or seconds == math.inf):
             raise CommandRefused('%s needs {"grip_attempt_seconds": SECONDS}, less than 0 for as long as it takes, '
                                  "not %s" % (self.command, json.dumps(values)))
         self._start(seconds if seconds >= 0.0 else math.inf)
 
-    def _start(self, attempt_s):
+    def _start(self, attempt_s: float) -> None:
         self.sucking, self.missed = True, False
         self._attempt_s = self._attempt_left_s = attempt_s
         self._blow_left_s = 0.0
 
-    def _release(self, values):
+    def _release(self, values: dict[str, Any]) -> None:
         self._stop(values)
         self._blow_left_s = self.parameters["blow_off_seconds"]
 
-    def _stop(self, values):
+    def _stop(self, values: dict[str, Any]) -> None:
         self.sucking = False
         self._attempt_s = self._attempt_left_s = self._blow_left_s = 0.0
 
-    def _reboot(self, values):
+    def _reboot(self, values: dict[str, Any]) -> None:
         self._stop(values)
         self.parameters = {name: start for name, (start, _) in self.PARAMETERS.items()}

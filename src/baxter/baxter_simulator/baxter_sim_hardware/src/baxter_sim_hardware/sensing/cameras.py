@@ -5,6 +5,9 @@ A camera is an array of 1280 x 800 sensors. Every mode shows all of it, scaled, 
 picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array
 that a window is cut from. Without ROS.
 """
+
+from __future__ import annotations
+
 import errno
 from typing import NamedTuple
 
@@ -32,7 +35,7 @@ _NEUTRAL_EXPOSURE, _NEUTRAL_WHITE, _DOUBLING_GAIN = 50.0, 2048.0, 79.0
 class CameraRefused(HardwareError):
     """A request that a camera cannot follow. ``code`` is the errno of the service's answer."""
 
-    def __init__(self, code, text):
+    def __init__(self, code: int, text: str) -> None:
         super().__init__(text)
         self.code = code
 
@@ -46,7 +49,7 @@ class CaptureSettings(NamedTuple):
     rate: float
     controls: dict
 
-    def checked(self):
+    def checked(self) -> CaptureSettings:
         """These settings with a rate; raises :class:`CameraRefused` for impossible settings."""
         if (self.width, self.height) not in MODES:
             raise CameraRefused(errno.EINVAL, "%d x %d is not a resolution of this camera; choose from %s"
@@ -71,22 +74,22 @@ class CaptureSettings(NamedTuple):
                                 % (self.width, self.height, x, y, width, height))
         return settings
 
-    def control(self, number):
+    def control(self, number: int) -> int:
         """A control's value, -1 for automatic."""
         return self.controls.get(number, AUTO)
 
     @property
-    def array(self):
+    def array(self) -> tuple[int, int]:
         """The array that a window is cut from [pixels]."""
         return (ARRAY[0] // 2, ARRAY[1] // 2) if self.control(HALF) == 1 else ARRAY
 
     @property
-    def window(self):
+    def window(self) -> tuple[int, int] | None:
         """Corner of the picture in the array (x, y), or None for the whole array."""
         x, y = self.control(WINDOW_X), self.control(WINDOW_Y)
         return None if x == AUTO and y == AUTO else (max(x, 0), max(y, 0))
 
-    def pinhole(self, focal, near, far):
+    def pinhole(self, focal: float, near: float, far: float) -> Pinhole:
         """The pinhole before :meth:`turned`. ``focal``: focal length of the full array [pixels]."""
         if self.window is None:
             focal, start, size = focal * self.width / ARRAY[0], (0, 0), (self.width, self.height)
@@ -95,7 +98,7 @@ class CaptureSettings(NamedTuple):
         return Pinhole(self.width, self.height, focal, focal, (size[0] - 1) / 2.0 - start[0],
                        (size[1] - 1) / 2.0 - start[1], near, far)
 
-    def turned(self, pinhole):
+    def turned(self, pinhole: Pinhole) -> Pinhole:
         """The pinhole of the picture after flip and mirror, in the same frame: a mirrored axis has a negative focal
         length, so that pixels still project along the right rays."""
         if self.control(MIRROR) == 1:
@@ -104,7 +107,7 @@ class CaptureSettings(NamedTuple):
             pinhole = pinhole._replace(fy=-pinhole.fy, cy=pinhole.height - 1 - pinhole.cy)
         return pinhole
 
-    def developed(self, picture):
+    def developed(self, picture: np.ndarray) -> np.ndarray:
         """The picture (height, width, 3) of red, green, blue after exposure, gain, white balance, flip and mirror."""
         exposure, gain = self.control(EXPOSURE), self.control(GAIN)
         bright = (1.0 if exposure == AUTO else exposure / _NEUTRAL_EXPOSURE)
@@ -118,7 +121,7 @@ class CaptureSettings(NamedTuple):
         return picture[::rows, ::columns]
 
     @property
-    def turns(self):
+    def turns(self) -> tuple[int, int]:
         """(rows, columns): -1 where they run the other way after flip and mirror, else 1."""
         return (-1 if self.control(FLIP) == 1 else 1), (-1 if self.control(MIRROR) == 1 else 1)
 
@@ -126,29 +129,29 @@ class CaptureSettings(NamedTuple):
 class Rack:
     """The robot's cameras, and which of them are open."""
 
-    def __init__(self, most_open):
+    def __init__(self, most_open: int) -> None:
         """``most_open``: largest number of powered cameras; the robot's wiring carries two of its three."""
         self._most_open = most_open
         self._names = []
         self.open = {}
 
-    def add(self, name, settings):
+    def add(self, name: str, settings: CaptureSettings | None) -> None:
         """Add a camera; open from the start with ``settings``, or closed for None."""
         self._names.append(name)
         if settings is not None and len(self.open) < self._most_open:
             self.open[name] = settings
 
-    def remove(self, name):
+    def remove(self, name: str) -> None:
         """Remove a camera."""
         self._names.remove(name)
         self.open.pop(name, None)
 
-    def available(self):
+    def available(self) -> list[str]:
         """Names of the cameras that are open or could be opened now."""
         full = len(self.open) >= self._most_open
         return [name for name in self._names if name in self.open or not full]
 
-    def open_camera(self, name, settings):
+    def open_camera(self, name: str, settings: CaptureSettings) -> CaptureSettings:
         """Open or reopen a camera; returns the :class:`CaptureSettings` in force. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.available():
@@ -157,7 +160,7 @@ class Rack:
         self.open[name] = settings.checked()
         return self.open[name]
 
-    def close_camera(self, name):
+    def close_camera(self, name: str) -> None:
         """Close a camera. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.open:
@@ -166,7 +169,7 @@ class Rack:
                                 % (name, ", ".join(self.open) or "none"))
         del self.open[name]
 
-    def _known(self, name):
+    def _known(self, name: str) -> None:
         if name not in self._names:
             raise CameraRefused(errno.ENODEV, "there is no camera '%s'; cameras: %s"
                                 % (name, ", ".join(self._names) or "none"))

@@ -4,6 +4,9 @@
 Sizes are measured on the vendor's meshes, in the frame that the description has for each navigator: z outwards, the
 wheel near the origin. No source gives the colour; white with a little blue is a choice.
 """
+
+from __future__ import annotations
+
 import numpy as np
 
 from .panel import NAVIGATORS
@@ -21,7 +24,7 @@ _COLOUR = (190, 225, 255)
 _HALF_LINE_M, _INNER_M, _STRAIGHT_M, _OUTER_M = 0.0015, 0.0235, 0.0205, 0.0285
 
 
-def place(navigator):
+def place(navigator: str) -> np.ndarray:
     """The pose (4, 4) of the rectangle's centre in the frame of a navigator, one of panel.NAVIGATORS; x to the right
     and y up for a viewer."""
     above = np.eye(4)
@@ -30,7 +33,7 @@ def place(navigator):
     return above
 
 
-def picture(inner, outer):
+def picture(inner: bool, outer: bool) -> np.ndarray:
     """The glow as a picture, uint8 (rows, columns, 3), with each light on or off; black does not glow."""
     (columns, rows), (width, height) = PIXELS, SIZE_M
     x = ((np.arange(columns) + 0.5) / columns - 0.5) * width

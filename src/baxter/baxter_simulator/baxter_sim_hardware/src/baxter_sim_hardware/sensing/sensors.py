@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's sensors: infrared range at the hands, the ring of sonars at the head, accelerometers in the hands."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -22,12 +25,12 @@ LIGHTS_S = 0.2  # [simulated s] validity of one set_lights; clients repeat it at
 MAX_LEVEL = 100.0
 
 
-def range_from_hit(distance):
+def range_from_hit(distance: float | None) -> float:
     """Reading of a hand's sensor [m] for a ray that hits after `distance` [m], or not at all (None)."""
     return RANGE_NOTHING_M if distance is None else max(distance, RANGE_MIN_M)
 
 
-def sonar_directions():
+def sonar_directions() -> np.ndarray:
     """(12, 2, 3) unit vectors in the ring's frame: for each transducer its two rays."""
     angles = 2.0 * math.pi * np.arange(SONAR_COUNT) / SONAR_COUNT
     return np.array([[(math.cos(angle) * math.cos(up), math.sin(angle) * math.cos(up), math.sin(up))
@@ -40,43 +43,44 @@ class SonarRing:
     def __init__(self):
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         self.enabled = ALL_SONARS
         self.levels = {"green": 0.0, "red": 0.0}
         self._lights, self._lights_until = 0, 0.0
 
-    def enable(self, mask):
+    def enable(self, mask: int) -> None:
         """Raises CommandRefused for bits that belong to no sonar."""
         if mask & ~ALL_SONARS:
             raise CommandRefused("sonars %d are to be enabled; it must be from 0 to %d" % (mask, ALL_SONARS))
         self.enabled = mask
 
-    def set_lights(self, mask, time_s):
+    def set_lights(self, mask: int, time_s: float) -> None:
         """Set the lights by `mask` for LIGHTS_S if it has LIGHTS_OVERRIDE; else let them show echoes again."""
         self._lights = mask
         self._lights_until = time_s + LIGHTS_S if mask & LIGHTS_OVERRIDE else 0.0
 
-    def overridden(self, time_s):
+    def overridden(self, time_s: float) -> int | None:
         """The mask that a client has set, if still valid at time_s [s], or None."""
         return self._lights if time_s < self._lights_until else None
 
-    def set_level(self, colour, level):
+    def set_level(self, colour: str, level: float) -> None:
         """Raises CommandRefused unless it is from 0 to 100."""
         if not 0.0 <= level <= MAX_LEVEL:
             raise CommandRefused("%s level is %g; it must be from 0 to %g" % (colour, level, MAX_LEVEL))
         self.levels[colour] = level
 
-    def echoes(self, distances):
+    def echoes(self, distances: np.ndarray) -> list[tuple[int, float]]:
         """[(sensor, distance [m])] of the sonars that are on, from (12,) distances, inf where nothing was hit."""
         return [(sensor, distance) for sensor, distance in enumerate(distances)
                 if self.enabled >> sensor & 1 and SONAR_MIN_M <= distance <= SONAR_MAX_M]
 
-    def heard(self, distances):
+    def heard(self, distances: np.ndarray) -> int:
         """A bit for each sonar with an echo among (12,) distances."""
         return sum(1 << sensor for sensor, _ in self.echoes(distances))
 
 
-def specific_force(before, after, gravity, rotation, dt):
+def specific_force(before: np.ndarray, after: np.ndarray, gravity: np.ndarray, rotation: np.ndarray,
+                   dt: float) -> np.ndarray:
     """(3,) [m/s^2] reading of an accelerometer, in its own axes.
 
     before, after: (3,) velocity [m/s] of its frame in base around a tick of dt [s]; gravity: (3,) in base [m/s^2];

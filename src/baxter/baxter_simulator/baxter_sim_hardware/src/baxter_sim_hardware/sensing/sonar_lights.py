@@ -4,11 +4,19 @@
 They are a band around the ring of sonars, which the description has as a cylinder. The sizes and colours of the lights
 are a choice.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from urdf_model import Cylinder
 
 from .sensors import MAX_LEVEL, SONAR_COUNT
+
+if TYPE_CHECKING:
+    from urdf_model import Link
 
 #: Columns and rows of the band.
 PIXELS = (720, 20)
@@ -20,7 +28,7 @@ _RED, _GREEN = (255, 0, 0), (0, 255, 0)
 _LIGHT_COLUMNS, _LIGHT_ROWS, _HALO_ROWS = 12, slice(2, 10), slice(13, 18)
 
 
-def around(link):
+def around(link: Link) -> tuple[np.ndarray, tuple[float, float], float] | None:
     """The band's place on the ring, a urdf_model.Link: (pose (4, 4) of the cylinder's centre, y upwards, z ahead, where
     the first sonar is; width and height [m]; radius [m]). None for a ring that is not one cylinder."""
     shapes = link.visuals
@@ -32,7 +40,7 @@ def around(link):
     return shapes[0].origin @ pose, (2.0 * np.pi * radius, shapes[0].geometry.length), radius
 
 
-def picture(mask, red, green):
+def picture(mask: int, red: float, green: float) -> np.ndarray:
     """The glow, uint8 (rows, columns, 3); black does not glow. mask: a bit for each sonar's light; red, green: the
     halo's levels, 0 to 100."""
     columns, rows = PIXELS

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arms in ROS messages: their commands and settings, end points, set-points and external loads."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from baxter_core_msgs.msg import JointCommand
 
@@ -10,6 +15,13 @@ from baxter_sim_hardware.errors import CommandRefused
 
 from . import convert
 from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from arm_kinematics import Chain
+    from baxter_sim_hardware.robot import Baxter
+    from baxter_sim_hardware.warnings import Warnings
 
 SPRING_JOINT = JOINTS.index("s1")  # the one with the spring; the message has one state of hysteresis for all joints
 
@@ -38,7 +50,8 @@ class ArmTopics(Part):
     was refused) for each joint command.
     """
 
-    def __init__(self, baxter, chains, limb_index, warnings):
+    def __init__(self, baxter: Baxter, chains: Mapping[str, Chain], limb_index: Mapping[str, np.ndarray],
+                 warnings: Warnings) -> None:
         self._baxter, self._chains, self._limb_index = baxter, chains, limb_index
         self._warnings = warnings
         self._arm_index = np.concatenate([limb_index[side] for side in baxter.arms.sides])
@@ -136,7 +149,7 @@ class ArmTopics(Part):
         if msg.data:
             self._baxter.arms.stop_limb(side)
 
-    def joint_command(self, side, msg, time_s):
+    def joint_command(self, side: str, msg: JointCommand, time_s: float) -> None:
         """Take one JointCommand message."""
         try:
             command = self._baxter.command(side, msg.mode, msg.names, msg.command)

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's cameras in /sensor_renderer: topics of each camera, and the services that open and close them."""
+
+from __future__ import annotations
+
 import threading
+from typing import TYPE_CHECKING
 
 import rospy
 from baxter_core_msgs.srv import (
@@ -26,6 +30,10 @@ from sensor_renderer.lens import Lens
 from sensor_renderer.topics import ColourTopics, LearningTopics
 from sim_time.pace import Pace
 
+if TYPE_CHECKING:
+    from sensor_renderer.moments import Moment
+    from sensor_renderer.sensor_element import SensorEntry
+
 # Two of the robot's three cameras can have power (baxter_interface 1.1.0).
 _ROBOT_POWERS, _ALL = 2, 3
 _PARAMETERS = "/baxter_sim_hardware/"
@@ -42,13 +50,13 @@ class CameraServices:
     _by_namespace = {}
 
     @classmethod
-    def of(cls, namespace):
+    def of(cls, namespace: str) -> CameraServices:
         """The services of this namespace, made when first asked for."""
         if namespace not in cls._by_namespace:
             cls._by_namespace[namespace] = cls(namespace)
         return cls._by_namespace[namespace]
 
-    def __init__(self, namespace):
+    def __init__(self, namespace: str) -> None:
         profile = rospy.get_param(_PARAMETERS + "profile", "sim")
         #: Whether the cameras start as on the physical robot, or as in the vendor's simulator.
         self.as_robot = profile == "robot"
@@ -62,7 +70,7 @@ class CameraServices:
             ("list", ListCameras, self._list), ("open", OpenCamera, self._open), ("close", CloseCamera, self._close),
             ("reset", Empty, self._reset))]
 
-    def optics(self, name):
+    def optics(self, name: str) -> Optics:
         """The `Optics` of a camera. Raises SensorError."""
         try:
             return Optics(name, effects.chosen(self._effects),
@@ -71,14 +79,14 @@ class CameraServices:
         except HardwareError as error:
             raise SensorError("%s: %s" % (name, error)) from error
 
-    def add(self, driver):
+    def add(self, driver: BaxterCamera) -> None:
         """Add a camera."""
         with self._lock:
             self._drivers[driver.camera_name] = driver
             self._rack.add(driver.camera_name, driver.first_settings)
             driver.use(self._rack.open.get(driver.camera_name))
 
-    def remove(self, driver):
+    def remove(self, driver: BaxterCamera) -> None:
         """Remove a camera; the services close with the last one."""
         with self._lock:
             self._drivers.pop(driver.camera_name)
@@ -134,7 +142,7 @@ class CameraServices:
 class BaxterCamera(Driver):
     """One of the robot's cameras, named as its sensor; ``<robotNamespace>`` is the namespace of the services."""
 
-    def __init__(self, entry):
+    def __init__(self, entry: SensorEntry) -> None:
         super().__init__(entry)
         camera = entry.cameras()[0]
         self.camera_name = entry.name
@@ -156,7 +164,7 @@ class BaxterCamera(Driver):
             self.first_settings = CaptureSettings(pinhole.width, pinhole.height, entry.rate, controls)
         self._services.add(self)
 
-    def use(self, settings):
+    def use(self, settings: CaptureSettings | None) -> None:
         """Open with ``settings``, or close for None."""
         if settings is None:
             old, self.topics, self._use = self.topics, [], None
@@ -178,13 +186,13 @@ class BaxterCamera(Driver):
         self._apply(self._settings)
         self.topics = [*topics.all, self._learning]
 
-    def _apply(self, settings):
+    def _apply(self, settings: CameraSettings) -> None:
         self.memory_s = settings.exposure.exposure_time
         use = self._use
         if use is not None:
             settings.apply(use[2], self._learning)
 
-    def publish(self, moment):
+    def publish(self, moment: Moment) -> None:
         use = self._use
         if use is None:
             return  # closed by a client since the node asked
@@ -195,6 +203,6 @@ class BaxterCamera(Driver):
         topics.publish(middle.time_s, self._frame, picture, self._encoding, info)
         self._learning.publish(middle, imager.camera, self._frame, settings.turns)
 
-    def close(self):
+    def close(self) -> None:
         self._settings.close()
         self._services.remove(self)

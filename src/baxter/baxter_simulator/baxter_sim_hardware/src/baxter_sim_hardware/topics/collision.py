@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS interface of the arms' safety: collision states, and the messages that suppress safety functions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionState
 from std_msgs.msg import Header
 
@@ -8,6 +13,9 @@ from baxter_sim_hardware.arms import collision
 from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
+
+if TYPE_CHECKING:
+    from baxter_sim_hardware.arms.guarding import Guarding
 
 
 def _suppress(kind):
@@ -20,7 +28,7 @@ def _suppress(kind):
 class CollisionTopics(Part):
     """guarding: `arms.guarding.Guarding`."""
 
-    def __init__(self, guarding):
+    def __init__(self, guarding: Guarding) -> None:
         self._guarding, self.suppressions = guarding, guarding.suppressions
 
     def _avoidance(self, time_s, side, snapshot):

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Conversions between ROS messages and the core's types."""
+
+from __future__ import annotations
+
 import struct
+from typing import TYPE_CHECKING
 
 from baxter_core_msgs.msg import AssemblyState, EndpointState, SEAJointState
 from control_msgs.msg import JointControllerState
@@ -11,6 +15,14 @@ from std_msgs.msg import Header
 from sim_time.stamps import stamp
 from urdf_model.transforms import quaternion_from_matrix
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from io import BytesIO
+
+    import numpy as np
+
+    from baxter_sim_hardware.robot_state import Assembly
+
 _UINT32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # sequence number, seconds, nanoseconds, length of an empty frame_id
 
@@ -18,13 +30,13 @@ _HEADER = struct.Struct("<IIII")  # sequence number, seconds, nanoseconds, lengt
 class JointStates:
     """Makes the JointState messages of the same n joints. The names, most of the message, are serialized only once."""
 
-    def __init__(self, names):
+    def __init__(self, names: list[str]) -> None:
         text = [name.encode() for name in names]
         self._names = names
         self._count = _UINT32.pack(len(names))
         self._prepared = self._count + b"".join(_UINT32.pack(len(name)) + name for name in text)
 
-    def message(self, time_s, position, velocity, effort):
+    def message(self, time_s: float, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray) -> JointState:
         """JointState from arrays (n,) in the order of the names."""
         message = _PreparedJointState()
         message.header.stamp = stamp(time_s)
@@ -34,7 +46,7 @@ class JointStates:
 
 
 class _PreparedJointState(JointState):
-    def serialize(self, buff):
+    def serialize(self, buff: BytesIO) -> None:
         header = self.header
         parts = [_HEADER.pack(header.seq, header.stamp.secs, header.stamp.nsecs, 0), self.prepared]
         for values in (self.position, self.velocity, self.effort):
@@ -42,13 +54,13 @@ class _PreparedJointState(JointState):
         buff.write(b"".join(parts))
 
 
-def assembly_state(assembly):
+def assembly_state(assembly: Assembly) -> AssemblyState:
     """AssemblyState from `robot_state.Assembly`."""
     return AssemblyState(assembly.ready, assembly.enabled, assembly.stopped, assembly.error,
                          int(assembly.estop_button), int(assembly.estop_source))
 
 
-def endpoint_state(time_s, frame, pose, twist, wrench):
+def endpoint_state(time_s: float, frame: str, pose: np.ndarray, twist: np.ndarray, wrench: np.ndarray) -> EndpointState:
     """EndpointState in `frame` from a (4, 4) pose and (6,) twist and wrench, linear parts first."""
     pose_msg = Pose(Point(*pose[:3, 3].tolist()), Quaternion(*map(float, quaternion_from_matrix(pose[:3, :3]))))
     linear, angular = twist[:3].tolist(), twist[3:].tolist()
@@ -57,7 +69,8 @@ def endpoint_state(time_s, frame, pose, twist, wrench):
                          Twist(Vector3(*linear), Vector3(*angular)), Wrench(Vector3(*force), Vector3(*torque)))
 
 
-def sea_joint_state(time_s, frame, names, commanded, measured, model):
+def sea_joint_state(time_s: float, frame: str, names: Sequence[str], commanded: tuple[np.ndarray, ...],
+                    measured: tuple[np.ndarray, ...], model: tuple) -> SEAJointState:
     """SEAJointState of k joints.
 
     commanded: (position, velocity, acceleration, effort), measured: (position, velocity, effort), model: (gravity with
@@ -68,7 +81,8 @@ def sea_joint_state(time_s, frame, names, commanded, measured, model):
                          *(values.tolist() for values in (*commanded, *measured, *efforts)), float(state))
 
 
-def joint_controller_state(time_s, set_point, measured, effort, dt):
+def joint_controller_state(time_s: float, set_point: float, measured: float, effort: float,
+                           dt: float) -> JointControllerState:
     """JointControllerState of one joint without gains, which its drive has not.
 
     set_point, measured: floats of the same quantity; effort: what the drive exerts [Nm]; dt: length of a tick [s].

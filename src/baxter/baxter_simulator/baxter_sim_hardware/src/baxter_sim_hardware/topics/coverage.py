@@ -1,32 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Coverage of the physical robot's interface: its topics, counted by group, and the reasons for missing ones."""
+
+from __future__ import annotations
+
 from collections import Counter, defaultdict
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
 
 from baxter_model import SIDES
 from baxter_model.interface import group_of, physical_robot
 
 from .interface import TOPICS
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
-def served(namespace="/robot"):
+
+def served(namespace: str = "/robot") -> dict[str, str]:
     """{topic: type} of what the plugin opens."""
     return {name if name.startswith("/") else "%s/%s" % (namespace, name): row.type
             for row in TOPICS for _, name in row.names()}
 
 
-def physical():
+def physical() -> dict[str, str]:
     """{topic: type} of the physical robot."""
     robot = physical_robot()
     return dict(sorted({**robot.published, **robot.listened}.items()))
 
 
-def elsewhere(name, table):
+def elsewhere(name: str, table: Mapping[str, Any]) -> str | None:
     """Which other node serves a topic, or None. table: the parsed content of config/topics_not_served.yaml."""
     return next((node for pattern, node in table["elsewhere"].items() if fnmatchcase(name, pattern)), None)
 
 
-def reason_to_leave_out(name, kind, table):
+def reason_to_leave_out(name: str, kind: str, table: Mapping[str, Any]) -> str | None:
     """Why a topic is missing, or None if no reason is listed."""
     for entry in table["left_out"]:
         if any(fnmatchcase(kind, pattern) for pattern in entry.get("types", ())) or any(
@@ -35,7 +42,7 @@ def reason_to_leave_out(name, kind, table):
     return None
 
 
-def markdown(table):
+def markdown(table: Mapping[str, Any]) -> str:
     """The coverage section of docs/interface.md: counts by group, then what is left out."""
     here = served()
     counts, left_out = defaultdict(Counter), defaultdict(list)
@@ -66,7 +73,7 @@ def markdown(table):
     return "\n".join(lines) + "\n"
 
 
-def _both_sides(names):
+def _both_sides(names: list[str]) -> list[str]:
     """The names, with left and right of the same topic joined into one."""
     seen = []
     for name in names:

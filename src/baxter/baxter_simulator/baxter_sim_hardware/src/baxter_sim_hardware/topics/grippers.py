@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The grippers' ROS side: messages from and to the hands, and a client's description of a custom tool."""
+
+from __future__ import annotations
+
 import copy
+from typing import TYPE_CHECKING
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
@@ -14,6 +18,14 @@ from baxter_sim_hardware.sensing.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from baxter_sim_hardware.grippers.hands import CupHand, FingersHand
+    from baxter_sim_hardware.robot_state import RobotState
+
+    from .panel import PanelTopics
 
 _MANUFACTURER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
 _PROPERTIES = {
@@ -38,13 +50,13 @@ _LONGEST = 10000
 class GripperTopics(Part):
     """hands: {side: one of `hands`}; state: the robot's RobotState."""
 
-    def __init__(self, hands, state):
+    def __init__(self, hands: Mapping[str, FingersHand | CupHand | NoHand], state: RobotState) -> None:
         self._state = state
         self._hands = hands
         self._properties = {side: _PROPERTIES[type(hand.gripper)] for side, hand in self._hands.items()}
         self._custom_states = {}  # {side: EndEffectorState of a tool that only a client knows}
 
-    def attach_sensors(self, panel):
+    def attach_sensors(self, panel: PanelTopics) -> None:
         """Attach the vacuum sensors, 0 to 255, and the valves of suction grippers to the panel's channels."""
         for side, hand in self._hands.items():
             gripper = hand.gripper

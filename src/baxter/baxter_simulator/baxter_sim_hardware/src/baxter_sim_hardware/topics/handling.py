@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The handlers of incoming messages, and their order."""
-from typing import NamedTuple
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from baxter_model import SIDES
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.message_delay import Late
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from baxter_sim_hardware.warnings import Warnings
+    from loop_ros.protocol import Subscription
 
 
 class _Entry(NamedTuple):
@@ -22,7 +31,7 @@ class _Entry(NamedTuple):
 class Handling:
     """The robot's subscriptions and their handlers."""
 
-    def __init__(self, warnings, delay_of=None):
+    def __init__(self, warnings: Warnings, delay_of: Callable[[int], float] | None = None) -> None:
         """warnings: `warnings.Warnings`, for messages that are refused; delay_of: function(number of a stream) -> how
         long what comes now is on its way [s], or None without delays."""
         self._warnings, self._delay_of = warnings, delay_of
@@ -30,16 +39,17 @@ class Handling:
         self._on_way = []  # subscriptions with messages on their way
 
     @property
-    def waits(self):
+    def waits(self) -> bool:
         """Whether messages are on their way, so that `handle` has to be called."""
         return bool(self._on_way)
 
-    def add(self, subscription, place, key, component, handler, is_delayed=False):
+    def add(self, subscription: Subscription, place: int, key: str, component: object,
+            handler: Callable[[Any, Any, float], None], is_delayed: bool = False) -> None:
         """Register ``handler(component, message, time_s)``; within a tick, lower places come first."""
         late = Late() if is_delayed and self._delay_of is not None else None
         self._topics[subscription] = _Entry(place, key, component, handler, late, len(self._topics) + 1)
 
-    def handle(self, pending, time_s):
+    def handle(self, pending: Iterable[Subscription], time_s: float) -> None:
         """Handle all messages of those subscriptions at time_s [s], and those that were on their way; a refusal is
         logged."""
         if self._delay_of is not None:
@@ -51,7 +61,7 @@ class Handling:
         if self._on_way:
             self._on_way = [subscription for subscription in self._on_way if self._topics[subscription].late]
 
-    def _after_delays(self, pending, time_s):
+    def _after_delays(self, pending: Iterable[Subscription], time_s: float) -> list[Subscription]:
         """Send off what has come in; the subscriptions that may have messages now, in their own order."""
         at_once = []
         for subscription in pending:
@@ -65,19 +75,19 @@ class Handling:
                 entry.late.send(time_s, self._delay_of(entry.number), message)
         return sorted(at_once + self._on_way, key=lambda subscription: self._topics[subscription].number)
 
-    def drop(self, pending):
+    def drop(self, pending: Iterable[Subscription]) -> list[str]:
         """Drop all messages of those subscriptions, and those on their way; returns the keys of the rows that had
         some."""
         self.forget()
         return [self._topics[subscription].key for subscription in pending if subscription.drain()]
 
-    def forget(self):
+    def forget(self) -> None:
         """Drop what is on its way."""
         for subscription in self._on_way:
             self._topics[subscription].late.drop()
         self._on_way = []
 
-    def _call(self, subscription, message, time_s):
+    def _call(self, subscription: Subscription, message: Any, time_s: float) -> None:
         entry = self._topics[subscription]
         try:
             entry.handler(entry.component, message, time_s)

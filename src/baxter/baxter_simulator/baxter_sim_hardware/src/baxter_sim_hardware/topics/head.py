@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The head's ROS side: messages from and to `head.Head`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 
 from baxter_sim_hardware.head import TURNING_SPEED
@@ -7,13 +12,17 @@ from baxter_sim_hardware.head import TURNING_SPEED
 from . import convert
 from .row import STATE_RATE_HZ, Part, Topic
 
+if TYPE_CHECKING:
+    from baxter_sim_hardware.head import PanDrive
+    from baxter_sim_hardware.robot_state import RobotState
+
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
 
 class HeadTopics(Part):
     """drive: `head.PanDrive`; state: the robot's RobotState; dt: length of a tick [s]."""
 
-    def __init__(self, drive, state, dt):
+    def __init__(self, drive: PanDrive, state: RobotState, dt: float) -> None:
         self._head, self._joint, self._state, self._dt = drive.head, drive.joint, state, dt
 
     def _command_pan(self, component, msg, time_s):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's ROS interface as one table: the plugin opens it, the documentation lists it, tests check it."""
+
+from __future__ import annotations
+
 from .arms import CONTROLLERS, ArmTopics
 from .collision import CollisionTopics
 from .grippers import GripperTopics
@@ -26,7 +29,7 @@ DELAYED = ("joint_command", "inverse_dynamics_command", "command_twist_stamped",
            *CONTROLLERS)
 
 
-def markdown_table(namespace="/robot"):
+def markdown_table(namespace: str = "/robot") -> str:
     """The table as docs/interface.md prints it."""
     lines = ["| Topic | Type | Direction | Rate | Meaning |", "|---|---|---|---|---|"]
     for topic in TOPICS:

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The panel's ROS side: messages from and to `panel.Panel`, and the service that presses its buttons."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_core_msgs.msg import (
     AnalogIOState,
     AnalogIOStates,
@@ -18,13 +23,18 @@ from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from gazebo_ros.model_plugin import PluginContext
+
 PRESS_SERVICE = "sim/press"
 
 
 class PanelTopics(Part):
     """Buttons, lights, wheels and the other channels."""
 
-    def __init__(self, context, press_estop):
+    def __init__(self, context: PluginContext, press_estop: Callable[[bool], None]) -> None:
         """press_estop: function(whether the emergency stop is pressed now)."""
         self._panel, self._press_estop = Panel(), press_estop
         self.attach, self.attach_valve = self._panel.attach, self._panel.attach_valve
@@ -34,7 +44,7 @@ class PanelTopics(Part):
             for navigator, link in navigator_lights.LINKS.items() if link in context.robot.links}
         context.service(PRESS_SERVICE, Press, self._press)
 
-    def reset(self):
+    def reset(self) -> None:
         self._panel.reset()
         for navigator in self._drawn:
             self._draw(navigator)
@@ -43,7 +53,7 @@ class PanelTopics(Part):
         _, _, lights = self._panel.navigator(navigator)
         self._drawn[navigator].show(navigator_lights.picture(*lights))
 
-    def cuff_squeezed(self, side):
+    def cuff_squeezed(self, side: str) -> bool:
         """Whether the cuff of one hand is squeezed."""
         return self._panel.digital["%s_lower_cuff" % side]
 

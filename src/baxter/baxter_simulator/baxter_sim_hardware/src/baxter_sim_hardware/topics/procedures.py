@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS interface of the maintenance procedures and the updater."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from baxter_core_msgs.msg import RobustControllerStatus
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
 from std_msgs.msg import Bool, Int32
@@ -19,6 +24,14 @@ from baxter_sim_hardware.errors import CommandRefused
 from sim_time.pace import Schedule
 
 from .row import Part, Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+
+    from baxter_sim_hardware.robot import Baxter
+    from baxter_sim_hardware.warnings import Warnings
 
 UPDATER_RATE_HZ = 1.0
 TYPES = {"Tare": "TareEnable", "CalibrateArm": "CalibrateArmEnable"}  # messages that ask for PROCEDURES
@@ -43,18 +56,18 @@ def _take(name):
 class ProcedureTopics(Part):
     """baxter: `robot.Baxter`; warnings: `warnings.Warnings`."""
 
-    def __init__(self, baxter, warnings):
+    def __init__(self, baxter: Baxter, warnings: Warnings) -> None:
         self._baxter, self._warnings = baxter, warnings
         self.procedures = {(name, side): Procedure(postures(name, side)) for name in PROCEDURES for side in SIDES}
         self._updater = Updater()
         self._schedule = Schedule(STATUS_RATE_HZ)
 
-    def reset(self):
+    def reset(self) -> None:
         for procedure in self.procedures.values():
             procedure.reset()
         self._updater.reset()
 
-    def update(self, time_s, feel):
+    def update(self, time_s: float, feel: Callable[[str], np.ndarray]) -> None:
         """After a step: continue the procedures. feel: function(side) -> (7,) external torques [Nm]; it is
         expensive."""
         if not self._schedule.due(time_s):

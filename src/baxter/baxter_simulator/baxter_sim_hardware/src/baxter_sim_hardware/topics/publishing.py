@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publish each of the robot's topics at its rate, and none without a subscriber."""
+
+from __future__ import annotations
+
 import itertools
 import math
 from functools import partial
+from typing import TYPE_CHECKING
 
 from baxter_sim_hardware.message_delay import Late
 from sim_time.pace import Schedule
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from baxter_sim_hardware.snapshot import Snapshot
+    from loop_ros.protocol import Publisher
 
 
 class Publishing:
     """Topics by rate."""
 
-    def __init__(self, take_snapshot, survived, now_s):
+    def __init__(self, take_snapshot: Callable[[], Snapshot], survived: Callable[[str, Exception], None],
+                 now_s: Callable[[], float]) -> None:
         """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception); now_s:
         function -> simulation time [s]."""
         self._take_snapshot, self._survived, self._now_s = take_snapshot, survived, now_s
@@ -20,19 +31,19 @@ class Publishing:
         self._newest = {}  # publisher of a delayed group: the messages that were sent last
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due
 
-    def add(self, rate, hz, function, component, publisher):
+    def add(self, rate: float | str, hz: float, function: Callable, component: object, publisher: Publisher) -> None:
         """Publish ``function(time_s, component, snapshot)``, a message or a tuple of them, at `hz`, and in a paused
         world once for a new subscriber. rate: the row's, which names the group."""
         group = self._groups.setdefault(rate, (Schedule(hz), []))[1]
         group.append((function, component, publisher))
         publisher.present = partial(self._present, function, component, publisher)
 
-    def delay(self, rates, delay_of):
+    def delay(self, rates: Collection[float | str], delay_of: Callable[[], float]) -> None:
         """The messages of groups `rates` take delay_of() [s], asked at each time that one is due, until they are
         sent."""
         self._delayed, self._delay_of = rates, delay_of
 
-    def forget(self):
+    def forget(self) -> None:
         """The joints were put elsewhere: drop what is on its way. In a paused world, subscribers get the state of
         now."""
         self._late.drop()
@@ -41,12 +52,12 @@ class Publishing:
             for _, _, publisher in topics:
                 publisher.renew()
 
-    def set_rate(self, rate, hz):
+    def set_rate(self, rate: float | str, hz: float) -> None:
         """Publish a group at another rate [Hz]."""
         self._groups[rate][0].set_rate(hz)
         self._idle_until_s = -math.inf
 
-    def publish(self, time_s):
+    def publish(self, time_s: float) -> bool:
         """Publish the messages that are due at time_s [s], and those that were on their way; one that cannot be made is
         left out. Returns whether one was due."""
         if self._late:

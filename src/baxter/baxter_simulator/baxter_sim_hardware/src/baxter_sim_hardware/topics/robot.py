@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot as a whole in ROS messages: all its joints, its state, and the requests that change that state."""
+
+from __future__ import annotations
+
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from std_msgs.msg import Empty, UInt32
@@ -10,6 +14,13 @@ from baxter_sim_hardware.robot_state import Event
 
 from . import convert
 from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from baxter_sim_hardware.simulated import SimulatedBaxter
+    from baxter_sim_hardware.warnings import Warnings
+    from gazebo_ros.model_plugin import PluginContext
 
 # Joints that the physical robot lists, always at 0: it nods without an angle, and its torso turns on no joint.
 WITHOUT_SENSOR = ("head_nod", "torso_t0")
@@ -21,12 +32,13 @@ class RobotTopics(Part):
     """simulated: `simulated.SimulatedBaxter`; set_joint_state_rate: function(Hz); as_robot: whether joint states come
     as the physical robot sends them: arms, head and torso in one message, grippers in another."""
 
-    def __init__(self, simulated, set_joint_state_rate, context, warnings, as_robot=False):
+    def __init__(self, simulated: SimulatedBaxter, set_joint_state_rate: Callable[[float], None],
+                 context: PluginContext, warnings: Warnings, as_robot: bool = False) -> None:
         self._simulated, self._baxter, self._set_rate = simulated, simulated.baxter, set_joint_state_rate
         self._world, self._log, self._warnings = context.world, context.log, warnings
         self._joints = self._messages_of_joints(list(simulated.model.joint_names), as_robot)
 
-    def apply(self, event):
+    def apply(self, event: Event) -> None:
         """Take an `Event`; a request that the robot's state refuses is logged."""
         before = self._baxter.state.state
         try:
@@ -37,15 +49,15 @@ class RobotTopics(Part):
         if self._baxter.state.state is not before:
             self._log.info("Baxter is %s" % self._baxter.state.state.value)
 
-    def press_estop(self, pressed):
+    def press_estop(self, pressed: bool) -> None:
         """The emergency stop button was pressed or released."""
         self.apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE)
 
-    def announce_start(self):
+    def announce_start(self) -> None:
         """Tell subscribers that the robot is ready."""
         self._started.publish(Empty())
 
-    def announce_reset(self):
+    def announce_reset(self) -> None:
         """Tell subscribers that the joints were moved by a service or reset."""
         self._resets.publish(UInt32(next(_resets)))
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A row of the interface table, and the base class of parts with rows."""
+
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,10 +43,10 @@ class Topic:
     meaning: str
 
     @property
-    def is_published(self):
+    def is_published(self) -> bool:
         return self.rate is not None
 
-    def names(self):
+    def names(self) -> list[tuple[str | tuple[str, ...] | None, str]]:
         """[(component or None, topic name)], one for each limb, navigator ... that has its own topic."""
         kinds = [kind for kind in COMPONENTS if "{%s}" % kind in self.name]
         names = []
@@ -59,14 +62,14 @@ class Part:
     TOPICS = ()
 
     @property
-    def publishers(self):
+    def publishers(self) -> dict[str, MethodType]:
         """{key: bound function} of the rows that the robot publishes."""
         return {row.key: MethodType(row.function, self) for row in self.TOPICS if row.is_published}
 
     @property
-    def handlers(self):
+    def handlers(self) -> dict[str, MethodType]:
         """{key: bound function} of the rows that the robot subscribes to."""
         return {row.key: MethodType(row.function, self) for row in self.TOPICS if not row.is_published}
 
-    def reset(self):
+    def reset(self) -> None:
         """The world went back to its start."""

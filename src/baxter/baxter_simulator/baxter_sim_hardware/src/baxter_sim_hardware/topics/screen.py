@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS interface of the head's screen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -8,6 +13,9 @@ from sim_time.stamps import stamp
 
 from .row import Part, Topic
 
+if TYPE_CHECKING:
+    from gazebo_ros.model_plugin import PluginContext
+
 SCREEN_FRAME = "screen"
 SCREEN_RATE_HZ = 10.0
 
@@ -15,13 +23,13 @@ SCREEN_RATE_HZ = 10.0
 class ScreenTopics(Part):
     """The head's screen; attribute `screen`: the Screen."""
 
-    def __init__(self, context):
+    def __init__(self, context: PluginContext) -> None:
         """`context`: the plugin's PluginContext, which passes the picture to the renderers."""
         self.screen = Screen()
         glass = on_glass(context.robot)
         self._drawn = context.screen(GLASS_LINK, *glass, (WIDTH, HEIGHT)) if glass else None
 
-    def reset(self):
+    def reset(self) -> None:
         """A dark screen."""
         self.screen.reset()
         self._draw()

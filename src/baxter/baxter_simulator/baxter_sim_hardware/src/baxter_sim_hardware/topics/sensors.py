@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's sensors as ROS messages. Rays are cast only for topics with subscribers."""
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Point32, Vector3
@@ -16,13 +20,21 @@ from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from baxter_sim_hardware.sensing.noise import HandSensors
+    from gazebo_ros.model_plugin import PluginContext
+
+    from .panel import PanelTopics
+
 SONAR_FRAME = "sonar_ring"
 SONAR_RATE_HZ = 10.0
 LIGHT_TURNS = 12  # in which all sonars have listened for the lights that pictures show
 _UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of an Imu's missing measurement
 
 
-def accelerometer_frame(side):
+def accelerometer_frame(side: str) -> str:
     return "%s_hand_accelerometer" % side
 
 
@@ -33,7 +45,8 @@ class SensorTopics(Part):
     If the description lacks a sensor's frame, that sensor reports no echo and zero acceleration.
     """
 
-    def __init__(self, context, limb_index, dt, hands=None):
+    def __init__(self, context: PluginContext, limb_index: Mapping[str, np.ndarray], dt: float,
+                 hands: HandSensors | None = None) -> None:
         world, model, robot = context.world, context.model, context.robot
         self._world, self._model, self._limb_index, self._dt, self._hands = world, model, limb_index, dt, hands
         self._links = set(robot.links)
@@ -49,11 +62,11 @@ class SensorTopics(Part):
         self._shown, self._drawing = (0, 0.0, 0.0), Schedule(SONAR_RATE_HZ)
         self._heard, self._turn = np.full(sensors.SONAR_COUNT, np.inf), 0
 
-    def reset(self):
+    def reset(self) -> None:
         self._ring.reset()
         self._heard[:], self._turn = np.inf, 0
 
-    def update(self, time_s):
+    def update(self, time_s: float) -> None:
         """Show the ring's lights as they are at time_s [s]. The sonars listen one by one: to ask all of them each time
         takes as long as eight physics steps, and mostly nobody takes a picture."""
         if self._drawn is None or not self._drawing.due(time_s):
@@ -71,7 +84,7 @@ class SensorTopics(Part):
 
     # -- hands
 
-    def attach_sensors(self, panel):
+    def attach_sensors(self, panel: PanelTopics) -> None:
         """Show the hands' ranges [mm] among the panel's channels."""
         for side, name in RANGE_SENSORS.items():
             panel.attach(name, lambda side=side: round(1000.0 * sensors.range_from_hit(self._hit(side))))

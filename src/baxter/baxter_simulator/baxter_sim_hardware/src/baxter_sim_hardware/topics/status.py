@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's diagnostics and its description, as ROS messages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from baxter_core_msgs.msg import URDFConfiguration
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -11,6 +16,12 @@ from sim_time.stamps import stamp
 
 from .row import LATCHED, Part, Topic
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from baxter_sim_hardware.robot import Baxter
+    from loop_ros.protocol import Log
+
 DIAGNOSTICS_RATE_HZ = 1.0
 AGGREGATE = "/Baxter"
 
@@ -19,7 +30,8 @@ class StatusTopics(Part):
     """baxter: `robot.Baxter`; limb_index: {side: (7,) indices of its joints in the model's}; links: names of the
     robot's; urdf_xml: its description; log: of the plugin's context."""
 
-    def __init__(self, baxter, limb_index, links, urdf_xml, log):
+    def __init__(self, baxter: Baxter, limb_index: Mapping[str, np.ndarray], links: Collection[str], urdf_xml: str,
+                 log: Log) -> None:
         self._baxter, self._limb_index = baxter, limb_index
         self._links, self._urdf_xml, self._log = links, urdf_xml, log
         self._urdf = self._fragment_time = None
