@@ -22,10 +22,13 @@ from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from arm_kinematics.bullet_checker import BulletChecker
     from urdf_model.model import Robot
 
 
-def read_robot(path) -> Robot:
+def read_robot(path: str | Path | None) -> Robot:
     """Return the urdf_model.Robot in a URDF or xacro file, of Baxter where ``path`` is None."""
     if path is None:
         import rospkg
@@ -57,7 +60,7 @@ def chain_of(options: argparse.Namespace) -> tuple[Robot, Chain]:
     return robot, Chain.from_robot(robot, base, options.tip or tip_of(options.side))
 
 
-def run_command(main):
+def run_command(main: Callable[[], int]) -> int:
     """Run a command; its own errors become one line and exit status 1."""
     try:
         return main()
@@ -71,14 +74,14 @@ def run_command(main):
         return 130
 
 
-def _row(values, number: str = "%.6f") -> str:
+def _row(values: Iterable[float], number: str = "%.6f") -> str:
     return " ".join(number % value for value in values)
 
 
 # -- fk --------------------------------------------------------------------------------------------------------------
 
 
-def fk():
+def fk() -> int:
     """Entry point of ``rosrun baxter_sim_kinematics fk``."""
     neutral = poses().angles("neutral", SIDES[0]).values()
     parser = with_numbers(new_parser("Where the tip of an arm is for given joint values.\n\n"
@@ -118,7 +121,7 @@ def _fk(options: argparse.Namespace) -> int:
 # -- ik --------------------------------------------------------------------------------------------------------------
 
 
-def ik():
+def ik() -> int:
     """Entry point of ``rosrun baxter_sim_kinematics ik``."""
     parser = with_numbers(new_parser("Joint values that put the tip of an arm somewhere, or why there are none.\n\n"
                                      "  rosrun baxter_sim_kinematics ik 0.644 0 0.066 -0.381 0.923 -0.015 0.052"))
@@ -172,7 +175,7 @@ def _ik(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
     return 0
 
 
-def self_collision_checker(robot: Robot, warn: Callable[[str], None]):
+def self_collision_checker(robot: Robot, warn: Callable[[str], None]) -> BulletChecker:
     """Return a BulletChecker of ``robot`` alone; ``warn`` is called with a text where a mesh is missing."""
     from baxter_sim_kinematics.self_checker import self_checker
     from model_files.resources import ResourceFinder

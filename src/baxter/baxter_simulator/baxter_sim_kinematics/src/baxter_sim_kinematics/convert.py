@@ -2,7 +2,7 @@
 """Conversions between ROS messages and this package's own types. Few other modules know messages."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from baxter_kinematics_msgs.msg import IKVerdict
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -13,6 +13,12 @@ from arm_kinematics.target import pose_from_quaternion
 from urdf_model.transforms import quaternion_from_matrix
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import genpy
+    import numpy as np
+    from geometry_msgs.msg import PoseStamped, Transform
+
     from arm_kinematics.chain import Chain
 
 _VERDICTS = {
@@ -24,23 +30,23 @@ _VERDICTS = {
 }
 
 
-def pose_matrix(pose: Any):
+def pose_matrix(pose: Pose) -> np.ndarray:
     """Return the (4, 4) matrix of a geometry_msgs/Pose. Raises InvalidTarget when it is not a pose."""
     point, turn = pose.position, pose.orientation
     return pose_from_quaternion((point.x, point.y, point.z), (turn.x, turn.y, turn.z, turn.w))
 
 
-def transform_matrix(transform):
+def transform_matrix(transform: Transform) -> np.ndarray:
     """Return the (4, 4) matrix of a geometry_msgs/Transform. Raises InvalidTarget when it is not a transform."""
     return pose_matrix(Pose(position=transform.translation, orientation=transform.rotation))
 
 
-def posture(chain: Chain, joint_state):
+def posture(chain: Chain, joint_state: JointState) -> np.ndarray:
     """Return the posture (n,) of ``chain`` that a sensor_msgs/JointState holds. Raises InvalidPosture."""
     return chain.posture_by_name(list(joint_state.name), list(joint_state.position))
 
 
-def joint_state(chain: Chain, q, order, stamp):
+def joint_state(chain: Chain, q: np.ndarray, order: Iterable[str], stamp: genpy.Time) -> JointState:
     """Return a sensor_msgs/JointState of the posture ``q`` (n,), its joints in the given order of names."""
     by_name = dict(zip(chain.joint_names, q.tolist(), strict=True))
     message = JointState(name=list(order), position=[by_name[name] for name in order])
@@ -48,12 +54,12 @@ def joint_state(chain: Chain, q, order, stamp):
     return message
 
 
-def pose_message(matrix):
+def pose_message(matrix: np.ndarray) -> Pose:
     """Return the geometry_msgs/Pose of a (4, 4) matrix."""
     return Pose(Point(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
 
 
-def verdict(chain: Chain, error, target, order, stamp):
+def verdict(chain: Chain, error: Exception, target: PoseStamped, order: Iterable[str], stamp: genpy.Time) -> IKVerdict:
     """Return the IKVerdict of the exception ``error`` about the PoseStamped ``target``; see :func:`joint_state`."""
     message = IKVerdict(verdict=IKVerdict.INVALID_REQUEST, detail=str(error), target=target)
     if isinstance(error, NoSolution):

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import struct
-from typing import Any
+from typing import TYPE_CHECKING
 
 import genpy
 from sensor_msgs.msg import JointState
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from std_msgs.msg import Header
 
 # std_msgs/Header on the wire: sequence number, then the stamp.
 _STAMP = struct.Struct("<4xII")
@@ -19,11 +24,11 @@ class UnreadJointState(JointState):
         """Does not create the fields: nobody reads them, and creating them takes as long as all other work here."""
 
     @property
-    def header(self):
+    def header(self) -> Header:
         """For rospy's statistics about topics, which few labs have."""
         return JointState().deserialize(self.serialized).header
 
-    def deserialize(self, buffer):
+    def deserialize(self, buffer: bytes) -> UnreadJointState:
         """Keep the bytes. Raises genpy.DeserializationError if they end within the header."""
         if len(buffer) < _STAMP.size:
             raise genpy.DeserializationError("joint states of %d bytes" % len(buffer))
@@ -34,7 +39,7 @@ class UnreadJointState(JointState):
 class NewestState:
     """Takes UnreadJointStates; any thread may read the newest one with all of ``joint_names``."""
 
-    def __init__(self, joint_names, time_went_back) -> None:
+    def __init__(self, joint_names: Iterable[str], time_went_back: Callable[[], object]) -> None:
         """``time_went_back()`` is called when a state is older than the one before it."""
         # A serialized string is its length and its bytes. The fingers may come in a message of their own.
         self._needed = [struct.pack("<I", len(name)) + name for name in map(str.encode, joint_names)]
@@ -42,7 +47,7 @@ class NewestState:
         self._serialized, self._stamp = None, (0, 0)
         self._read = None, None  # the last result, and the message that it came from
 
-    def take(self, message: Any):
+    def take(self, message: UnreadJointState) -> bool:
         """Returns whether it has all of the joints, and so is the newest state now."""
         stamp = _STAMP.unpack_from(message.serialized)
         if stamp < self._stamp:
@@ -52,7 +57,7 @@ class NewestState:
             self._serialized, self._stamp = message.serialized, stamp
         return counts
 
-    def read(self):
+    def read(self) -> JointState | None:
         """Return the newest JointState, or None if there is none yet. Raises genpy.DeserializationError."""
         serialized = self._serialized
         if serialized is None:

@@ -7,9 +7,8 @@ import csv
 import math
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +31,7 @@ from command_line.options import MAX_WORKERS, number
 from command_line.user_files import PIPE_WAIT_S, read_text
 
 if TYPE_CHECKING:
+    from arm_kinematics.bullet_checker import BulletChecker
     from arm_kinematics.chain import Chain
     from urdf_model.model import Robot
 
@@ -64,7 +64,7 @@ def _reach_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def reach():
+def reach() -> int:
     """Entry point of ``rosrun baxter_sim_kinematics reach``."""
     parser = _reach_parser()
     return run_command(lambda: _reach(parser.parse_args()))
@@ -134,7 +134,7 @@ class _Bar:
     def __init__(self) -> None:
         self._last = -1
 
-    def __call__(self, done: Callable[[], bool], total) -> None:
+    def __call__(self, done: int, total: int) -> None:
         tenth, terminal = 10 * done // total, sys.stderr.isatty()
         if terminal:
             full = 40 * done // total
@@ -147,7 +147,7 @@ class _Bar:
         sys.stderr.flush()
 
 
-def reach_overlap():
+def reach_overlap() -> int:
     """Entry point of ``rosrun baxter_sim_kinematics reach_overlap``."""
     parser = argparse.ArgumentParser(
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -181,7 +181,7 @@ def _overlap(options: argparse.Namespace) -> int:
     return 0
 
 
-def reach_place():
+def reach_place() -> int:
     """Entry point of ``rosrun baxter_sim_kinematics reach_place``."""
     parser = with_numbers(new_parser(
         "Where to put a table, or any task, before an arm: the places at which most of its poses are reached.\n"
@@ -228,7 +228,7 @@ def _place(options: argparse.Namespace) -> int:
     return 0
 
 
-def _is_solved(chain: Chain, pose: Any, checker) -> bool:
+def _is_solved(chain: Chain, pose: np.ndarray, checker: BulletChecker | None) -> bool:
     try:
         solve(chain, pose, chain.mid_range, checker=checker)
     except NoSolution:
@@ -236,7 +236,7 @@ def _is_solved(chain: Chain, pose: Any, checker) -> bool:
     return True
 
 
-def _task_poses(path):
+def _task_poses(path: Path) -> np.ndarray:
     poses = []
     for row, line in enumerate(read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines(), 1):
         words = line.replace(",", " ").replace(";", " ").split()

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from arm_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
 from command_line.options import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+
     from arm_kinematics.chain import Chain
+    from arm_kinematics.posture_map import PostureMap
 
 
 class SeedMode(enum.IntEnum):
@@ -29,7 +34,7 @@ _TRIED = {
 }
 
 
-def seed_mode(number: str):
+def seed_mode(number: int) -> SeedMode:
     """Return the SeedMode of a number. Raises InvalidSeed."""
     try:
         return SeedMode(number)
@@ -50,12 +55,14 @@ class SeedRequest(NamedTuple):
 class SeedPolicy:
     """Tries seeds in the order of the mode. ``neutral`` (n,): used if the current posture is not known."""
 
-    def __init__(self, chain: Chain, posture_map, neutral, current) -> None:
+    def __init__(self, chain: Chain, posture_map: PostureMap, neutral: np.ndarray,
+                 current: Callable[[], np.ndarray]) -> None:
         """``current()``: returns the current posture (n,), or raises InvalidPosture, which says why it is not known."""
         self._chain, self._posture_map, self._neutral, self._current = chain, posture_map, neutral, current
         self._reported = None  # why the current posture was unknown at the last call, or None
 
-    def answer(self, request, index, target, solve, remarks):
+    def answer(self, request: SeedRequest, index: int, target: np.ndarray, solve: Callable[[np.ndarray], Any],
+               remarks: list[str]) -> tuple[SeedMode, Any]:
         """Return (SeedMode of the seed that succeeded, result of ``solve(seed)``) for pose number ``index`` of a
         SeedRequest.
 
@@ -76,7 +83,8 @@ class SeedPolicy:
                 failure = error
         raise failure
 
-    def _seed(self, mode, request, index, target, remarks):
+    def _seed(self, mode: SeedMode, request: SeedRequest, index: int, target: np.ndarray,
+              remarks: list[str]) -> np.ndarray | None:
         """Return the posture to start from, or None if AUTO has no user's seed."""
         if mode is SeedMode.NS_MAP:
             return self._posture_map.nearest(target)
@@ -98,7 +106,7 @@ class SeedPolicy:
             remarks.append("the seed of pose %d is left out: %s" % (index + 1, error))
             return None
 
-    def _current_or_neutral(self, remarks):
+    def _current_or_neutral(self, remarks: list[str]) -> np.ndarray:
         try:
             current = self._current()
         except InvalidPosture as error:

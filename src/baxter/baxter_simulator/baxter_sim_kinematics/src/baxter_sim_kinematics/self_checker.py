@@ -10,7 +10,8 @@ from bullet_sim import LOG
 from urdf_model import Robot
 
 
-def self_checker(robot: Robot, find_mesh: Callable, warn: Callable[[str], None] = LOG.warning) -> BulletChecker:
+def self_checker(robot: Robot, find_mesh: Callable[[str], str | None],
+                 warn: Callable[[str], None] = LOG.warning) -> BulletChecker:
     """Return a BulletChecker of a robot alone: with Baxter's own pairs and convex pieces, or of another robot with all
     pairs that make sense. ``find_mesh``, ``warn``: as for ``bullet_sim.World``.
     """
