@@ -29,7 +29,7 @@ CONTROLS = {"joint_delta": 7, "joint_pos": 7, "osc_pose": 6}
 class ArmControl:
     """One arm: `arm`, by `control`, one of CONTROLS. Without a gripper the last number of its actions does nothing."""
 
-    def __init__(self, arm: Arm, control: str, has_gripper: bool = True):
+    def __init__(self, arm: Arm, control: str, has_gripper: bool = True) -> None:
         self._arm, self._control, self._has_gripper = arm, control, has_gripper
         self.reset()
 
@@ -51,7 +51,7 @@ class ArmControl:
         """Send a set-point: `share` of the way from `begin` (7,) to the target."""
         self._arm.command(Mode.RAW_POSITION, begin + share * (self.target - begin))
 
-    def _wanted(self, action):
+    def _wanted(self, action: np.ndarray) -> np.ndarray:
         arm = self._arm
         if self._control == "joint_delta":
             return self.target + JOINT_DELTA_RAD * action
@@ -68,7 +68,7 @@ def action_size(control: str, arms: int = 2) -> int:
     return arms * (CONTROLS[control] + 1)
 
 
-def checked(action: Sequence[float], size: int) -> np.ndarray:
+def checked(action: Sequence[float] | np.ndarray, size: int) -> np.ndarray:
     """(size,) an action, clipped to -1 … 1. Raises ValueError for another size and for NaN."""
     action = np.asarray(action, dtype=float)
     if action.shape != (size,) or np.isnan(action).any():

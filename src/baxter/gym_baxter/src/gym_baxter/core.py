@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,13 @@ from urdf_model.transforms import quaternion_from_matrix
 from .controls import ArmControl, action_size, checked
 from .randomised import Randomised, Randomiser
 from .tasks import TASKS, robosuite_start
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from baxter_lab.saving import SavedState
+
+    from .randomised import Drawn
 
 # Set-points are streamed at 100 Hz, as programs on the robot do.
 STREAM_S = 0.01
@@ -53,7 +60,7 @@ class Stepped(NamedTuple):
 class Core:
     """task: a name in `tasks.TASKS`; choices: `Choices`. Raises ValueError for unknown names, MeshesMissing."""
 
-    def __init__(self, task: str, choices: Choices = Choices()):  # noqa: B008 (a tuple)
+    def __init__(self, task: str, choices: Choices = Choices()) -> None:  # noqa: B008 (a tuple)
         if task not in TASKS:
             raise ValueError("task is %r; choices are %s" % (task, ", ".join(TASKS)))
         if choices.obs_type not in OBSERVATIONS:
@@ -72,7 +79,7 @@ class Core:
         self._randomiser = Randomiser(choices.randomised, self.lab, choices.cameras)
         self._start = self.lab.save()
 
-    def _start_robot(self):
+    def _start_robot(self) -> None:
         table = poses()
         start = robosuite_start() if self.task.POSE is None else {
             side: np.array(list(table.angles(self.task.POSE, side).values())) for side in SIDES}
@@ -80,7 +87,7 @@ class Core:
         self.lab.robot.put(start)
 
     @property
-    def _is_randomised(self):
+    def _is_randomised(self) -> bool:
         return self.choices.randomised != Randomised()
 
     @property
@@ -102,7 +109,7 @@ class Core:
             control.reset()
         return self.observation()
 
-    def step(self, action) -> Stepped:
+    def step(self, action: Sequence[float] | np.ndarray) -> Stepped:
         """One action, (action_size,) of numbers from -1 to 1. Raises ValueError."""
         action = checked(action, self.action_size)
         begins = [control.target.copy() for control in self._controls]
@@ -146,13 +153,13 @@ class Core:
 
     # -- states
 
-    def save(self):
+    def save(self) -> tuple[SavedState, list[Callable[[], object]], dict[str, Any], Drawn]:
         """The whole state: the physics, the robot's control logic, the task's."""
         logic = [restorer(vars(control)) for control in self._controls]
         goal = {name: value for name, value in vars(self.task).items() if name == "goal"}
         return self.lab.save(), logic, goal, self._randomiser.drawn
 
-    def restore(self, state) -> dict:
+    def restore(self, state: tuple[SavedState, list[Callable[[], object]], dict[str, Any], Drawn]) -> dict:
         """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
         for bit. Raises LabError."""
         saved, logic, task, drawn = state
@@ -165,7 +172,7 @@ class Core:
         return self.observation()
 
 
-def _ticks(choices):
+def _ticks(choices: Choices) -> int:
     """Ticks of an action. Raises ValueError unless it is a whole number."""
     rate, step = choices.control_freq, choices.physics_step_s
     ticks = 1.0 / (step * rate) if rate > 0 and step > 0 else 0.0

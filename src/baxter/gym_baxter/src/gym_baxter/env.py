@@ -2,6 +2,8 @@
 """The environments for Gymnasium."""
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 from gymnasium import spaces
@@ -24,7 +26,7 @@ class BaxterEnv(gymnasium.Env, EzPickle):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
-    def __init__(self, task: str, render_mode: str | None = None, **choices):
+    def __init__(self, task: str, render_mode: str | None = None, **choices: Any) -> None:
         EzPickle.__init__(self, task, render_mode, **choices)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError("render_mode is %r; choices are None and rgb_array" % (render_mode,))
@@ -36,39 +38,40 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         self._core.reset(np.random.default_rng(0))
         self.observation_space = _space(self._given(self._core.observation()))
 
-    def _given(self, observation):
+    def _given(self, observation: dict[str, Any]) -> np.ndarray | dict[str, Any]:
         return observation["state"] if self._core.choices.obs_type == "state" else (
             observation if "agent_pos" in observation else observation["pixels"])
 
-    def reset(self, *, seed=None, options=None):
+    def reset(self, *, seed: int | None = None,
+              options: dict[str, Any] | None = None) -> tuple[np.ndarray | dict[str, Any], dict[str, Any]]:
         """Begin an episode."""
         super().reset(seed=seed)
         state = (options or {}).get("state")
         found = self._core.reset(self.np_random) if state is None else self._core.restore(state)
         return self._given(found), {"is_success": False}
 
-    def step(self, action):
+    def step(self, action: np.ndarray) -> tuple[np.ndarray | dict[str, Any], float, bool, bool, dict[str, Any]]:
         """One action."""
         observation, reward, succeeded = self._core.step(action)
         return self._given(observation), float(reward), bool(succeeded), False, {"is_success": bool(succeeded)}
 
-    def save(self):
+    def save(self) -> tuple:
         """The whole present state, for ``reset(options={"state": ...})`` of this environment."""
         return self._core.save()
 
-    def render(self):
+    def render(self) -> np.ndarray | None:
         """A picture from outside, (360, 480, 3) uint8, with render_mode rgb_array."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs gymnasium.make(..., render_mode=\"rgb_array\")")
             return None
         return self._core.lab.cameras.look(_EYE, _TARGET, *_PICTURE).pixels
 
-    def close(self):
+    def close(self) -> None:
         """End the world."""
         self._core.close()
 
 
-def _space(value):
+def _space(value: np.ndarray | dict[str, Any]) -> spaces.Space:
     if isinstance(value, dict):
         return spaces.Dict({name: _space(part) for name, part in value.items()})
     if value.dtype == np.uint8:

@@ -4,6 +4,7 @@ robosuite's TwoArmPegInHole; the README says where it differs. All in `base`, SI
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from urdf_model.transforms import quaternion_from_matrix
 from .bodies import RED, WOOD, Link, Part, urdf
 from .names import places, poses
 from .task import Task
+
+if TYPE_CHECKING:
+    from baxter_lab import Options
 
 
 class TwoArmPegInHole(Task):
@@ -31,18 +35,18 @@ class TwoArmPegInHole(Task):
     BESIDE_M, ALONG_M, ALIGNED = 0.06, (-0.12, 0.14), 0.95
 
     @classmethod
-    def robot(cls, options):
+    def robot(cls, options: Options) -> Options:
         peg = Link([Part((cls.RADIUS_M, 2.0 * cls.HALF_LENGTH_M), (0.0, 0.0, 0.0))], RED)
         plate = Link([Part(size, place) for size, place in cls.PLATE], WOOD)
         tools = (Tool("left", urdf("plate", {"plate": plate}), cls.PLATE_PLACE_M, (math.pi / 2.0, 0.0, math.pi)),
                  Tool("right", urdf("peg", {"peg": peg}), (0.0, 0.0, cls.HALF_LENGTH_M)))
         return options._replace(left_gripper="none", right_gripper="none", tools=tools)
 
-    def _frames(self):
+    def _frames(self) -> tuple[np.ndarray, np.ndarray]:
         model = self.lab.robot.simulated.model
         return model.link_pose("plate").matrix(), model.link_pose("peg").matrix()
 
-    def _fit(self, plate, peg):
+    def _fit(self, plate: np.ndarray, peg: np.ndarray) -> tuple[float, float, float]:
         """How far the hole is along the peg's axis and beside it [m], and the cosine between axis and hole."""
         axis = peg[:3, 2]
         to_hole = (plate @ (*self.HOLE_M, 1.0))[:3] - peg[:3, 3]
@@ -50,16 +54,16 @@ class TwoArmPegInHole(Task):
         beside = float(np.linalg.norm(to_hole - along * axis))
         return along, beside, abs(float(plate[:3, 2] @ axis))
 
-    def _is_in(self, along, beside, cosine):
+    def _is_in(self, along: float, beside: float, cosine: float) -> bool:
         return beside < self.BESIDE_M and self.ALONG_M[0] <= along <= self.ALONG_M[1] and cosine > self.ALIGNED
 
-    def observed(self):
+    def observed(self) -> np.ndarray:
         plate, peg = self._frames()
         along, beside, cosine = self._fit(plate, peg)
         return np.concatenate([plate[:3, 3], quaternion_from_matrix(plate), peg[:3, 3], quaternion_from_matrix(peg),
                                plate[:3, 3] - peg[:3, 3], (cosine, along, beside)])
 
-    def reward(self):
+    def reward(self) -> float:
         """robosuite's, divided by its greatest value, 5: a fifth each for the hands' distance, for the peg beside and
         along the hole, for its direction, and for success."""
         plate, peg = self._frames()
@@ -68,5 +72,5 @@ class TwoArmPegInHole(Task):
         shaped = 3.0 - math.tanh(apart) - math.tanh(beside) - math.tanh(abs(along)) + cosine
         return (shaped + self._is_in(along, beside, cosine)) / 5.0
 
-    def succeeded(self):
+    def succeeded(self) -> bool:
         return self._is_in(*self._fit(*self._frames()))

@@ -37,7 +37,7 @@ class Task:
         """The robot that the task needs, made of the one that was asked for."""
         return options
 
-    def __init__(self, lab: Lab):
+    def __init__(self, lab: Lab) -> None:
         self.lab = lab
         self.build()
 
@@ -59,10 +59,10 @@ class Task:
         """Whether it is done."""
         raise NotImplementedError
 
-    def _hand(self, side):
+    def _hand(self, side: str) -> np.ndarray:
         return self.lab.robot.arms[side].pose[:3, 3]
 
-    def _table(self, size, place, name="table"):
+    def _table(self, size: tuple[float, float], place: tuple[float, float], name: str = "table") -> None:
         """A table: size (length, width), place (x, y) of its middle [m]."""
         self.lab.add_box(name, (*size, 0.05), (*place, TABLE_TOP_M - 0.025), colour=_TABLE_COLOUR)
 

@@ -35,7 +35,7 @@ class TwoArmTransport(Task):
     JITTER_M, YAW_RAD, CUBE_YAW_RAD = 0.005, math.pi / 6.0, 0.3 * math.pi
     _ON_BASE_M = 0.004  # a point of contact is on the bottom of a bin if it is no higher than this above it
 
-    def build(self):
+    def build(self) -> None:
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             self._table(self.TABLE_M, (self.TABLE_X_M, sign * self.TABLE_Y_M), "%s_table" % side)
         self.bins = {name: self._bin(name, x, sign * self.TABLE_Y_M) for name, x, sign in (
@@ -62,7 +62,7 @@ class TwoArmTransport(Task):
         return self.lab.add_urdf(name, urdf(name, {name: Link(parts, (0.85, 0.85, 0.88, 1.0))}),
                                  (self.TABLE_X_M + x, y, TABLE_TOP_M + 0.5 * height), static=True)
 
-    def begin(self, random):
+    def begin(self, random: np.random.Generator) -> None:
         def jitter():
             return random.uniform(-self.JITTER_M, self.JITTER_M, 2)
 
@@ -79,13 +79,13 @@ class TwoArmTransport(Task):
         x, y, _ = self.bins["target_bin"].position
         self.trash.put((x, y, bottom + 0.5 * self.CUBE_M), float(random.uniform(-self.CUBE_YAW_RAD, self.CUBE_YAW_RAD)))
 
-    def _is_in(self, thing, name):
+    def _is_in(self, thing: Thing, name: str) -> bool:
         """Whether a thing touches the bottom of a bin."""
         floor = TABLE_TOP_M + self.WALL_M
         return any(contact.distance <= 0.0 and contact.position[2] < floor + self._ON_BASE_M
                    for contact in self.lab.world.contacts(thing.model, self.bins[name].model))
 
-    def observed(self):
+    def observed(self) -> np.ndarray:
         hammer, trash, lid = (thing.position for thing in (self.hammer, self.trash, self.lid))
         return np.array([
             *posed(self.hammer), *posed(self.trash), *posed(self.lid), *self.bins["target_bin"].position,
@@ -93,9 +93,9 @@ class TwoArmTransport(Task):
             self._is_in(self.trash, "trash_bin"), *(value for side in SIDES for value in hammer - self._hand(side)),
             *(lid - self._hand("right")), *(trash - self._hand("left"))], dtype=float)
 
-    def reward(self):
+    def reward(self) -> float:
         """As robosuite's, which has no other: 1 for success."""
         return float(self.succeeded())
 
-    def succeeded(self):
+    def succeeded(self) -> bool:
         return self._is_in(self.hammer, "target_bin") and self._is_in(self.trash, "trash_bin")

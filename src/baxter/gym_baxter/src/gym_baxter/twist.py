@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled: the joints of an arm after its hand has moved by a twist."""
+
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics.kernels import linear, motion
 from disk_cache.compiled import compiler
+
+if TYPE_CHECKING:
+    from arm_kinematics.kernels import Arm, Limits
 
 _compiled = compiler("gym_baxter", [__file__, linear.__file__, motion.__file__], error_model="numpy")
 
@@ -15,7 +22,7 @@ _STILL = 1e-9
 
 
 @_compiled
-def _fill_difference(goal, pose, error):
+def _fill_difference(goal: np.ndarray, pose: np.ndarray, error: np.ndarray) -> None:
     """Fill error (6,) with shift and turn from one pose to another [m, rad]: the turn is axis times angle."""
     turned = np.zeros((3, 3))
     for i in range(3):
@@ -34,7 +41,7 @@ def _fill_difference(goal, pose, error):
 
 
 @_compiled
-def _turn(pose, vector):
+def _turn(pose: np.ndarray, vector: np.ndarray) -> None:
     """Turn a pose (4, 4) in place about `vector` (3,), axis times angle [rad], in the base frame (Rodrigues)."""
     angle = linear.length(vector, 0, 3)
     if angle <= _STILL:
@@ -52,7 +59,7 @@ def _turn(pose, vector):
 
 
 @_compiled
-def after(arm, limits, q, twist, damping):
+def after(arm: Arm, limits: Limits, q: np.ndarray, twist: np.ndarray, damping: float) -> np.ndarray:
     """(n,) joints [rad] after the hand's pose at `q` (n,) has moved by `twist` (6,), shift [m] and turn [rad], in the
     base frame. arm, limits: as for `arm_kinematics.kernels`; damping: as of damped least squares [m]."""
     rotations, offsets, prismatic = arm

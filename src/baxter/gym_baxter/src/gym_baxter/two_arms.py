@@ -25,12 +25,12 @@ class TwoArmLift(Task):
     HANDLE_M, ROD_M = 0.09, 0.02  # length and width of a handle; side of its rods
     LIFTED_M, UPRIGHT = 0.10, math.cos(math.radians(30.0))
 
-    def build(self):
+    def build(self) -> None:
         self._table((0.8, 0.8), (0.26 + 0.4, 0.0))
         self.pot = self.lab.add_urdf("pot", urdf("pot", {"link": Link(self._parts(), STEEL)}),
                                      (0.66, 0.0, TABLE_TOP_M + self.HALF_M))
 
-    def _parts(self):
+    def _parts(self) -> list[Part]:
         """Walls, bottom and handles; the handles are along y."""
         half, wall, rod, handle = self.HALF_M, self.WALL_M, self.ROD_M, self.HANDLE_M
         found = [((2 * half, 2 * half, wall), (0.0, 0.0, 0.5 * wall - half))]
@@ -44,7 +44,7 @@ class TwoArmLift(Task):
             found.append(((handle, rod, rod), (0.0, sign * (half + handle + 0.5 * rod), half - rod)))
         return [Part(size, place, self.DENSITY) for size, place in found]
 
-    def begin(self, random):
+    def begin(self, random: np.random.Generator) -> None:
         x, y = random.uniform(-0.03, 0.03, 2)
         yaw = math.pi + random.uniform(-math.pi / 3, math.pi / 3)
         self.pot.put((0.66 + float(x), float(y), TABLE_TOP_M + self.HALF_M + 1e-3), float(yaw))
@@ -57,15 +57,15 @@ class TwoArmLift(Task):
         return {side: (pose @ (0.0, sign * out, self.HALF_M - self.ROD_M, 1.0))[:3]
                 for side, sign in zip(SIDES, (-1.0, 1.0), strict=True)}
 
-    def observed(self):
+    def observed(self) -> np.ndarray:
         handles = self._handles()
         return np.array([*posed(self.pot), *(value for side in SIDES
                                                for value in (*handles[side], *(handles[side] - self._hand(side))))])
 
-    def _lift(self):
+    def _lift(self) -> float:
         return float(self.pot.position[2]) - self.HALF_M - TABLE_TOP_M
 
-    def reward(self):
+    def reward(self) -> float:
         """robosuite's, divided by its greatest value, 3: lifted and upright 3; else reaching, grasps, height."""
         pose = self.pot.pose
         upright, lift = pose[2, 2] >= self.UPRIGHT, float(pose[2, 3]) - self.HALF_M - TABLE_TOP_M
@@ -78,10 +78,10 @@ class TwoArmLift(Task):
             total += 0.25 * holds + 0.5 * reached
         return total / 3.0
 
-    def _holds(self, side):
+    def _holds(self, side: str) -> bool:
         return self.lab.robot.arms[side].gripper.holds
 
-    def succeeded(self):
+    def succeeded(self) -> bool:
         """As robosuite's: neither tilt nor grasps count."""
         return self._lift() > self.LIFTED_M
 
@@ -96,7 +96,7 @@ class TwoArmHandover(Task):
     HEAD_M, FRICTION = (0.05, 0.10, 0.05), 4.0
     LIFTED_M = 0.10
 
-    def build(self):
+    def build(self) -> None:
         # A quarter of a table of 0.8 x 1.2 m, on the right.
         self._table((0.8, 0.3), (0.26 + 0.4, -0.45))
         width = 2.0 * self.HALF_WIDTH_M
@@ -105,23 +105,23 @@ class TwoArmHandover(Task):
         self.hammer = self.lab.add_urdf("hammer", urdf("hammer", {"link": Link(parts, friction=self.FRICTION)}),
                                         (0.6, -0.45, TABLE_TOP_M + 0.5 * self.HEAD_M[2]))
 
-    def begin(self, random):
+    def begin(self, random: np.random.Generator) -> None:
         x, y = random.uniform(-0.1, 0.1), random.uniform(-0.05, 0.05)
         self.hammer.put((0.6 + x, -0.45 + y, TABLE_TOP_M + 0.5 * self.HEAD_M[2] + 1e-3),
                         float(random.uniform(-math.pi, math.pi)))
 
-    def observed(self):
+    def observed(self) -> np.ndarray:
         return np.array([*posed(self.hammer), *(value for side in SIDES
                                                   for value in self.hammer.position - self._hand(side))])
 
-    def _holding(self):
+    def _holding(self) -> dict[str, bool]:
         """{side: whether it holds something}; the hammer is all there is."""
         return {side: self.lab.robot.arms[side].gripper.holds for side in SIDES}
 
-    def _lifted(self):
+    def _lifted(self) -> bool:
         return float(self.hammer.position[2]) - TABLE_TOP_M > self.LIFTED_M
 
-    def reward(self):
+    def reward(self) -> float:
         """robosuite's stages, divided by its greatest value, 2."""
         holding, lifted = self._holding(), self._lifted()
         if self.succeeded():
@@ -133,6 +133,6 @@ class TwoArmHandover(Task):
             return (1.0 + reached if lifted else 0.5) / 2.0
         return 0.25 * near(float(np.linalg.norm(self.hammer.position - self._hand("right"))), 1.0) / 2.0
 
-    def succeeded(self):
+    def succeeded(self) -> bool:
         holding = self._holding()
         return holding["left"] and not holding["right"] and self._lifted()
