@@ -91,7 +91,7 @@ def with_load(body: ArmBody, mass: float, place: Array) -> ArmBody:
 
 
 @_compiled
-def turn_joints(body, position, turned):
+def turn_joints(body: ArmBody, position: Array, turned: Array) -> None:
     """Fill turned (n, 3, 3): from a joint's frame to that of the joint before, at position (n,) [rad]."""
     for i in range(len(position)):
         c, s = np.cos(position[i]), np.sin(position[i])
@@ -103,7 +103,8 @@ def turn_joints(body, position, turned):
 
 
 @_compiled
-def torques(body, turned, velocity, acceleration, gravity, work, found):
+def torques(body: ArmBody, turned: Array, velocity: Array, acceleration: Array, gravity: float, work: Array,
+            found: Array) -> None:
     """Fill found (n,) [Nm]: what the joints exert.
 
     turned: of `turn_joints`; velocity, acceleration: (n,); gravity [m/s^2]; work: (n, 6), for what is in between.
@@ -152,7 +153,7 @@ def torques(body, turned, velocity, acceleration, gravity, work, found):
 
 
 @_compiled
-def fill_inertia(body, turned, still, unit, work, matrix):
+def fill_inertia(body: ArmBody, turned: Array, still: Array, unit: Array, work: Array, matrix: Array) -> None:
     """Fill matrix (n, n) [kg m^2], the joint-space inertia; still, unit: (n,) zeros."""
     for i in range(len(still)):
         unit[i] = 1.0
@@ -161,7 +162,7 @@ def fill_inertia(body, turned, still, unit, work, matrix):
 
 
 @_compiled
-def solve(matrix, right, factor):
+def solve(matrix: Array, right: Array, factor: Array) -> None:
     """Solve matrix (n, n), positive definite, times x = right (n,), in place of right; factor: (n, n), Cholesky's."""
     count = len(right)
     for i in range(count):
