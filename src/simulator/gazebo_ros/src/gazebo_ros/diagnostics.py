@@ -12,7 +12,7 @@ from rospy_fixes.ports.threads import STATUS_NAME
 from sim_time.stamps import stamp_ns
 
 if TYPE_CHECKING:
-    from gazebo_ros.simulation import Simulation
+    from gazebo_ros.simulation import HostedPlugin, Simulation
     from loop_ros.faults import Faults
     from loop_ros.protocol import LoopRos
     from rospy_fixes.ports.threads import ThreadFaults
@@ -54,7 +54,7 @@ class Diagnostics:
         failed = [hosted for hosted in self._simulation.plugins if hosted.failures]
         return [self._dropped(), *self._restarted(), *map(_status_of, failed)]
 
-    def _dropped(self):
+    def _dropped(self) -> DiagnosticStatus:
         places = dict(self._faults.places)
         total = sum(fault.count for fault in places.values())
         if not total:
@@ -63,7 +63,7 @@ class Diagnostics:
             DiagnosticStatus.WARN, MESSAGES, "%d could not be digested and were dropped" % total, _HARDWARE,
             [KeyValue(place, "%d, the newest: %s" % (fault.count, fault.text)) for place, fault in places.items()])
 
-    def _restarted(self):
+    def _restarted(self) -> list[DiagnosticStatus]:
         found = self._threads.summary()
         if found is None:
             return []
@@ -71,7 +71,7 @@ class Diagnostics:
                                  [KeyValue(*row) for row in found[1].items()])]
 
 
-def _status_of(hosted):
+def _status_of(hosted: HostedPlugin) -> DiagnosticStatus:
     name = "%splugin %s of %s" % (PREFIX, hosted.label, hosted.model_name)
     values = [KeyValue("failures", str(hosted.failures)), KeyValue("newest", hosted.last_error)]
     if hosted.has_failed:

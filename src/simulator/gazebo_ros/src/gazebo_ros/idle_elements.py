@@ -76,7 +76,7 @@ def plugin_elements(robots: Iterable[Robot], source: str) -> str:
     return found.text()
 
 
-def _add_plugins(found, robot, source):
+def _add_plugins(found: IdleElements, robot: Robot, source: str) -> None:
     for gazebo in robot.gazebo:
         for plugin in gazebo.iter("plugin"):
             table = TABLES.get(os.path.basename(plugin.get("filename") or ""))
@@ -84,6 +84,6 @@ def _add_plugins(found, robot, source):
                 _add_all(found, table.find(plugin, "plugin"), source)
 
 
-def _add_all(found, idles, source):
+def _add_all(found: IdleElements, idles: Iterable[Idle], source: str) -> None:
     for idle in idles:
         found.add(idle, source)

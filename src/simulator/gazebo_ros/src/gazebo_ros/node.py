@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 import time
+from typing import TYPE_CHECKING
 
 import rosgraph
 import roslib.packages
@@ -41,6 +42,9 @@ from rospy_nodes.start import limit_ports
 from sdf_model import ModelFolders
 from world_picture import snapshot
 from world_picture.snapshot import SnapshotError
+
+if TYPE_CHECKING:
+    from rospy_fixes.ports.threads import ThreadFaults
 
 # How long threads may hold the interpreter [s]. PyBullet holds it during a step. With the default of 5 ms, one busy
 # thread would take more than half of the loop's time.
@@ -96,7 +100,7 @@ def main(argv: list[str] | None = None) -> int:
     return code
 
 
-def _build(log, cleanup, line, threads):
+def _build(log: LoopLog, cleanup: contextlib.ExitStack, line: CommandLine, threads: ThreadFaults) -> Simulation:
     """Build everything, from the parameters to a simulation that is ready to run; clean-up functions go on ``cleanup``.
 
     ``line``: :class:`CommandLine`, which overrides the parameters; ``threads``: what rospy's threads meet.
@@ -188,7 +192,7 @@ def _build(log, cleanup, line, threads):
     return simulation
 
 
-def _picture_process(line, log):
+def _picture_process(line: CommandLine, log: LoopLog) -> PictureProcess:
     """The process that draws cameras, where the launch file does not start it (``line.starts_renderer``)."""
     def runs_already():
         if not line.starts_renderer:
@@ -203,7 +207,7 @@ def _picture_process(line, log):
                           runs_already, log)
 
 
-def _snapshot_writer(log):
+def _snapshot_writer(log: LoopLog) -> snapshot.SnapshotWriter | snapshot.NoSnapshot:
     """A new snapshot; if there is no space for it, the lab goes on without pictures."""
     snapshot.remove_stale()
     try:
@@ -213,7 +217,7 @@ def _snapshot_writer(log):
         return snapshot.NoSnapshot()
 
 
-def _end(log, code):
+def _end(log: LoopLog, code: int) -> None:
     """Leave the ROS graph and end the process, even if threads of rospy still wait."""
     rospy.signal_shutdown("the simulator ends")
     log.close()

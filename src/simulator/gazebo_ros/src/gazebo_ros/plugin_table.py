@@ -12,9 +12,10 @@ from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import Any
 
 
-def _read(path):
+def _read(path: str | os.PathLike[str]) -> Any:
     with open(path, encoding="utf-8") as file:
         return yaml.safe_load(file) or {}
 
@@ -71,7 +72,7 @@ class PluginTable:
         return self._classes[key]
 
     @staticmethod
-    def _load(key, target):
+    def _load(key: str, target: str) -> type[ModelPlugin]:
         module_name, class_name = target.split(":")
         try:
             loaded = getattr(importlib.import_module(module_name), class_name)

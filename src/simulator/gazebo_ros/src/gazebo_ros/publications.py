@@ -151,13 +151,13 @@ class Publications:
                 self._log.warn("%s; windows and cameras stand still" % error)
             self._snapshot_too_small = True
 
-    def _set_rospy_time(self):
+    def _set_rospy_time(self) -> None:
         # Replaces rospy's own subscription to /clock, which this node does not have.
         rospy.rostime._rostime_current = rospy.Time(*divmod(self._simulation.time_ns, 10**9))
         with self._rospy_time_changed:
             self._rospy_time_changed.notify_all()
 
-    def _publish_states(self):
+    def _publish_states(self) -> None:
         models = self._simulation.world.models
         if self._model_states.has_listeners:
             self._model_states.publish(ModelStates(
@@ -172,7 +172,7 @@ class Publications:
                     message.twist.append(msg_from_twist(*model.link_twist(link)))
             self._link_states.publish(message)
 
-    def _publish_contacts(self, now):
+    def _publish_contacts(self, now: float) -> None:
         too_soon = now - self._contacts_sent_at < 0.5 / CONTACTS_RATE and not self._simulation.paused
         if self._contacts.has_listeners and not too_soon:
             self._contacts_sent_at = now
@@ -181,7 +181,7 @@ class Publications:
             message.header.stamp, message.header.frame_id = stamp_ns(self._simulation.time_ns), "world"
             self._contacts.publish(message)
 
-    def _report(self, factor):
+    def _report(self, factor: float) -> None:
         simulation = self._simulation
         if self._metrics.has_listeners:
             metrics = PerformanceMetrics(real_time_factor=factor)

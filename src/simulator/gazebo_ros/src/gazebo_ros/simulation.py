@@ -168,7 +168,7 @@ class Simulation:
         if self._advance is not None:
             self._end_advance(AdvanceRefused("the simulator is shutting down"))
 
-    def _some_ticks(self):
+    def _some_ticks(self) -> int:
         """The ticks of one turn; returns how many."""
         count, at_once = 0, self.ticks_at_once if self._pacer.is_paced else 1
         while True:
@@ -257,7 +257,7 @@ class Simulation:
         for hosted in [h for h in self.plugins if model_name is None or h.model_name == model_name]:
             self._close(hosted)
 
-    def _advance_turn(self):
+    def _advance_turn(self) -> None:
         advance = self._advance
         if not self.paused:
             self._end_advance(AdvanceRefused(
@@ -279,7 +279,7 @@ class Simulation:
         if not advance.remaining:
             self._end_advance(None)
 
-    def _end_advance(self, error):
+    def _end_advance(self, error: AdvanceRefused | None) -> None:
         advance, self._advance = self._advance, None
         if error is not None:
             advance.future.set_exception(error)
@@ -287,12 +287,12 @@ class Simulation:
         self._delivered_before = self._deliveries()
         advance.future.set_result((self.tick, self.time_ns))
 
-    def _sort(self):
+    def _sort(self) -> None:
         # New lists each time: the loop may be walking over the old ones.
         self._working = [hosted for hosted in self.plugins if not hosted.has_failed]
         self._failed = [hosted for hosted in self.plugins if hosted.has_failed]
 
-    def _has_raised(self, hosted, where, error):
+    def _has_raised(self, hosted: HostedPlugin, where: str, error: BaseException) -> None:
         """A plugin has raised: restart it, or stop it if restarting has not helped."""
         hosted.failures += 1
         hosted.last_error = "%s() raised %s" % (where, described(error))
@@ -306,7 +306,7 @@ class Simulation:
                         % (who, hosted.last_error, _trace(error)))
         self._restart_or_stop(hosted)
 
-    def _restart_or_stop(self, hosted):
+    def _restart_or_stop(self, hosted: HostedPlugin) -> None:
         try:
             hosted.plugin = hosted.plugin.restarted()
         except SURVIVED as error:
@@ -316,25 +316,25 @@ class Simulation:
         hosted.has_failed = False
         self._sort()
 
-    def _give_up(self, hosted, why):
+    def _give_up(self, hosted: HostedPlugin, why: str) -> None:
         hosted.has_failed = True
         self._faults.guarded("%s, stopping its joints" % _names(hosted), hosted.plugin.hold)
         self._sort()
         self._log.error("%s and is stopped; the world goes on. A reset revives it: rosservice call /gazebo/reset_world "
                         "{}. The last error: %s" % (why, hosted.last_error))
 
-    def _wait_for_revival(self, time_s):
+    def _wait_for_revival(self, time_s: float) -> None:
         for hosted in self._failed:
             if self._faults.guarded("%s, failed" % _names(hosted), hosted.plugin.while_failed, time_s):
                 self._revive(hosted, "a request")
 
-    def _revive(self, hosted, by):
+    def _revive(self, hosted: HostedPlugin, by: str) -> None:
         hosted.failed_at = []
         self._restart_or_stop(hosted)
         if not hosted.has_failed:
             self._log.info("%s is revived by %s" % (_names(hosted), by))
 
-    def _close(self, hosted):
+    def _close(self, hosted: HostedPlugin) -> None:
         self.plugins = [other for other in self.plugins if other is not hosted]
         self._sort()
         try:
@@ -345,9 +345,9 @@ class Simulation:
             hosted.context.close()
 
 
-def _names(hosted):
+def _names(hosted: HostedPlugin) -> str:
     return "model plugin %s of model %s" % (hosted.label, hosted.model_name)
 
 
-def _trace(error):
+def _trace(error: BaseException) -> str:
     return "".join(traceback.format_exception(error)).rstrip()

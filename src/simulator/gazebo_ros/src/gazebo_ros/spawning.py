@@ -40,10 +40,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any
 
+    from bullet_sim import Model
+    from gazebo_ros.model_plugin import ModelPlugin
     from gazebo_ros.simulation import Simulation
     from loop_ros.protocol import Log, LoopRos
     from sdf_model import SdfModel
-    from urdf_model import Robot
+    from urdf_model import MergedRobot, Robot
 
 
 class SpawnRefused(Exception):
@@ -243,7 +245,7 @@ class Spawner:
         self._remove(name)
         self._on_change()
 
-    def _remove(self, name):
+    def _remove(self, name: str) -> None:
         self._simulation.unhost(name)
         self._simulation.world.delete(name)
         self.drawings.pop(name, None)
@@ -252,7 +254,7 @@ class Spawner:
         for _, picture in self._screens.pop(name, []):
             picture.close()
 
-    def _set_start(self, model, start):
+    def _set_start(self, model: Model, start: dict[str, float]) -> None:
         names = list(start)
         index = model.index(names)
         wanted = np.array([start[name] for name in names])
@@ -265,7 +267,8 @@ class Spawner:
             model.set_joint_positions(index, position)
             model.mark_start()
 
-    def _start_plugin(self, prepared, model_name, plugin_class, element, namespace):
+    def _start_plugin(self, prepared: Prepared, model_name: str, plugin_class: type[ModelPlugin], element: Any,
+                      namespace: str) -> None:
         simulation = self._simulation
         label = element.get("filename")
         # By name: an earlier plugin may have replaced the model by a fixed one.
@@ -335,14 +338,14 @@ class Spawner:
                            % (name, names, ", ".join(self._library.plugins.known)))
         return found, sensors, options
 
-    def _warn(self, name, text):
+    def _warn(self, name: str, text: str) -> None:
         if text:
             self._log.warn("model '%s': %s" % (name, text))
 
-    def _leave_out(self, model_name, error):
+    def _leave_out(self, model_name: str, error: PluginError | IllegalName | str) -> None:
         self._log.warn("model '%s' comes without one of its sensors: %s" % (model_name, error))
 
-    def _check_name(self, name):
+    def _check_name(self, name: str) -> None:
         if not name:
             raise SpawnRefused("the model needs a name (model_name is empty)")
         try:
@@ -353,14 +356,14 @@ class Spawner:
             raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
 
 
-def _slow_bodies(merged):
+def _slow_bodies(merged: MergedRobot) -> list[str]:
     """The names of the bodies whose collision shape is a file: a mesh, or the file that gathers more shapes than
     PyBullet takes."""
     return [link.name for link in merged.links.values() if len(link.collisions) > MAX_SHAPES
             or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
-def _drawn(merged, plugin, namespace):
+def _drawn(merged: MergedRobot, plugin: Any, namespace: str) -> dict[str, Any]:
     """The scene's entry of a sensor that needs pictures."""
     sensor, link = urdf_extras.sensor_of(plugin)
     frame = merged.frames[link]
