@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from sensor_msgs.msg import PointCloud2
 
 #: Points of one cloud that a page gets.
@@ -58,7 +60,7 @@ def _column(cells: np.ndarray, offset: int, kind: str) -> np.ndarray:
     return np.ascontiguousarray(cells[:, offset:offset + size]).view(kind)[:, 0]
 
 
-def _colours(cells, fields, is_bigendian):
+def _colours(cells: np.ndarray, fields: dict[str, Any], is_bigendian: bool) -> np.ndarray:
     field = next((fields[name] for name in _COLOURS if name in fields), None)
     if field is None or field.offset + 4 > cells.shape[1]:
         return np.full((len(cells), 3), _GREY, np.uint8)

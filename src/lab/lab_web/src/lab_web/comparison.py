@@ -63,7 +63,7 @@ def shown_of(findings: list[Finding]) -> dict[str, Any]:
 
 
 def findings_of(robot: Interface, read: Callable[[Interface], Seen], is_there: Callable[[], bool],
-                no_answer: tuple[type[BaseException], ...]) -> list[Finding]:
+                no_answer: type[BaseException] | tuple[type[BaseException], ...]) -> list[Finding]:
     """Findings about the robot on the master, from ``read(robot)``, a baxter_conformance.comparison.Seen. Raises
     RobotError where the master ends meanwhile.
 

@@ -98,7 +98,7 @@ class Pages:
         """Tell one page, or all (None)."""
         self.loop_thread.soon(self._tell, number, code, text)
 
-    def answer(self, number: int, operation: dict[str, Any]) -> None:
+    def answer(self, number: int | None, operation: dict[str, Any]) -> None:
         """An answer to one page."""
         self.loop_thread.soon(self._send_one, number, operation)
 
@@ -126,7 +126,7 @@ class Pages:
         for socket in self._sockets.values():
             socket.send(operation)
 
-    def _send_one(self, number: int, operation: dict[str, Any]) -> None:
+    def _send_one(self, number: int | None, operation: dict[str, Any]) -> None:
         if number in self._sockets:
             self._sockets[number].send(operation)
 
