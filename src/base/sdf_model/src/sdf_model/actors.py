@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The <actor> element: a figure that the plugin ``libactor_trajectory.so`` moves along its way."""
 
+from __future__ import annotations
+
 import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
@@ -10,13 +13,16 @@ from urdf_model import Inertial, Link, Mesh, Robot, Shape
 
 from .links import file_of
 
+if TYPE_CHECKING:
+    from .document import Document
+
 #: The plugin that moves an actor; inside of it is the content of the actor's <script>.
 PLUGIN = "libactor_trajectory.so"
 # Of a standing person [kg, kg m^2]: the figure, where its skin cannot be found, is a box with this inertia.
 _PERSON = 70.0, (20.0, 20.0, 3.0)
 
 
-def actor_robot(document, element, name):
+def actor_robot(document: Document, element: etree._Element, name: str) -> Robot:
     """Return the Robot of an <actor>: to be seen only, and static but for its plugin.
 
     Raises SdfError for numbers of its trajectory that are none.

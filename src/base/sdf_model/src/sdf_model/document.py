@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One SDF file or text: its XML, its numbers, and its errors and unknown elements, by file and line."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +14,12 @@ from urdf_model.transforms import pose_matrix
 
 from .elements import TABLE
 from .lenient import attributes_to_elements
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from lxml import etree
 
 ROOT_TAGS = ("sdf", "gazebo")
 #: The size of a shape whose size is 0 [m].
@@ -25,19 +34,19 @@ class SdfError(ValueError):
 class Notes:
     """Elements that are not understood or have no effect, from one or several files."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._left_out, self._mended = {}, {}  # what -> file -> lines
         self.idle = IdleElements()
 
-    def add(self, what, source, line):
+    def add(self, what: str, source: str, line: int | None) -> None:
         """Note that ``what`` in ``line`` of ``source`` is ignored."""
         add_place(self._left_out, what, source, line)
 
-    def mend(self, what, source, line):
+    def mend(self, what: str, source: str, line: int | str | None) -> None:
         """Note that ``what`` in ``line`` of ``source`` is not valid SDF, but is understood."""
         add_place(self._mended, what, source, line)
 
-    def warning(self):
+    def warning(self) -> str:
         """Return one line that names all notes, or "" without notes."""
         said = (("not understood and left out", self._left_out), ("not as SDF has it, but read", self._mended))
         parts = ["%s: %s" % (text, placed(noted)) for text, noted in said if noted]
@@ -54,7 +63,8 @@ class Document:
     :param most_bytes: how long the text may be
     """
 
-    def __init__(self, xml, source, folder, notes, most_bytes=bounds.DESCRIPTION_BYTES):
+    def __init__(self, xml: str | bytes, source: str | Path, folder: str | Path | None, notes: Notes,
+                 most_bytes: int = bounds.DESCRIPTION_BYTES) -> None:
         self.source = str(source)
         self.folder = folder
         self.notes = notes
@@ -71,40 +81,40 @@ class Document:
             self.notes.idle.add(idle, self.source)
         self.version = self._version()
 
-    def _repaired(self, what):
+    def _repaired(self, what: str) -> None:
         self.notes.mend(what, self.source, "of the error")
 
-    def _version(self):
+    def _version(self) -> tuple[int, ...]:
         text = self.root.get("version", "1.6")
         try:
             return tuple(int(word) for word in text.split("."))
         except ValueError:
             raise self.error(self.root, "version='%s' is not a version; expected one such as 1.6" % text) from None
 
-    def error(self, element, text):
+    def error(self, element: etree._Element, text: str) -> SdfError:
         """Return an SdfError with file and line."""
         return SdfError("%s, line %s: %s" % (self.source, element.sourceline, text))
 
-    def note(self, element, what=None):
+    def note(self, element: etree._Element, what: str | None = None) -> None:
         """Note that an element is not understood."""
         self.notes.add(what or element.tag, self.source, element.sourceline)
 
-    def mend(self, element, what):
+    def mend(self, element: etree._Element, what: str) -> None:
         """Note that an element is not valid SDF, but is understood; ``what`` describes it."""
         self.notes.mend(what, self.source, element.sourceline)
 
-    def children(self, element):
+    def children(self, element: etree._Element) -> list[etree._Element]:
         """Return the child elements, without processing instructions."""
         return [child for child in element if isinstance(child.tag, str)]
 
-    def name(self, element):
+    def name(self, element: etree._Element) -> str:
         """Return the attribute ``name``."""
         name = (element.get("name") or "").strip()
         if not name:
             raise self.error(element, "<%s> has no name" % element.tag)
         return name
 
-    def text(self, element, tag, default=None):
+    def text(self, element: etree._Element, tag: str, default: str | None = None) -> str:
         """Return the stripped text of a child; without ``default`` it must be there."""
         child = element.find(tag)
         text = "" if child is None else (child.text or "").strip()
@@ -112,7 +122,7 @@ class Document:
             raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
         return text or default
 
-    def flag(self, element, tag, default=False):
+    def flag(self, element: etree._Element, tag: str, default: bool = False) -> bool:
         """Return the truth of a child."""
         text = self.text(element, tag, "").lower()
         if not text:
@@ -121,17 +131,18 @@ class Document:
             raise self.error(element.find(tag), "<%s> is '%s', expected true or false" % (tag, text))
         return text in _TRUE
 
-    def number(self, element, tag, default=None, may_be_infinite=False):
+    def number(self, element: etree._Element, tag: str, default: float | None = None,
+               may_be_infinite: bool = False) -> float | None:
         """Return the number in a child, or ``default``."""
         child = element.find(tag)
         return default if child is None else self.numbers(child, 1, may_be_infinite)[0]
 
-    def vector(self, element, tag, default):
+    def vector(self, element: etree._Element, tag: str, default: Sequence[float]) -> tuple[float, ...]:
         """Return the numbers (tuple) in a child, as many as ``default`` has."""
         child = element.find(tag)
         return tuple(default) if child is None else self.numbers(child, len(default))
 
-    def positive(self, element, tag, count):
+    def positive(self, element: etree._Element, tag: str, count: int) -> tuple[float, ...]:
         """Return ``count`` positive numbers in a child that must be there; 0 is NO_SIZE_M, as in Gazebo."""
         child = element.find(tag)
         if child is None:
@@ -143,7 +154,7 @@ class Document:
             self.mend(child, "<%s> of %s, of which %g is used for 0" % (tag, child.text.strip(), NO_SIZE_M))
         return tuple(value or NO_SIZE_M for value in values)
 
-    def numbers(self, element, count, may_be_infinite=False):
+    def numbers(self, element: etree._Element, count: int, may_be_infinite: bool = False) -> tuple[float, ...]:
         """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something. Further
         ones are left out, as by Gazebo, with a note."""
         text = (element.text or "").strip()
@@ -162,13 +173,13 @@ class Document:
         return values
 
     @staticmethod
-    def relative_to(element):
+    def relative_to(element: etree._Element) -> str:
         """Return the name of the frame that the child <pose> is given in, "" if it names none."""
         child = element.find("pose")
         # Up to SDF 1.6 the attribute was called frame.
         return "" if child is None else child.get("relative_to") or child.get("frame") or ""
 
-    def pose(self, element):
+    def pose(self, element: etree._Element) -> np.ndarray:
         """Return the 4x4 matrix of the child <pose> (x y z [m], roll pitch yaw), identity where there is none."""
         child = element.find("pose")
         if child is None or not (child.text or "").strip():

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the models that ``model://NAME`` names."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from urdf_model import XmlRefused, bounds, parse_xml, read_file
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
 
 class ModelFolders:
@@ -15,17 +21,17 @@ class ModelFolders:
     it stands fast.
     """
 
-    def __init__(self, folders, sizes=None):
+    def __init__(self, folders: Iterable[str | Path], sizes: Mapping[str, Mapping[str, Any]] | None = None) -> None:
         self.folders = [Path(folder) for folder in folders]
         self._sizes = sizes or {}
 
-    def stand_in(self, uri):
+    def stand_in(self, uri: str) -> str | None:
         """Return the SDF text of the replacement of the model ``uri`` (model://NAME), or None."""
         scheme, _, rest = uri.partition("://")
         name = rest.partition("/")[0]
         return _of_size(name, self._sizes[name]) if scheme == "model" and name in self._sizes else None
 
-    def find(self, uri, base=None):
+    def find(self, uri: str, base: str | Path | None = None) -> Path | None:
         """Return the description file (Path) that ``uri`` names, or None.
 
         ``uri``: model://NAME, model://NAME/FILE, file://PATH or a path, relative ones to the folder ``base``; a
@@ -39,7 +45,7 @@ class ModelFolders:
                 return found
         return None
 
-    def places(self, uri, base=None):
+    def places(self, uri: str, base: str | Path | None = None) -> list[Path]:
         """Return the Paths that ``uri`` may mean, as :meth:`find` has it; the first that exists is meant."""
         scheme, separator, rest = uri.partition("://")
         if not separator:
@@ -56,7 +62,7 @@ _SHAPES = {"box": "<box><size>%g %g %g</size></box>",
            "sphere": "<sphere><radius>%g</radius></sphere>"}
 
 
-def _of_size(name, size):
+def _of_size(name: str, size: Mapping[str, Any]) -> str:
     kind = next(kind for kind in _SHAPES if kind in size)
     shape = _SHAPES[kind] % tuple(size[kind])
     # The inertia of the box around it.
@@ -72,7 +78,7 @@ def _of_size(name, size):
             "</link></model></sdf>" % (name, mass is None, *size["centre"], weight, parts))
 
 
-def description_file(folder):
+def description_file(folder: str | Path) -> Path | None:
     """Return the SDF (Path) in a model's folder, or None.
 
     model.config names it, with several the one of the highest version; without model.config it is model.sdf.

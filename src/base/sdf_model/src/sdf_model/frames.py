@@ -1,7 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Frames of one SDF scope (a model or the world), given relative to each other."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from .document import Document
 
 #: Names that mean the scope's own frame.
 OWN = ("", "__model__", "world", "__root__")
@@ -10,21 +19,21 @@ OWN = ("", "__model__", "world", "__root__")
 class Frames:
     """Collects named frames, then computes their poses in the frame of the scope."""
 
-    def __init__(self, document, scope=""):
+    def __init__(self, document: Document, scope: str = "") -> None:
         """``scope``: the model's name, which may stand in front of the names in it, as ``scope::link``."""
         self._document = document
         self._scope = scope + "::" if scope else ""
         self._given = {}  # name -> (name of the frame it is given in, 4x4, element)
         self._found = {}
 
-    def add(self, name, element, default="", pose=None):
+    def add(self, name: str, element: etree._Element, default: str = "", pose: np.ndarray | None = None) -> None:
         """Add a frame: the <pose> of ``element``, or ``pose``, in the frame its relative_to names or in ``default``."""
         if pose is None:
             pose = self._document.pose(element)
             default = self._document.relative_to(element) or default
         self._given[name] = (default, pose, element)
 
-    def add_joint(self, name, element, child):
+    def add_joint(self, name: str, element: etree._Element, child: str) -> str:
         """Add the frame of a joint, by default in that of its ``child``; return the name of the frame.
 
         A joint may have the name of a link, as in SDF before 1.7: then the name alone means the link.
@@ -34,7 +43,7 @@ class Frames:
         self.add(name, element, child)
         return name
 
-    def plain(self, name):
+    def plain(self, name: str) -> str:
         """Return ``name`` without the scope's name in front of it, and those of the scopes around that, if only that is
         the name of a frame."""
         if not self._scope or name in self:
@@ -47,10 +56,10 @@ class Frames:
             rest = "::" + rest
         return name
 
-    def __contains__(self, name):
+    def __contains__(self, name: str) -> bool:
         return name in OWN or name in self._given
 
-    def where(self, name, element):
+    def where(self, name: str, element: etree._Element) -> np.ndarray:
         """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` refers to it, for the message."""
         # Without recursion: a chain may be as long as the file.
         chain, asked, name = [], {}, self.plain(name)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Deviations that Gazebo's reader accepts: attributes in place of elements, as before SDF 1.3."""
 
+from __future__ import annotations
+
 from lxml import etree
 
 # Element -> the attributes that are elements in it today.
@@ -26,7 +28,7 @@ _TEXTS = {"gravity": "xyz", "ambient": "rgba", "diffuse": "rgba", "specular": "r
 _RENAMED = {"filename": "uri"}
 
 
-def attributes_to_elements(root):
+def attributes_to_elements(root: etree._Element) -> list[tuple[str, int]]:
     """Convert attributes of ``root``'s elements to elements, in place; return a list of (what, line)."""
     mended = []
     for element in list(root.iter(*_INSIDE, *_TEXTS, "origin")):
@@ -53,7 +55,7 @@ def attributes_to_elements(root):
     return mended
 
 
-def _add(parent, tag, text, where):
+def _add(parent: etree._Element, tag: str, text: str, where: etree._Element) -> None:
     child = etree.SubElement(parent, tag)
     child.text = text
     child.sourceline = where.sourceline

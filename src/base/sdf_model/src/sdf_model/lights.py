@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The <light> element, and the light settings of <scene>."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .document import Document, Notes
+
+if TYPE_CHECKING:
+    from lxml import etree
 
 
 @dataclass
@@ -34,7 +40,7 @@ class Scene:
     sky: bool = False
 
 
-def read_light(document, element, origin):
+def read_light(document: Document, element: etree._Element, origin: np.ndarray) -> Light:
     """Return the Light of ``element``; ``origin`` (4x4) is where its <pose> refers to."""
     attenuation = element.find("attenuation")
     factors = (1.0, 0.0, 0.0)  # of SDF's specification, as the other defaults
@@ -63,7 +69,7 @@ def read_light(document, element, origin):
     )
 
 
-def read_scene(document, element):
+def read_scene(document: Document, element: etree._Element) -> Scene:
     """Return the Scene of the ``<scene>`` element."""
     return Scene(
         *(None if element.find(tag) is None else colour(document, element, tag, None)[:3]
@@ -73,7 +79,7 @@ def read_scene(document, element):
     )
 
 
-def parse_light(xml, source):
+def parse_light(xml: bytes, source: str) -> Light:
     """Return the Light of the text of one <light>; its pose is in the frame of the link that it is in.
 
     Raises SdfError. ``source`` names the text in messages.
@@ -82,7 +88,7 @@ def parse_light(xml, source):
     return read_light(document, document.root.find("light"), np.eye(4))
 
 
-def colour(document, element, tag, default):
+def colour(document: Document, element: etree._Element, tag: str, default: tuple | None) -> tuple | None:
     """Return red, green, blue, alpha of a child; alpha may be left out."""
     child = element.find(tag)
     if child is None:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The content of a <link>: inertia, shapes, surfaces, materials."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,12 @@ from .document import SdfError
 from .materials import read_material
 from .polylines import polyline_file
 
+if TYPE_CHECKING:
+    from lxml import etree
+
+    from .document import Document
+    from .materials import MaterialScripts
+
 # Bodies bounce from this <threshold> on, by default; nothing is as fast as the second one [m/s].
 _NO_BOUNCE_M_PER_S, _NEVER_M_PER_S = 100000.0, 1000.0
 # Of a surface.
@@ -22,7 +31,7 @@ _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 
 _INERTIA += (("izz", 2, 2, 1.0),)
 
 
-def read_link(document, element, name, materials):
+def read_link(document: Document, element: etree._Element, name: str, materials: MaterialScripts) -> Link:
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame. ``materials``: MaterialScripts."""
     link = Link(name, _inertial(document, element), line=element.sourceline)
     link.gravity = document.flag(element, "gravity", True)
@@ -51,7 +60,7 @@ def read_link(document, element, name, materials):
     return link
 
 
-def _inertial(document, link):
+def _inertial(document: Document, link: etree._Element) -> Inertial:
     """Return the Inertial; by default SDF's, 1 kg and 1 kg m^2."""
     element = link.find("inertial")
     if element is None:
@@ -70,7 +79,7 @@ def _inertial(document, link):
     return Inertial(mass, pose[:3, 3].copy(), pose[:3, :3] @ matrix @ pose[:3, :3].T)
 
 
-def _shape(document, element, link):
+def _shape(document: Document, element: etree._Element, link: str) -> Shape | None:
     """Return the Shape of a <visual> or <collision>, or None for a kind that is not understood (which is noted)."""
     geometry = element.find("geometry")
     shapes = [] if geometry is None else document.children(geometry)
@@ -106,7 +115,7 @@ def _shape(document, element, link):
     return Shape(found, origin, element.get("name", ""), None, link)
 
 
-def _polylines(document, lines):
+def _polylines(document: Document, lines: list[etree._Element]) -> str:
     """The file of the body over the <polyline> elements ``lines``; the first one has its height."""
     points = [[document.numbers(point, 2) for point in line.iterchildren("point")] for line in lines]
     try:
@@ -117,7 +126,7 @@ def _polylines(document, lines):
         raise document.error(lines[0], "<polyline>: %s" % error) from None
 
 
-def _turned_to(document, plane):
+def _turned_to(document: Document, plane: etree._Element) -> np.ndarray:
     """Return the 4x4 rotation that takes z to the plane's normal."""
     normal = np.array(document.vector(plane, "normal", (0.0, 0.0, 1.0)))
     length = np.linalg.norm(normal)
@@ -127,14 +136,14 @@ def _turned_to(document, plane):
     return pose_matrix(rpy=(0.0, float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))))
 
 
-def file_of(document, uri):
+def file_of(document: Document, uri: str) -> str:
     """Return a mesh's name in a form that does not depend on the file that names it."""
     if "://" in uri or document.folder is None:
         return uri
     return str(Path(document.folder) / uri)
 
 
-def _surface(document, collision):
+def _surface(document: Document, collision: etree._Element) -> Surface | None:
     element = collision.find("surface")
     if element is None:
         return None
@@ -167,7 +176,8 @@ def _surface(document, collision):
     return Surface(**found) if found else None
 
 
-def _direction(document, collision, friction):
+def _direction(document: Document, collision: etree._Element,
+               friction: etree._Element | None) -> tuple[float, ...] | None:
     """The unit direction (3,) of <fdir1>, which is in the collision's axes, in those of the link; None for none."""
     if friction is None:
         return None
@@ -176,7 +186,7 @@ def _direction(document, collision, friction):
     return tuple((document.pose(collision)[:3, :3] @ said / length).tolist()) if length > 0.0 else None
 
 
-def _bitmask(document, surface):
+def _bitmask(document: Document, surface: etree._Element) -> int:
     contact = surface.find("contact")
     if contact is None:
         return ALL_BITS

@@ -1,14 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The <material> of a visual, and the material scripts that it names."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from urdf_model import Finish, bounds, read_file
 from urdf_model.materials import GLOWS, MATERIALS
 
 from .lights import colour
 from .ogre_script import parse_materials
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from lxml import etree
+
+    from .document import Document
+    from .folders import ModelFolders
+    from .ogre_script import Material
 
 # A folder of scripts with more files is not one of a model.
 _MAX_SCRIPTS = 100
@@ -25,12 +37,12 @@ class Look:
 class MaterialScripts:
     """The materials in scripts beside the models. Each script is read once."""
 
-    def __init__(self, folders):
+    def __init__(self, folders: ModelFolders) -> None:
         """``folders``: ModelFolders, in which the names of scripts are looked up."""
         self._folders = folders
         self._read = {}
 
-    def find(self, name, uris, base):
+    def find(self, name: str, uris: Iterable[str], base: str | Path | None) -> Look | None:
         """Return the Look of the material ``name`` in the scripts ``uris``, or None.
 
         ``uris`` name scripts, or folders with scripts and with textures; relative ones begin in the folder ``base``.
@@ -48,12 +60,12 @@ class MaterialScripts:
                 return _look(materials[name], [*filter(Path.is_dir, places), folder.parent / "textures", folder])
         return None
 
-    def picture(self, uri, base):
+    def picture(self, uri: str, base: str | Path | None) -> str:
         """Return the path of the picture ``uri``; relative ones begin in the folder ``base``."""
         places = self._folders.places(uri, base)
         return str(next(filter(_is_there, places), places[0]).absolute()) if places else uri
 
-    def _materials_of(self, script):
+    def _materials_of(self, script: Path) -> dict[str, Material]:
         if script not in self._read:
             try:
                 text = read_file(script, bounds.DESCRIPTION_BYTES).decode("utf-8", "replace")
@@ -63,7 +75,7 @@ class MaterialScripts:
         return self._read[script]
 
 
-def _look(material, folders):
+def _look(material: Material, folders: Sequence[Path]) -> Look:
     """The Look of an ``ogre_script.Material`` with textures in ``folders``; a texture that is in none of them is named
     in the first one, so that the renderer can say what is missing."""
     found = [path for path in (folder / material.texture for folder in folders) if _is_there(path)]
@@ -77,14 +89,15 @@ def _look(material, folders):
     return Look(None if rgb is None else (*rgb, 1.0), None if finish == Finish() else finish)
 
 
-def _is_there(path):
+def _is_there(path: Path) -> bool:
     try:
         return path.exists()
     except OSError:  # a name that is too long
         return False
 
 
-def read_material(document, visual, materials):
+def read_material(document: Document, visual: etree._Element,
+                  materials: MaterialScripts) -> tuple[tuple | None, Finish | None]:
     """Return (rgba or None, Finish or None) of a <visual>. ``materials``: MaterialScripts.
 
     Colours in the <material> itself come before those of the script that it names, as in Gazebo.
@@ -112,7 +125,7 @@ def read_material(document, visual, materials):
     return rgba, finish
 
 
-def _scripted(element, document, materials):
+def _scripted(element: etree._Element, document: Document, materials: MaterialScripts) -> Look:
     name = (element.findtext("script/name") or "").strip()
     uris = [(uri.text or "").strip() for uri in element.iterfind("script/uri")]
     found = materials.find(name, [uri for uri in uris if uri], document.folder) if name else None

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The <model> element, and files that hold one."""
 
+from __future__ import annotations
+
 import copy
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from lxml import etree
@@ -20,6 +23,9 @@ from .lights import Light, read_light
 from .links import read_link
 from .materials import MaterialScripts
 from .tree import Dynamics, Parts, SdfJoint, build_robot, crosses
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
 _TWO_AXES = ("universal", "revolute2")
@@ -37,7 +43,8 @@ class SdfModel:
     warning: str = ""
 
 
-def parse_sdf_model(xml, source, folders=None, folder=None):
+def parse_sdf_model(xml: str | bytes, source: str | Path, folders: ModelFolders | None = None,
+                    folder: str | Path | None = None) -> SdfModel:
     """Return the SdfModel of an SDF text (str or bytes) with one <model>, or with one <include> of a model.
 
     ``source`` names the text in messages, ``folders`` (ModelFolders) is where included models are looked for, and
@@ -70,18 +77,19 @@ class Included:
 class ModelReader:
     """Reads <model> and <include> elements."""
 
-    def __init__(self, folders):
+    def __init__(self, folders: ModelFolders) -> None:
         self._folders = folders
         self._materials = MaterialScripts(folders)
         self._opened = 0
 
-    def model(self, document, element, depth=0, static=None):
+    def model(self, document: Document, element: etree._Element, depth: int = 0,
+              static: bool | None = None) -> SdfModel:
         """Return the SdfModel of a <model>. ``static`` overrides its own element."""
         name = document.name(element)
         parts = self._parts(document, element, "", np.eye(4), depth)
         return self._finish(document, name, parts, document.pose(element), static)
 
-    def included(self, document, element, depth):
+    def included(self, document: Document, element: etree._Element, depth: int) -> SdfModel | Included:
         """Return the SdfModel that an <include> asks for, or Included for a file without a model."""
         inner, model = self._open(document, element, depth)
         if model is None:
@@ -96,7 +104,7 @@ class ModelReader:
         name = document.text(element, "name", "") or inner.name(model)
         return self._finish(inner, name, parts, pose, static)
 
-    def _finish(self, document, name, parts, pose, static):
+    def _finish(self, document: Document, name: str, parts: Parts, pose: np.ndarray, static: bool | None) -> SdfModel:
         if static is not None:
             parts.static = static
         robot = build_robot(document, name, parts)
@@ -111,7 +119,7 @@ class ModelReader:
             robot.gazebo.append(said)
         return SdfModel(name, robot, pose, parts.static)
 
-    def _open(self, document, element, depth):
+    def _open(self, document: Document, element: etree._Element, depth: int) -> tuple[Document, etree._Element | None]:
         """Return (Document, <model> or None) of the file that an <include> names."""
         uri = document.text(element, "uri")
         if depth >= _DEEPEST_INCLUDE:
@@ -141,7 +149,7 @@ class ModelReader:
             raise inner.error(inner.root, "it holds %d <model>, expected one" % len(models))
         return inner, models[0] if models else None
 
-    def _parts(self, document, element, prefix, origin, depth):
+    def _parts(self, document: Document, element: etree._Element, prefix: str, origin: np.ndarray, depth: int) -> Parts:
         """Return the Parts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
         if element.get("placement_frame"):
             document.note(element, "placement_frame of model '%s'" % element.get("name"))
@@ -188,7 +196,7 @@ class ModelReader:
         parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
         return _moved(parts, prefix, origin)
 
-    def _hold_kinematic(self, document, element, parts):
+    def _hold_kinematic(self, document: Document, element: etree._Element, parts: Parts) -> None:
         """Make a model of kinematic links fixed: only services move it, no force does."""
         links = list(element.iterchildren("link"))
         kinematic = [link for link in links if document.flag(link, "kinematic")]
@@ -199,7 +207,8 @@ class ModelReader:
             document.note(link.find("kinematic"), "kinematic of link '%s', beside links that are not"
                           % document.name(link))
 
-    def _nested(self, document, element, parts, frames, depth):
+    def _nested(self, document: Document, element: etree._Element, parts: Parts, frames: Frames,
+                depth: int) -> list[str]:
         """Add the parts of models inside this one to ``parts`` and their frames to ``frames``.
 
         An included model becomes a part of this one: its <static> is one of this model, of which the first counts.
@@ -241,19 +250,19 @@ class ModelReader:
         return held
 
 
-def actor(document, element, name="", pose=None):
+def actor(document: Document, element: etree._Element, name: str = "", pose: np.ndarray | None = None) -> SdfModel:
     """Return the SdfModel of an <actor>; ``name`` and ``pose`` (4x4) in place of its own."""
     name = name or document.name(element)
     robot = actor_robot(document, element, name)
     return SdfModel(name, robot, document.pose(element) if pose is None else pose, True)
 
 
-def _say_static(parts, static):
+def _say_static(parts: Parts, static: bool) -> None:
     if not parts.static_is_said:
         parts.static, parts.static_is_said = static, True
 
 
-def unused(name, names):
+def unused(name: str, names: Collection[str]) -> str:
     """Return ``name``, or the first of name_0, name_1, ... that is not in ``names`` if it is."""
     found, number = name, 0
     while found in names:
@@ -261,7 +270,7 @@ def unused(name, names):
     return found
 
 
-def _moved(parts, prefix, origin):
+def _moved(parts: Parts, prefix: str, origin: np.ndarray) -> Parts:
     """Return ``parts`` with names and frames of the enclosing scope."""
     if not prefix:
         return parts
@@ -283,7 +292,7 @@ def _moved(parts, prefix, origin):
     return Parts(links, parts.joints, parts.gazebo, gearboxes, parts.static, parts.static_is_said)
 
 
-def _sensors_and_lights(document, link, name):
+def _sensors_and_lights(document: Document, link: etree._Element, name: str) -> list[etree._Element]:
     """Return the <sensor> and <light> elements of a link or joint as a <gazebo> element that refers to it, the way a
     URDF has them."""
     for light in link.iterchildren("light"):
@@ -296,7 +305,7 @@ def _sensors_and_lights(document, link, name):
     return [holder]
 
 
-def _plugins(document, element):
+def _plugins(document: Document, element: etree._Element) -> list[etree._Element]:
     """Return the <plugin> elements as a <gazebo> element, the way a URDF has them."""
     found = element.findall("plugin")
     if not found:
@@ -306,7 +315,7 @@ def _plugins(document, element):
     return [holder]
 
 
-def _bounded(document, element, tag, value, bound):
+def _bounded(document: Document, element: etree._Element, tag: str, value: float, bound: bounds.Bound) -> float:
     """Return ``value`` within ``bound``, which is noted where it makes a difference."""
     used = min(max(value, bound.low), bound.high)
     if used != value:
@@ -314,14 +323,14 @@ def _bounded(document, element, tag, value, bound):
     return used
 
 
-def _end(document, joint, role):
+def _end(document: Document, joint: etree._Element, role: str) -> str:
     element = joint.find(role)
     if element is not None and element.get("link"):
         return element.get("link").strip()
     return document.text(joint, role)
 
 
-def _joint(document, element, frames, own_frame):
+def _joint(document: Document, element: etree._Element, frames: Frames, own_frame: str) -> list[SdfJoint]:
     """Return the SdfJoint of a <joint>, in a list: one for each of its axes, with a link named after the joint between
     two of them."""
     name, kind = document.name(element), element.get("type", "")
@@ -353,7 +362,7 @@ def _joint(document, element, frames, own_frame):
     return found
 
 
-def _pitch(document, screw):
+def _pitch(document: Document, screw: etree._Element) -> float:
     """The <thread_pitch> of a screw [rad/m]: it goes on by -1 / pitch for each radian (ODE's sign)."""
     pitch = document.number(screw, "thread_pitch", 1.0)
     if not 1.0 / bounds.JOINT_POSITION.high <= abs(pitch) <= bounds.JOINT_POSITION.high:
@@ -362,7 +371,7 @@ def _pitch(document, screw):
     return pitch
 
 
-def _gearbox(document, element, frames, own_frame):
+def _gearbox(document: Document, element: etree._Element, frames: Frames, own_frame: str) -> Gearbox:
     """Return the Gearbox of a <joint>."""
     name, frame = document.name(element), frames.where(own_frame, element)
     axes = [frame[:3, :3] @ _turn(document, element, tag, "revolute", frame, frames)[2] for tag in ("axis", "axis2")]
@@ -370,7 +379,8 @@ def _gearbox(document, element, frames, own_frame):
     return Gearbox(name, *ends, document.number(element, "gearbox_ratio", 1.0), tuple(axes), element)
 
 
-def _turn(document, joint, tag, kind, frame, frames):
+def _turn(document: Document, joint: etree._Element, tag: str, kind: str, frame: np.ndarray,
+          frames: Frames) -> tuple[str, Limit, np.ndarray, Dynamics]:
     """Return (type, Limit, axis (3,), Dynamics) of the <axis> or <axis2> ``tag`` of a joint."""
     name, given = document.name(joint), joint.find(tag)
     if given is None:
@@ -380,7 +390,7 @@ def _turn(document, joint, tag, kind, frame, frames):
             _dynamics(document, given))
 
 
-def _dynamics(document, axis):
+def _dynamics(document: Document, axis: etree._Element) -> Dynamics:
     element = axis.find("dynamics")
     if element is None:
         return Dynamics()
@@ -391,7 +401,7 @@ def _dynamics(document, axis):
                                                ("spring_reference", float, bounds.POSITION))))
 
 
-def _axis(document, given, name, frame, frames):
+def _axis(document: Document, given: etree._Element, name: str, frame: np.ndarray, frames: Frames) -> np.ndarray:
     """Return the unit axis in the joint's frame, from whichever frame it is written in."""
     element = given.find("xyz")
     axis = np.array(document.vector(given, "xyz", (0.0, 0.0, 1.0)))
@@ -410,7 +420,7 @@ def _axis(document, given, name, frame, frames):
     return frame[:3, :3].T @ in_model
 
 
-def _limit(document, given, name, kind):
+def _limit(document: Document, given: etree._Element, name: str, kind: str) -> tuple[str, Limit]:
     """Return (type, Limit): a revolute joint without limits is a continuous one."""
     element = given.find("limit")
     if element is None:

@@ -5,9 +5,15 @@ Format: https://ogrecave.github.io/ogre/api/1.12/_material-_scripts.html. Progra
 technique and its first texture are left out.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 # A text in quotation marks, a brace or the end of a line (which ends an attribute), or a word.
 _TOKEN = re.compile(r'"([^"\n]*)"|([{}\n])|([^\s{}"]+)')
@@ -33,7 +39,7 @@ class Material:
     two_sided: bool = False
 
 
-def parse_materials(text):
+def parse_materials(text: str) -> dict[str, Material]:
     """Return {name: Material} of a script. Lines that are not understood are left out."""
     said = {}
     for words, inner in _entries(text):
@@ -44,7 +50,7 @@ def parse_materials(text):
     return {name: Material(**values) for name, values in said.items()}
 
 
-def _entries(text):
+def _entries(text: str) -> list[tuple[list[str], list | None]]:
     """The entries of a script: (words, entries of the block behind them, or None for an attribute)."""
     blocks, words = [[]], []
     for quoted, sign, word in _TOKEN.findall(_COMMENT.sub(" ", text) + "\n"):
@@ -64,7 +70,7 @@ def _entries(text):
     return blocks[0]
 
 
-def _said(entries):
+def _said(entries: list) -> dict[str, Any]:
     """Fields of Material that a block sets: those of its first technique. Of several passes, the first counts."""
     said = {}
     for passed in _inside(_inside([entries], "technique")[:1], "pass"):
@@ -82,7 +88,7 @@ def _said(entries):
     return said
 
 
-def _texture(unit):
+def _texture(unit: list) -> dict[str, Any]:
     said = {}
     for words, _ in unit:
         if words[0] == "texture" and len(words) > 1:
@@ -92,12 +98,12 @@ def _texture(unit):
     return said if "texture" in said else {}
 
 
-def _inside(blocks, key):
+def _inside(blocks: Iterable[list], key: str) -> list[list]:
     """The blocks named ``key`` in ``blocks``."""
     return [inner for entries in blocks for words, inner in entries if words[:1] == [key] and inner is not None]
 
 
-def _numbers(words):
+def _numbers(words: list[str]) -> list[float]:
     try:
         values = [float(word) for word in words]
     except ValueError:

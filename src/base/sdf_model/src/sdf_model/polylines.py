@@ -75,7 +75,7 @@ def extruded(outlines: Sequence[np.ndarray], height: float) -> tuple[np.ndarray,
     return points, np.concatenate([np.array(faces)[:, ::-1], top, np.array(sides)])
 
 
-def _cleaned(line):
+def _cleaned(line: Sequence[tuple[float, float]]) -> np.ndarray:
     """A line (k, 2) without points that repeat the one before."""
     points = np.asarray(line, dtype=float).reshape(-1, 2)
     kept = points[np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > _SAME_M]
@@ -84,17 +84,17 @@ def _cleaned(line):
     return kept
 
 
-def _area(line):
+def _area(line: np.ndarray) -> float:
     """Area of a closed line, positive if it is counter-clockwise (Gauss's formula)."""
     x, y = line.T
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
-def _turned(line, counter_clockwise):
+def _turned(line: np.ndarray, counter_clockwise: bool) -> np.ndarray:
     return line if (_area(line) > 0.0) == counter_clockwise else line[::-1]
 
 
-def _is_inside(point, line):
+def _is_inside(point: np.ndarray, line: np.ndarray) -> bool:
     """Whether a point is inside of a closed line: a ray in x crosses it an odd number of times."""
     here, there = line, np.roll(line, -1, axis=0)
     crosses = (here[:, 1] > point[1]) != (there[:, 1] > point[1])
@@ -103,7 +103,7 @@ def _is_inside(point, line):
     return bool(np.count_nonzero(crosses & (at > point[0])) % 2)
 
 
-def _bridged(points, ring, holes):
+def _bridged(points: np.ndarray, ring: list[int], holes: list[list[int]]) -> list[int]:
     """One ring around the area of ``ring`` without ``holes``: each hole hangs on a bridge from its rightmost point."""
     for hole in sorted(holes, key=lambda hole: -points[hole, 0].max()):
         start = int(points[hole, 0].argmax())
@@ -113,7 +113,7 @@ def _bridged(points, ring, holes):
     return ring
 
 
-def _visible(points, ring, start, holes):
+def _visible(points: np.ndarray, ring: list[int], start: int, holes: list[list[int]]) -> int:
     """The place in ``ring`` of the nearest point that is seen from the point ``start``."""
     edges = [(ring[i], ring[(i + 1) % len(ring)]) for i in range(len(ring))]
     edges += [(hole[i], hole[(i + 1) % len(hole)]) for hole in holes for i in range(len(hole))]
@@ -128,7 +128,7 @@ def _visible(points, ring, start, holes):
     raise ValueError(_CROSSED)
 
 
-def _opens(points, ring, place, target):
+def _opens(points: np.ndarray, ring: list[int], place: int, target: np.ndarray) -> bool:
     """Whether ``target`` is in the angle at a place of a counter-clockwise ring."""
     before, here, after = (points[ring[(place + step) % len(ring)]] for step in (-1, 0, 1))
     left, right = _side(here, after, target) >= 0.0, _side(before, here, target) >= 0.0
@@ -159,7 +159,7 @@ def _turn(points, corner):
     return float(_side(*points[list(corner)]))
 
 
-def _is_ear(points, ring, place):
+def _is_ear(points: np.ndarray, ring: list[int], place: int) -> bool:
     corner = _corner(ring, place)
     if _turn(points, corner) <= 0.0:
         return False
@@ -170,7 +170,7 @@ def _is_ear(points, ring, place):
     return not (inside & ~same).any()
 
 
-def _side(a, b, point):
+def _side(a: np.ndarray, b: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Twice the area of the triangle a, b, point: positive where the point is to the left; arrays broadcast."""
     a, b, point = np.asarray(a), np.asarray(b), np.asarray(point)
     along, to = b - a, point - a

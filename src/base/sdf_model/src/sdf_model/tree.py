@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Builds the tree of a urdf_model.Robot from links and joints anywhere in a model."""
 
+from __future__ import annotations
+
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +13,11 @@ from urdf_model import Gear, Inertial, Joint, Limit, Link, Loop, Robot
 from urdf_model.transforms import inverse
 
 from .gears import gear_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from .document import Document
 
 WORLD = "world"
 # Mass and moments of a link between the axes of a joint, as a part of the lighter link's.
@@ -56,7 +63,8 @@ class Parts:
     static_is_said: bool = False  # whether an element says so
 
 
-def crosses(joints, links):
+def crosses(joints: Sequence[SdfJoint],
+            links: Mapping[str, tuple[Link, np.ndarray]]) -> dict[str, tuple[Link, np.ndarray]]:
     """Return the links between the ``joints`` of one <joint>, as Parts has them: so light that they change little."""
     masses = [links[end][0].inertial for end in (joints[0].parent, joints[-1].child)
               if end in links and links[end][0].inertial is not None]
@@ -72,7 +80,7 @@ def crosses(joints, links):
     return found
 
 
-def build_robot(document, name, parts):
+def build_robot(document: Document, name: str, parts: Parts) -> Robot:
     """Return the Robot of ``parts``.
 
     A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Joints that close a
@@ -138,7 +146,7 @@ def build_robot(document, name, parts):
     )
 
 
-def _gears(document, parts, joints):
+def _gears(document: Document, parts: Parts, joints: Mapping[str, Joint]) -> list[Gear]:
     """The Gears between the ``joints`` (by name) of the tree."""
     found = [joint.follows for joint in parts.joints if joint.follows is not None]
     for gearbox in parts.gearboxes:
@@ -149,7 +157,7 @@ def _gears(document, parts, joints):
     return [gear for gear in found if gear.joint in joints and gear.other in joints]
 
 
-def _without_welds(parts):
+def _without_welds(parts: Parts) -> tuple[list[SdfJoint], str | None]:
     """Return the joints without those that fix a link in the world, and that link, which then is a static root.
 
     Only where the world has no other joint, and all links hang on it; a hinge on the world needs the world as a link.
@@ -164,7 +172,7 @@ def _without_welds(parts):
     return [joint for joint in parts.joints if joint not in welds], anchored[0]
 
 
-def _root(links, joints):
+def _root(links: Mapping[str, tuple[Link, np.ndarray]], joints: Sequence[SdfJoint]) -> str:
     """Return the root link: the world, or the first one that is not a joint's child among those that are joined to the
     first link, with which Gazebo's model goes."""
     if WORLD in links:
@@ -173,13 +181,13 @@ def _root(links, joints):
     return next(name for name in _roots_first(links, joints) if name in near)
 
 
-def _roots_first(links, joints):
+def _roots_first(links: Iterable[str], joints: Iterable[SdfJoint]) -> list[str]:
     """The links, those first that are not a joint's child."""
     children = {joint.child for joint in joints}
     return sorted(links, key=lambda name: name in children)
 
 
-def _reachable(start, joints):
+def _reachable(start: str, joints: Iterable[SdfJoint]) -> set[str]:
     """The links that are joined to ``start``, directly or through others, and itself."""
     beside = {}
     for joint in joints:
@@ -193,7 +201,7 @@ def _reachable(start, joints):
     return found
 
 
-def _joint(links, joint, parent, child):
+def _joint(links: Mapping[str, tuple[Link, np.ndarray]], joint: SdfJoint, parent: str, child: str) -> Joint:
     turned = parent != joint.parent
     return Joint(
         joint.name,
@@ -210,7 +218,7 @@ def _joint(links, joint, parent, child):
     )
 
 
-def _loop(document, links, joint):
+def _loop(document: Document, links: Mapping[str, tuple[Link, np.ndarray]], joint: SdfJoint) -> list[Loop]:
     """[the Loop of a joint beside the tree], or [] for one of a kind that is held fixed elsewhere; it is noted."""
     kind = joint.type
     if kind == "fixed" and joint.element.get("type") != "fixed":
@@ -225,7 +233,7 @@ def _loop(document, links, joint):
                  inverse(links[joint.child][1]) @ joint.frame, joint.axis)]
 
 
-def _held(links, root, link, kind):
+def _held(links: Mapping[str, tuple[Link, np.ndarray]], root: str, link: str, kind: str) -> Joint:
     return Joint(
         "%s_held" % link, kind, root, link, inverse(links[root][1]) @ links[link][1], np.array([0.0, 0.0, 1.0])
     )

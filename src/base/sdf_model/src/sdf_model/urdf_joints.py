@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Joints of SDF in the <gazebo> elements of a URDF: they close loops, which a URDF's tree cannot have."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from urdf_model import Loop, Robot
 from urdf_model.transforms import inverse, pose_matrix
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from lxml import etree
 
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "ball")
 
@@ -28,7 +37,7 @@ def add_loops(robot: Robot) -> None:
                               % (element.sourceline, element.get("name", ""), what))
 
 
-def _loop(element, places):
+def _loop(element: etree._Element, places: Mapping[str, np.ndarray]) -> Loop:
     kind, ends = element.get("type", ""), [(element.findtext(role) or "").strip() for role in ("parent", "child")]
     if kind not in _KINDS:
         raise ValueError("its type is '%s', expected one of %s" % (kind, ", ".join(_KINDS)))
@@ -47,7 +56,7 @@ def _loop(element, places):
     return Loop(element.get("name", ""), kind, *ends, inverse(places[ends[0]]) @ frame, in_child, axis / length)
 
 
-def _numbers(element, path, count, default):
+def _numbers(element: etree._Element, path: str, count: int, default: Sequence[float]) -> list[float]:
     text = (element.findtext(path) or "").strip()
     try:
         values = [float(word) for word in text.split()] or list(default)
@@ -58,7 +67,7 @@ def _numbers(element, path, count, default):
     return values
 
 
-def _places(robot):
+def _places(robot: Robot) -> dict[str, np.ndarray]:
     """{link: its frame (4, 4) in the model's, with all joints at 0}."""
     found, waiting = {robot.root: robot.root_origin}, [robot.root]
     while waiting:

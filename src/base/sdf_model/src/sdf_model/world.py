@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The <world> element: gravity, step size, models, lights."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -41,7 +43,7 @@ class SdfWorld:
     warning: str = ""
 
 
-def parse_sdf_world(path, folders=None):
+def parse_sdf_world(path: str | Path, folders: ModelFolders | None = None) -> SdfWorld:
     """Return the SdfWorld of the file at ``path``. ``folders`` (ModelFolders): where models are looked for.
 
     Raises SdfError when the file cannot be read or is not a world, and for numbers of the world itself that are wrong;
@@ -59,13 +61,13 @@ def parse_sdf_world(path, folders=None):
 
 
 class _WorldReader:
-    def __init__(self, document, folders):
+    def __init__(self, document: Document, folders: ModelFolders) -> None:
         self._document = document
         self._models = ModelReader(folders)
         self._frames = Frames(document)
         self._world = None
 
-    def world(self, element):
+    def world(self, element: etree._Element) -> SdfWorld:
         document = self._document
         self._world = SdfWorld(element.get("name", "default"))
         for child in element.iterchildren(*_NAMED):
@@ -89,7 +91,7 @@ class _WorldReader:
         self._world.warning = document.notes.warning()
         return self._world
 
-    def _physics(self, element):
+    def _physics(self, element: etree._Element) -> None:
         document = self._document
         step = element.find("max_step_size")
         if step is not None:
@@ -101,17 +103,17 @@ class _WorldReader:
         if element.find("gravity") is not None:  # where older files have it
             self._world.gravity = self._gravity(element)
 
-    def _gravity(self, element):
+    def _gravity(self, element: etree._Element) -> tuple[float, ...]:
         return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", (0.0,) * 3),
                              element.find("gravity"))
 
-    def _bounded(self, bound, values, element):
+    def _bounded(self, bound: bounds.Bound, values: tuple[float, ...], element: etree._Element) -> tuple[float, ...]:
         try:
             return bound.check(values, "<%s>" % element.tag)
         except OutOfBounds as error:
             raise self._document.error(element, str(error)) from None
 
-    def _entity(self, element):
+    def _entity(self, element: etree._Element) -> None:
         document, world = self._document, self._world
         if element.tag == "light":
             world.lights.append(read_light(document, element, np.eye(4)))
@@ -135,7 +137,7 @@ class _WorldReader:
         self._frames.add(model.name, element, pose=model.pose)
         world.models.append(model)
 
-    def _state(self, element):
+    def _state(self, element: etree._Element) -> None:
         """A world saved by Gazebo has two poses of each model and light; <state> has the last one."""
         lights = {light.name: light for light in self._world.lights}
         for child in element.iterchildren("light"):
@@ -155,7 +157,7 @@ class _WorldReader:
                 self._document.note(links[0], "velocities of model '%s' in <state>" % model.name)
 
 
-def _road(document, element):
+def _road(document: Document, element: etree._Element) -> SdfModel:
     """Return the SdfModel of a <road>: visible, without collisions."""
     width = document.number(element, "width", 1.0)
     points = [np.array(document.numbers(point, 3)) for point in element.iterchildren("point")]
