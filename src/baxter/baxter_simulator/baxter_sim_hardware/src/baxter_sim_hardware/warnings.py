@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
+    from typing import Protocol
 
-    from loop_ros.protocol import Log
+    class _Log(Protocol):
+        def warn(self, text: str, /) -> None: ...
 
 PERIOD_S = 5.0  # [simulated s] between two warnings of one kind
 
@@ -16,7 +18,7 @@ PERIOD_S = 5.0  # [simulated s] between two warnings of one kind
 class Warnings:
     """Passes warnings to the log, one of each kind in PERIOD_S."""
 
-    def __init__(self, log: Log) -> None:
+    def __init__(self, log: _Log) -> None:
         """log: has ``warn(text)``."""
         self._log = log
         self._last = {}  # {kind: when [s]}
