@@ -33,10 +33,10 @@ class MessageDelay:
 class Late:
     """Things on their way on one stream, in their order: none overtakes another."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._waiting = deque()  # (when it arrives [s], what)
 
-    def __bool__(self):
+    def __bool__(self) -> bool:
         return bool(self._waiting)
 
     def send(self, time_s: float, delay_s: float, what: object) -> None:

@@ -40,7 +40,7 @@ def on_glass(robot: Robot) -> tuple[np.ndarray, tuple[float, float]] | None:
 class Screen:
     """`pixels`: (600, 1024, 3) uint8, red first: the present picture; `pictures`: number of pictures shown."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:

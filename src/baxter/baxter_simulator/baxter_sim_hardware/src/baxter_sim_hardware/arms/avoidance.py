@@ -75,7 +75,8 @@ def field(guards: Guards, rotations: np.ndarray, origins: np.ndarray, rates: np.
 
 
 @_compiled
-def _distances(centres, radii, rotations, origins, rates):
+def _distances(centres: np.ndarray, radii: np.ndarray, rotations: np.ndarray, origins: np.ndarray,
+               rates: np.ndarray) -> tuple[np.ndarray, float, float]:
     """((k,) distances of the balls from the arm [m], negative inside; the least of them; the share of its speed that an
     arm may have)."""
     distances, slowing = np.full(len(centres), np.inf), 1.0
@@ -116,7 +117,8 @@ def between(own: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndar
 
 
 @_compiled
-def _between(rotations, origins, others, rates, apart, closing_s):
+def _between(rotations: np.ndarray, origins: np.ndarray, others: np.ndarray, rates: np.ndarray, apart: float,
+             closing_s: float) -> tuple[np.ndarray, float]:
     left, slowing = np.full(len(others) - 1, np.inf), 1.0
     for link in range(FIRST_JOINT, len(origins) - 1):
         for other in range(FIRST_JOINT, len(others) - 1):
@@ -131,7 +133,8 @@ def _between(rotations, origins, others, rates, apart, closing_s):
 
 
 @_compiled
-def _share(rotations, origins, rates, link, near, away, distance):
+def _share(rotations: np.ndarray, origins: np.ndarray, rates: np.ndarray, link: int, near: np.ndarray, away: np.ndarray,
+           distance: tuple[float, float, float]) -> float:
     """The share of its speed that an arm may have whose `link` has the point `near` (3,) [m], with a thing at near +
     away (3,) [m]; distance: (what is left of it [m], it [m], least time of the approach [s])."""
     rest, reach, closing_s = distance
@@ -158,7 +161,8 @@ def around(blocks: Blocks, own: tuple[np.ndarray, np.ndarray], rates: np.ndarray
 
 
 @_compiled
-def _around(first, corners, rotations, origins, rates, apart, closing_s):
+def _around(first: np.ndarray, corners: np.ndarray, rotations: np.ndarray, origins: np.ndarray, rates: np.ndarray,
+            apart: float, closing_s: float) -> tuple[np.ndarray, float]:
     left, slowing = np.full(len(corners), np.inf), 1.0
     near, away = np.empty(3), np.empty(3)
     for link in range(FIRST_JOINT, len(origins) - 1):
@@ -179,7 +183,7 @@ def _around(first, corners, rotations, origins, rates, apart, closing_s):
 
 
 @_compiled
-def _nearest_to_box(a, b, corners):
+def _nearest_to_box(a: np.ndarray, b: np.ndarray, corners: np.ndarray) -> float:
     """The share of the line from a to b, 0 to 1, at which it is nearest to a box.
 
     The distance is convex along the line: its slope's zero is searched by bisection, to 1/1000 of the line's length.
@@ -200,7 +204,7 @@ def _nearest_to_box(a, b, corners):
 
 
 @_compiled
-def _nearest(a, b, c, d):
+def _nearest(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> tuple[float, float]:
     """Where two lines, from a to b and from c to d, are nearest to each other: shares of their lengths, 0 to 1."""
     first = second = along = to_first = to_second = 0.0
     for i in range(3):

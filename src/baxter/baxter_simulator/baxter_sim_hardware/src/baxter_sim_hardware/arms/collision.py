@@ -42,7 +42,7 @@ HELD_SHARE, HELD_S = 0.05, 0.5
 class Held:
     """Notices that avoidance keeps an arm from going on."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._since = None
 
     def look(self, time_s: float, share: float) -> bool:
@@ -57,7 +57,7 @@ class Held:
 class Suppressions:
     """Suppressions by the clients of one arm; each message is valid for SUPPRESSION_S."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:

@@ -152,7 +152,7 @@ class Procedure:
 class Updater:
     """The updater, which refuses every request: there is no source of updates."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:

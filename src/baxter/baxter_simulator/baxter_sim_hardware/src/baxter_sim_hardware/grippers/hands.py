@@ -172,7 +172,7 @@ class NoHand:
     Attribute `gripper`: its core.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.gripper = CustomGripper()
 
     def opening(self, positions: np.ndarray) -> float:

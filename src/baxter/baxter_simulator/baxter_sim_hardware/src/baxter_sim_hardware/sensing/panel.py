@@ -55,7 +55,7 @@ def navigator_name(navigator: str) -> str:
 class Panel:
     """The present value of every channel: `digital` {name: bool}, `analog` {name: int}; all zero at the start."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._sensors, self._valves = {}, {}
         self.reset()
 

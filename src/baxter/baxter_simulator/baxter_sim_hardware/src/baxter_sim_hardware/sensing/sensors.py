@@ -40,7 +40,7 @@ def sonar_directions() -> np.ndarray:
 class SonarRing:
     """Which sonars and lights are on."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:

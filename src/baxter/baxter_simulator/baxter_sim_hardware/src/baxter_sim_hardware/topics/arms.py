@@ -17,10 +17,18 @@ from . import convert
 from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from baxter_core_msgs.msg import EndpointState, SEAJointState
+    from control_msgs.msg import JointControllerState
+    from geometry_msgs.msg import TwistStamped
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool, Float64
+    from trajectory_msgs.msg import JointTrajectoryPoint
 
     from arm_kinematics import Chain
     from baxter_sim_hardware.robot import Baxter
+    from baxter_sim_hardware.snapshot import Snapshot
     from baxter_sim_hardware.warnings import Warnings
 
 SPRING_JOINT = JOINTS.index("s1")  # the one with the spring; the message has one state of hysteresis for all joints
@@ -34,7 +42,7 @@ CONTROLLERS = {
 }
 
 
-def _single(mode):
+def _single(mode: Mode) -> Callable[[ArmTopics, tuple[str, str], Float64, float], None]:
     def handle(part, limb_joint, msg, time_s):
         side, joint = limb_joint
         part.joint_command(side, JointCommand(mode=mode, names=["%s_%s" % (side, joint)], command=[msg.data]), time_s)
@@ -62,7 +70,7 @@ class ArmTopics(Part):
 
     # -- out
 
-    def _endpoint_state(self, time_s, side, snapshot):
+    def _endpoint_state(self, time_s: float, side: str, snapshot: Snapshot) -> EndpointState:
         index = self._limb_index[side]
         position, velocity, _ = snapshot.sensed
         pose, jacobian = self._chains[side].fk_and_jacobian(position[index])
@@ -70,14 +78,14 @@ class ArmTopics(Part):
             time_s, BASE_FRAME, pose, endpoint.twist(jacobian, velocity[index]),
             endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
 
-    def _commanded_endpoint(self, time_s, side, snapshot):
+    def _commanded_endpoint(self, time_s: float, side: str, snapshot: Snapshot) -> EndpointState:
         arms = self._baxter.arms
         joints = arms.joints_of(side)
         pose, jacobian = self._chains[side].fk_and_jacobian(arms.commanded_position[joints])
         return convert.endpoint_state(time_s, BASE_FRAME, pose,
                                       endpoint.twist(jacobian, arms.commanded_velocity[joints]), np.zeros(6))
 
-    def _gravity_compensation(self, time_s, side, snapshot):
+    def _gravity_compensation(self, time_s: float, side: str, snapshot: Snapshot) -> SEAJointState:
         index, arms, actuators = self._limb_index[side], self._baxter.arms, self._baxter.actuators
         joints, gravity = arms.joints_of(side), snapshot.gravity[index]
         nothing = np.zeros(len(joints))
@@ -95,18 +103,19 @@ class ArmTopics(Part):
             (arms.commanded_position[joints], arms.commanded_velocity[joints], acceleration, effort),
             tuple(values[index] for values in snapshot.sensed), model)
 
-    def _reference_joint_states(self, time_s, component, snapshot):
+    def _reference_joint_states(self, time_s: float, component: None, snapshot: Snapshot) -> JointState:
         arms, order = self._baxter.arms, self._order
         return self._reference_message.message(
             time_s, arms.commanded_position[order], arms.commanded_velocity[order], arms.commanded_torque[order])
 
-    def _position_state(self, time_s, limb_joint, snapshot):
+    def _position_state(self, time_s: float, limb_joint: tuple[str, str], snapshot: Snapshot) -> JointControllerState:
         return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_position, snapshot, 0)
 
-    def _velocity_state(self, time_s, limb_joint, snapshot):
+    def _velocity_state(self, time_s: float, limb_joint: tuple[str, str], snapshot: Snapshot) -> JointControllerState:
         return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_velocity, snapshot, 1)
 
-    def _controller_state(self, time_s, limb_joint, set_points, snapshot, quantity):
+    def _controller_state(self, time_s: float, limb_joint: tuple[str, str], set_points: np.ndarray, snapshot: Snapshot,
+                          quantity: int) -> JointControllerState:
         side = limb_joint[0]
         place, arms = self._chains[side].joint_names.index("%s_%s" % limb_joint), self._baxter.arms
         index = self._limb_index[side][place]
@@ -116,18 +125,18 @@ class ArmTopics(Part):
 
     # -- in
 
-    def _speed_ratio(self, side, msg, time_s):
+    def _speed_ratio(self, side: str, msg: Float64, time_s: float) -> None:
         self._baxter.arms.set_speed_ratio(side, msg.data)
 
-    def _timeout(self, side, msg, time_s):
+    def _timeout(self, side: str, msg: Float64, time_s: float) -> None:
         self._baxter.arms.set_timeout(side, msg.data)
 
-    def _feed_forward(self, side, msg, time_s):
+    def _feed_forward(self, side: str, msg: JointTrajectoryPoint, time_s: float) -> None:
         if not msg.velocities and len(msg.positions) == len(self._baxter.arms.joints_of(side)):
             return  # a set-point alone: nothing to feed forward
         self._baxter.arms.feed_forward(side, np.array(msg.velocities))
 
-    def _twist(self, side, msg, time_s):
+    def _twist(self, side: str, msg: TwistStamped, time_s: float) -> None:
         chain, joints = self._chains[side], self._baxter.arms.joints_of(side)
         pose, jacobian = chain.fk_and_jacobian(self._baxter.measured.position[joints])
         linear, angular = msg.twist.linear, msg.twist.angular
@@ -144,7 +153,7 @@ class ArmTopics(Part):
         self._baxter.command(side, Mode.VELOCITY, chain.joint_names,
                              endpoint.joint_velocities(jacobian, twist).tolist())
 
-    def _stop(self, side, msg, time_s):
+    def _stop(self, side: str, msg: Bool, time_s: float) -> None:
         self._baxter.state.require_enabled()
         if msg.data:
             self._baxter.arms.stop_limb(side)

@@ -31,6 +31,11 @@ from sensor_renderer.topics import ColourTopics, LearningTopics
 from sim_time.pace import Pace
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from baxter_core_msgs.srv import CloseCameraRequest, ListCamerasRequest, OpenCameraRequest
+    from std_srvs.srv import EmptyRequest
+
     from sensor_renderer.moments import Moment
     from sensor_renderer.sensor_element import SensorEntry
 
@@ -97,11 +102,11 @@ class CameraServices:
                     service.shutdown("the cameras are gone")
                 self._by_namespace.pop(self._namespace)
 
-    def _list(self, _request):
+    def _list(self, _request: ListCamerasRequest) -> ListCamerasResponse:
         with self._lock:
             return ListCamerasResponse(self._rack.available())
 
-    def _open(self, request):
+    def _open(self, request: OpenCameraRequest) -> OpenCameraResponse:
         asked = request.settings
         settings = CaptureSettings(asked.width, asked.height, asked.fps,
                             {control.id: control.value for control in asked.controls})
@@ -112,14 +117,14 @@ class CameraServices:
 
         return OpenCameraResponse(self._code(do))
 
-    def _close(self, request):
+    def _close(self, request: CloseCameraRequest) -> CloseCameraResponse:
         def do():
             self._rack.close_camera(request.name)
             self._drivers[request.name].use(None)
 
         return CloseCameraResponse(self._code(do))
 
-    def _reset(self, _request):
+    def _reset(self, _request: EmptyRequest) -> EmptyResponse:
         with self._lock:
             for name in list(self._rack.open):
                 self._rack.close_camera(name)
@@ -129,7 +134,7 @@ class CameraServices:
                 driver.use(self._rack.open.get(name))
         return EmptyResponse()
 
-    def _code(self, do):
+    def _code(self, do: Callable[[], None]) -> int:
         with self._lock:
             try:
                 do()

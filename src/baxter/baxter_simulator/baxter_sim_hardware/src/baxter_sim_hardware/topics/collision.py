@@ -15,10 +15,15 @@ from sim_time.stamps import stamp
 from .row import STATE_RATE_HZ, Part, Topic
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from std_msgs.msg import Empty
+
     from baxter_sim_hardware.arms.guarding import Guarding
+    from baxter_sim_hardware.snapshot import Snapshot
 
 
-def _suppress(kind):
+def _suppress(kind: str) -> Callable[[CollisionTopics, str, Empty, float], None]:
     def handle(part, side, msg, time_s):
         part.suppressions[side].take(kind, time_s)
 
@@ -31,11 +36,11 @@ class CollisionTopics(Part):
     def __init__(self, guarding: Guarding) -> None:
         self._guarding, self.suppressions = guarding, guarding.suppressions
 
-    def _avoidance(self, time_s, side, snapshot):
+    def _avoidance(self, time_s: float, side: str, snapshot: Snapshot) -> CollisionAvoidanceState:
         links, other_arm = self._guarding.near(side, time_s)
         return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), other_arm, links)
 
-    def _detection(self, time_s, side, snapshot):
+    def _detection(self, time_s: float, side: str, snapshot: Snapshot) -> CollisionDetectionState:
         return CollisionDetectionState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME),
                                        self._guarding.collides(side, time_s, snapshot))
 

@@ -20,10 +20,13 @@ from sim_time.stamps import stamp
 from .row import STATE_RATE_HZ, Part, Topic
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from baxter_core_msgs.msg import EndEffectorCommand
 
     from baxter_sim_hardware.grippers.hands import CupHand, FingersHand
     from baxter_sim_hardware.robot_state import RobotState
+    from baxter_sim_hardware.snapshot import Snapshot
 
     from .panel import PanelTopics
 
@@ -66,7 +69,7 @@ class GripperTopics(Part):
                 panel.attach_valve(BLOWERS[side], lambda gripper=gripper: gripper.blowing,
                                    self._valve(gripper.set_blow))
 
-    def _valve(self, switch):
+    def _valve(self, switch: Callable[[bool], None]) -> Callable[[bool], None]:
         def write(on):
             if on:
                 self._state.require_enabled()
@@ -74,28 +77,28 @@ class GripperTopics(Part):
 
         return write
 
-    def _command(self, side, msg, time_s):
+    def _command(self, side: str, msg: EndEffectorCommand, time_s: float) -> None:
         gripper = self._hands[side].gripper
         if self._properties[side] is _PROPERTIES[CustomGripper] and msg.command not in gripper.COMMANDS:
             raise CommandRefused("gripper command '%s': the %s arm carries no gripper" % (msg.command[:40], side))
         gripper.take(msg.command, msg.args, msg.sender, msg.sequence, self._state.enabled)
 
-    def _set_properties(self, side, msg, time_s):
+    def _set_properties(self, side: str, msg: EndEffectorProperties, time_s: float) -> None:
         self._require_custom(side)
         _require_short(msg)
         self._properties[side] = msg
 
-    def _set_state(self, side, msg, time_s):
+    def _set_state(self, side: str, msg: EndEffectorState, time_s: float) -> None:
         self._require_custom(side)
         _require_short(msg)
         self._custom_states[side] = msg
 
-    def _require_custom(self, side):
+    def _require_custom(self, side: str) -> None:
         if not isinstance(self._hands[side], NoHand):
             raise CommandRefused("the %s arm carries a gripper that the robot knows; only a custom one can be told "
                                  "what it is" % side)
 
-    def _gripper_state(self, time_s, side, snapshot):
+    def _gripper_state(self, time_s: float, side: str, snapshot: Snapshot) -> EndEffectorState:
         hand, told = self._hands[side], self._custom_states.get(side)
         gripper = hand.gripper
         if told is not None:
@@ -113,7 +116,7 @@ class GripperTopics(Part):
         message.command_sequence = gripper.sequence
         return message
 
-    def _gripper_properties(self, time_s, side, snapshot):
+    def _gripper_properties(self, time_s: float, side: str, snapshot: Snapshot) -> EndEffectorProperties:
         return self._properties[side]
 
     TOPICS = (
@@ -136,7 +139,7 @@ class GripperTopics(Part):
     )
 
 
-def _require_short(msg):
+def _require_short(msg: EndEffectorProperties | EndEffectorState) -> None:
     texts = [getattr(msg, name) for name in msg.__slots__]
     length = sum(len(text) for text in texts if isinstance(text, str))
     if length > _LONGEST:

@@ -13,8 +13,12 @@ from . import convert
 from .row import STATE_RATE_HZ, Part, Topic
 
 if TYPE_CHECKING:
+    from control_msgs.msg import JointControllerState
+    from std_msgs.msg import Bool, Float64
+
     from baxter_sim_hardware.head import PanDrive
     from baxter_sim_hardware.robot_state import RobotState
+    from baxter_sim_hardware.snapshot import Snapshot
 
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
@@ -25,28 +29,28 @@ class HeadTopics(Part):
     def __init__(self, drive: PanDrive, state: RobotState, dt: float) -> None:
         self._head, self._joint, self._state, self._dt = drive.head, drive.joint, state, dt
 
-    def _command_pan(self, component, msg, time_s):
+    def _command_pan(self, component: None, msg: HeadPanCommand, time_s: float) -> None:
         self._state.require_enabled()
         # A message with only the target set means: turn there. It does not disable panning, although the unset field's
         # 0 is the value of that request.
         request = msg.enable_pan_request if msg.speed_ratio else HeadPanCommand.REQUEST_PAN_VOID
         self._head.command_pan(msg.target, msg.speed_ratio, _REQUESTS.get(request))
 
-    def _command_position(self, component, msg, time_s):
+    def _command_position(self, component: None, msg: Float64, time_s: float) -> None:
         self._state.require_enabled()
         self._head.command_pan(msg.data, 0.0, None)
 
-    def _command_nod(self, component, msg, time_s):
+    def _command_nod(self, component: None, msg: Bool, time_s: float) -> None:
         if msg.data:
             self._state.require_enabled()
             self._head.nod(time_s)
 
-    def _head_state(self, time_s, component, snapshot):
+    def _head_state(self, time_s: float, component: None, snapshot: Snapshot) -> HeadState:
         joint = self._joint
         return HeadState(snapshot.position[joint], bool(abs(snapshot.velocity[joint]) > TURNING_SPEED),
                          self._head.is_nodding(time_s), self._head.pan_enabled)
 
-    def _controller_state(self, time_s, component, snapshot):
+    def _controller_state(self, time_s: float, component: None, snapshot: Snapshot) -> JointControllerState:
         joint = self._joint
         return convert.joint_controller_state(
             time_s, self._head.commanded_position, snapshot.position[joint], snapshot.effort[joint], self._dt)

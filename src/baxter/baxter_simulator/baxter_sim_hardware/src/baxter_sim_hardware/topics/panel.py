@@ -26,6 +26,9 @@ from .row import STATE_RATE_HZ, Part, Topic
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
+
+    from baxter_sim_hardware.snapshot import Snapshot
     from gazebo_ros.model_plugin import PluginContext
 
 PRESS_SERVICE = "sim/press"
@@ -49,7 +52,7 @@ class PanelTopics(Part):
         for navigator in self._drawn:
             self._draw(navigator)
 
-    def _draw(self, navigator):
+    def _draw(self, navigator: str) -> None:
         _, _, lights = self._panel.navigator(navigator)
         self._drawn[navigator].show(navigator_lights.picture(*lights))
 
@@ -57,39 +60,39 @@ class PanelTopics(Part):
         """Whether the cuff of one hand is squeezed."""
         return self._panel.digital["%s_lower_cuff" % side]
 
-    def _digital(self, time_s, name, snapshot):
+    def _digital(self, time_s: float, name: str, snapshot: Snapshot) -> DigitalIOState:
         return DigitalIOState(int(self._panel.read_digital(name)), DIGITAL[name])
 
-    def _all_digital(self, time_s, component, snapshot):
+    def _all_digital(self, time_s: float, component: None, snapshot: Snapshot) -> DigitalIOStates:
         return DigitalIOStates(list(DIGITAL), [self._digital(time_s, name, snapshot) for name in DIGITAL])
 
-    def _analog(self, time_s, name, snapshot):
+    def _analog(self, time_s: float, name: str, snapshot: Snapshot) -> AnalogIOState:
         return AnalogIOState(stamp(time_s), float(self._panel.read_analog(name)), ANALOG[name])
 
-    def _analog_uint32(self, time_s, name, snapshot):
+    def _analog_uint32(self, time_s: float, name: str, snapshot: Snapshot) -> UInt32:
         return UInt32(self._panel.read_analog(name))
 
-    def _all_analog(self, time_s, component, snapshot):
+    def _all_analog(self, time_s: float, component: None, snapshot: Snapshot) -> AnalogIOStates:
         return AnalogIOStates(list(ANALOG), [self._analog(time_s, name, snapshot) for name in ANALOG])
 
-    def _navigator(self, time_s, navigator, snapshot):
+    def _navigator(self, time_s: float, navigator: str, snapshot: Snapshot) -> NavigatorState:
         buttons, wheel, lights = self._panel.navigator(navigator)
         return NavigatorState(list(BUTTONS), buttons, wheel, list(LIGHTS), lights)
 
-    def _all_navigators(self, time_s, component, snapshot):
+    def _all_navigators(self, time_s: float, component: None, snapshot: Snapshot) -> NavigatorStates:
         return NavigatorStates([navigator_name(navigator) for navigator in NAVIGATORS],
                                [self._navigator(time_s, navigator, snapshot) for navigator in NAVIGATORS])
 
-    def _set_digital(self, component, msg, time_s):
+    def _set_digital(self, component: None, msg: DigitalOutputCommand, time_s: float) -> None:
         self._panel.set_digital(msg.name, msg.value)
         for navigator in self._drawn:
             if msg.name in ("%s_%s_light" % (navigator, light) for light in LIGHTS):
                 self._draw(navigator)
 
-    def _set_analog(self, component, msg, time_s):
+    def _set_analog(self, component: None, msg: AnalogOutputCommand, time_s: float) -> None:
         self._panel.set_analog(msg.name, msg.value)
 
-    def _press(self, request):
+    def _press(self, request: PressRequest) -> PressResponse:
         try:
             if request.action == PressRequest.TURN:
                 self._panel.turn(request.component, request.steps)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from baxter_core_msgs.msg import RobustControllerStatus
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
@@ -29,15 +29,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     import numpy as np
+    from std_msgs.msg import Empty, String
 
     from baxter_sim_hardware.robot import Baxter
+    from baxter_sim_hardware.snapshot import Snapshot
     from baxter_sim_hardware.warnings import Warnings
 
 UPDATER_RATE_HZ = 1.0
 TYPES = {"Tare": "TareEnable", "CalibrateArm": "CalibrateArmEnable"}  # messages that ask for PROCEDURES
 
 
-def _status_of(name):
+def _status_of(name: str) -> Callable[[ProcedureTopics, float, str, Snapshot], RobustControllerStatus]:
     def status(part, time_s, side, snapshot):
         procedure = part.procedures[name, side]
         return RobustControllerStatus(procedure.is_enabled, procedure.complete, procedure.uid, procedure.timed_out,
@@ -46,7 +48,7 @@ def _status_of(name):
     return status
 
 
-def _take(name):
+def _take(name: str) -> Callable[[ProcedureTopics, str, Any, float], None]:
     def handle(part, side, msg, time_s):
         part.procedures[name, side].take(msg.isEnabled, msg.uid, time_s)
 
@@ -76,7 +78,8 @@ class ProcedureTopics(Part):
             if procedure.is_active:
                 self._update(name, side, procedure, time_s, feel)
 
-    def _update(self, name, side, procedure, time_s, feel):
+    def _update(self, name: str, side: str, procedure: Procedure, time_s: float,
+                feel: Callable[[str], np.ndarray]) -> None:
         baxter = self._baxter
         own = baxter.arms.joints_of(side)
         arm = Arm(baxter.measured.position[own], baxter.measured.velocity[own], feel(side))
@@ -89,29 +92,29 @@ class ProcedureTopics(Part):
         except CommandRefused as refusal:
             self._warnings.warn(time_s, (name, side), "%s of the %s arm: %s" % (name, side, refusal))
 
-    def _start_update(self, component, msg, time_s):
+    def _start_update(self, component: None, msg: String, time_s: float) -> None:
         self._updater.start(msg.data)
         raise CommandRefused(self._updater.description)
 
-    def _stop_update(self, component, msg, time_s):
+    def _stop_update(self, component: None, msg: Empty, time_s: float) -> None:
         self._updater.reset()
 
-    def _plugins_loaded(self, time_s, side, snapshot):
+    def _plugins_loaded(self, time_s: float, side: str, snapshot: Snapshot) -> Bool:
         return Bool(True)
 
-    def _update_sources(self, time_s, component, snapshot):
+    def _update_sources(self, time_s: float, component: None, snapshot: Snapshot) -> UpdateSources:
         return UpdateSources("", [])
 
-    def _usb_ready(self, time_s, component, snapshot):
+    def _usb_ready(self, time_s: float, component: None, snapshot: Snapshot) -> Bool:
         return Bool(False)
 
-    def _updater_status(self, time_s, component, snapshot):
+    def _updater_status(self, time_s: float, component: None, snapshot: Snapshot) -> UpdateStatus:
         return UpdateStatus(self._updater.status, 0.0, self._updater.description)
 
-    def _update_status(self, time_s, component, snapshot):
+    def _update_status(self, time_s: float, component: None, snapshot: Snapshot) -> Int32:
         return Int32(self._updater.status)
 
-    def _update_progress(self, time_s, component, snapshot):
+    def _update_progress(self, time_s: float, component: None, snapshot: Snapshot) -> Int32:
         return Int32(0)
 
     TOPICS = (

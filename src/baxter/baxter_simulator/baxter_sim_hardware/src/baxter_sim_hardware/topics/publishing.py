@@ -6,13 +6,13 @@ from __future__ import annotations
 import itertools
 import math
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from baxter_sim_hardware.message_delay import Late
 from sim_time.pace import Schedule
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterable
 
     from baxter_sim_hardware.snapshot import Snapshot
     from loop_ros.protocol import Publisher
@@ -91,7 +91,7 @@ class Publishing:
         self._idle_until_s = min(schedule.next_s for schedule, _ in self._groups.values())
         return True
 
-    def _present(self, function, component, publisher):
+    def _present(self, function: Callable, component: object, publisher: Publisher) -> tuple:
         if any(publisher is to for ready in self._late.waiting() for to, _ in ready):
             # That comes after the pause, and must not be older.
             return self._newest.get(publisher, ())
@@ -101,7 +101,7 @@ class Publishing:
             self._survived("publishing %s" % publisher.topic, error)
             return ()
 
-    def _send(self, groups):
+    def _send(self, groups: Iterable[Iterable[tuple[Publisher, Any]]]) -> None:
         for publisher, message in itertools.chain.from_iterable(groups):
             try:
                 publisher.publish(message)
@@ -109,12 +109,12 @@ class Publishing:
                 self._survived("publishing %s" % publisher.topic, error)
 
 
-def _by_publisher(ready):
+def _by_publisher(ready: Iterable[tuple[Publisher, Any]]) -> dict[Publisher, list]:
     sent = {}
     for publisher, message in ready:
         sent.setdefault(publisher, []).append(message)
     return sent
 
 
-def _messages(made):
+def _messages(made: Any) -> tuple:
     return made if isinstance(made, tuple) else (made,)

@@ -18,9 +18,15 @@ from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from baxter_core_msgs.msg import AssemblyState
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Bool, UInt16
+
     from baxter_sim_hardware.simulated import SimulatedBaxter
+    from baxter_sim_hardware.snapshot import Snapshot
     from baxter_sim_hardware.warnings import Warnings
     from gazebo_ros.model_plugin import PluginContext
+    from loop_ros.protocol import Publisher
 
 # Joints that the physical robot lists, always at 0: it nods without an angle, and its torso turns on no joint.
 WITHOUT_SENSOR = ("head_nod", "torso_t0")
@@ -64,7 +70,7 @@ class RobotTopics(Part):
     # -- out
 
     @staticmethod
-    def _messages_of_joints(names, as_robot):
+    def _messages_of_joints(names: list[str], as_robot: bool) -> list[tuple[convert.JointStates, np.ndarray]]:
         """[(`convert.JointStates`, indices of its joints; the number of joints means one without a sensor)]."""
         groups = [sorted(names)]
         if as_robot:
@@ -73,34 +79,34 @@ class RobotTopics(Part):
         return [(convert.JointStates(group), np.array([names.index(name) if name in names else len(names)
                                                        for name in group])) for group in groups if group]
 
-    def _joint_states(self, time_s, component, snapshot):
+    def _joint_states(self, time_s: float, component: None, snapshot: Snapshot) -> tuple[JointState, ...]:
         sensed = [np.append(values, 0.0) for values in snapshot.sensed]
         return tuple(states.message(time_s, *(values[order] for values in sensed)) for states, order in self._joints)
 
-    def _assembly(self, time_s, component, snapshot):
+    def _assembly(self, time_s: float, component: str | None, snapshot: Snapshot) -> AssemblyState:
         return convert.assembly_state(self._baxter.state.assembly)
 
-    def _keep_started(self, publisher):
+    def _keep_started(self, publisher: Publisher) -> None:
         self._started = publisher
 
-    def _begin_resets(self, publisher):
+    def _begin_resets(self, publisher: Publisher) -> None:
         self._resets = publisher
         self.announce_reset()
 
     # -- in
 
-    def _joint_state_publish_rate(self, component, msg, time_s):
+    def _joint_state_publish_rate(self, component: None, msg: UInt16, time_s: float) -> None:
         if not 1 <= msg.data <= 1000:
             raise CommandRefused("%d Hz; it must be from 1 to 1000" % msg.data)
         self._set_rate(msg.data)
 
-    def _super_enable(self, component, msg, time_s):
+    def _super_enable(self, component: None, msg: Bool, time_s: float) -> None:
         self.apply(Event.ENABLE if msg.data else Event.DISABLE)
 
-    def _super_stop(self, component, msg, time_s):
+    def _super_stop(self, component: None, msg: Empty, time_s: float) -> None:
         self.apply(Event.STOP)
 
-    def _super_reset(self, component, msg, time_s):
+    def _super_reset(self, component: None, msg: Empty, time_s: float) -> None:
         self.apply(Event.RESET)
 
     TOPICS = (

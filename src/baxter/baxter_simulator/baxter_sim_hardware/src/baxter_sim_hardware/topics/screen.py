@@ -14,6 +14,7 @@ from sim_time.stamps import stamp
 from .row import Part, Topic
 
 if TYPE_CHECKING:
+    from baxter_sim_hardware.snapshot import Snapshot
     from gazebo_ros.model_plugin import PluginContext
 
 SCREEN_FRAME = "screen"
@@ -34,15 +35,15 @@ class ScreenTopics(Part):
         self.screen.reset()
         self._draw()
 
-    def _show(self, component, msg, time_s):
+    def _show(self, component: None, msg: Image, time_s: float) -> None:
         self.screen.show(msg.width, msg.height, msg.encoding, msg.step, msg.data)
         self._draw()
 
-    def _draw(self):
+    def _draw(self) -> None:
         if self._drawn is not None:
             self._drawn.show(self.screen.pixels)
 
-    def _image(self, time_s, component, snapshot):
+    def _image(self, time_s: float, component: None, snapshot: Snapshot) -> Image:
         return Image(Header(stamp=stamp(time_s), frame_id=SCREEN_FRAME), HEIGHT, WIDTH, "rgb8", 0, 3 * WIDTH,
                      self.screen.pixels.tobytes())
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from baxter_sim_hardware.sensing.noise import HandSensors
+    from baxter_sim_hardware.snapshot import Snapshot
     from gazebo_ros.model_plugin import PluginContext
 
     from .panel import PanelTopics
@@ -89,7 +90,7 @@ class SensorTopics(Part):
         for side, name in RANGE_SENSORS.items():
             panel.attach(name, lambda side=side: round(1000.0 * sensors.range_from_hit(self._hit(side))))
 
-    def _hit(self, side):
+    def _hit(self, side: str) -> float | None:
         """Distance [m] of the nearest surface in front of one hand's range sensor, or None."""
         if RANGE_SENSORS[side] not in self._links:
             return None
@@ -101,16 +102,16 @@ class SensorTopics(Part):
         distance = float(fraction) * sensors.RANGE_MAX_M
         return distance if self._hands is None else self._hands.range(side, self._world.time_s, distance)
 
-    def _range(self, time_s, side, snapshot):
+    def _range(self, time_s: float, side: str, snapshot: Snapshot) -> Range:
         return Range(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), Range.INFRARED, sensors.RANGE_FIELD_RAD,
                      sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, sensors.range_from_hit(self._hit(side)))
 
-    def _scan(self, time_s, side, snapshot):
+    def _scan(self, time_s: float, side: str, snapshot: Snapshot) -> LaserScan:
         hit = self._hit(side)
         return LaserScan(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), 0.0, 0.0, 0.0, 0.0, 0.0,
                          sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, [math.inf if hit is None else hit], [])
 
-    def _accelerometer(self, time_s, side, snapshot):
+    def _accelerometer(self, time_s: float, side: str, snapshot: Snapshot) -> Imu:
         force = np.zeros(3)
         if side in self._chains:
             chain, index = self._chains[side], self._limb_index[side]
@@ -128,7 +129,7 @@ class SensorTopics(Part):
 
     # -- head
 
-    def _distances(self, listening=slice(None)):
+    def _distances(self, listening: slice = slice(None)) -> np.ndarray:
         """(k,) [m] distance of the echo of each sonar of a slice of the twelve; inf for none."""
         directions = self._directions[listening]
         if SONAR_FRAME not in self._links:
@@ -140,7 +141,7 @@ class SensorTopics(Part):
         fractions = self._world.ray_test_batch(near, near + span * rays).reshape(directions.shape[:2]).min(axis=1)
         return np.where(fractions < 1.0, sensors.SONAR_MIN_M + span * fractions, np.inf)
 
-    def _sonar(self, time_s, component, snapshot):
+    def _sonar(self, time_s: float, component: None, snapshot: Snapshot) -> PointCloud:
         echoes = self._ring.echoes(self._distances())
         # The beam's axis lies in the plane of the ring.
         ahead = self._directions.sum(axis=1)
@@ -150,33 +151,33 @@ class SensorTopics(Part):
                     ChannelFloat32("Distance", [float(distance) for _, distance in echoes])]
         return PointCloud(Header(stamp=stamp(time_s), frame_id=SONAR_FRAME), points, channels)
 
-    def _lit(self, time_s):
+    def _lit(self, time_s: float) -> int:
         """A bit for each light that is on."""
         mask = self._ring.overridden(time_s)
         return self._ring.heard(self._distances()) if mask is None else mask
 
-    def _lights(self, time_s, component, snapshot):
+    def _lights(self, time_s: float, component: None, snapshot: Snapshot) -> UInt16:
         return UInt16(self._lit(time_s))
 
-    def _sonars_enabled(self, time_s, component, snapshot):
+    def _sonars_enabled(self, time_s: float, component: None, snapshot: Snapshot) -> UInt16:
         return UInt16(self._ring.enabled)
 
-    def _green_level(self, time_s, component, snapshot):
+    def _green_level(self, time_s: float, component: None, snapshot: Snapshot) -> Float32:
         return Float32(self._ring.levels["green"])
 
-    def _red_level(self, time_s, component, snapshot):
+    def _red_level(self, time_s: float, component: None, snapshot: Snapshot) -> Float32:
         return Float32(self._ring.levels["red"])
 
-    def _enable_sonars(self, component, msg, time_s):
+    def _enable_sonars(self, component: None, msg: UInt16, time_s: float) -> None:
         self._ring.enable(msg.data)
 
-    def _set_lights(self, component, msg, time_s):
+    def _set_lights(self, component: None, msg: UInt16, time_s: float) -> None:
         self._ring.set_lights(msg.data, time_s)
 
-    def _set_green_level(self, component, msg, time_s):
+    def _set_green_level(self, component: None, msg: Float32, time_s: float) -> None:
         self._ring.set_level("green", msg.data)
 
-    def _set_red_level(self, component, msg, time_s):
+    def _set_red_level(self, component: None, msg: Float32, time_s: float) -> None:
         self._ring.set_level("red", msg.data)
 
     TOPICS = (

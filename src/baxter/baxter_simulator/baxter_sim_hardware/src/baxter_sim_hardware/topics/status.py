@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from baxter_sim_hardware.robot import Baxter
-    from loop_ros.protocol import Log
+    from baxter_sim_hardware.snapshot import Snapshot
+    from loop_ros.protocol import Log, Publisher
 
 DIAGNOSTICS_RATE_HZ = 1.0
 AGGREGATE = "/Baxter"
@@ -36,7 +37,7 @@ class StatusTopics(Part):
         self._links, self._urdf_xml, self._log = links, urdf_xml, log
         self._urdf = self._fragment_time = None
 
-    def _statuses(self, snapshot):
+    def _statuses(self, snapshot: Snapshot) -> list[DiagnosticStatus]:
         arms = self._baxter.arms
         level, text = status.level_of(self._baxter.state.state)
         statuses = [DiagnosticStatus(level, "state", text, "baxter", [])]
@@ -50,24 +51,24 @@ class StatusTopics(Part):
                                              [KeyValue(key, value) for key, value in values.items()]))
         return statuses
 
-    def _diagnostics(self, time_s, component, snapshot):
+    def _diagnostics(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticArray:
         return _array(time_s, self._statuses(snapshot))
 
-    def _aggregate(self, time_s, component, snapshot):
+    def _aggregate(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticArray:
         statuses = self._statuses(snapshot)
         top = _worst(AGGREGATE, statuses)
         for each in statuses:
             each.name = "%s/%s" % (AGGREGATE, each.name)
         return _array(time_s, [top, *statuses])
 
-    def _toplevel(self, time_s, component, snapshot):
+    def _toplevel(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticStatus:
         return _worst("toplevel_state", self._statuses(snapshot))
 
-    def _begin_urdf(self, publisher):
+    def _begin_urdf(self, publisher: Publisher) -> None:
         self._urdf = publisher
         publisher.publish(URDFConfiguration(urdf=self._urdf_xml))
 
-    def _take_fragment(self, component, msg, time_s):
+    def _take_fragment(self, component: None, msg: URDFConfiguration, time_s: float) -> None:
         if not (msg.link or msg.joint):
             return  # the description that the robot itself publishes on this topic
         status.check_fragment(msg.link, msg.joint, msg.urdf, self._links)
@@ -92,10 +93,10 @@ class StatusTopics(Part):
     )
 
 
-def _worst(name, statuses):
+def _worst(name: str, statuses: list[DiagnosticStatus]) -> DiagnosticStatus:
     worst = max(statuses, key=lambda each: each.level)
     return DiagnosticStatus(worst.level, name, worst.message, "baxter", [])
 
 
-def _array(time_s, statuses):
+def _array(time_s: float, statuses: list[DiagnosticStatus]) -> DiagnosticArray:
     return DiagnosticArray(Header(stamp=stamp(time_s)), statuses)
