@@ -135,7 +135,7 @@ def _opens(points: np.ndarray, ring: list[int], place: int, target: np.ndarray) 
     return bool((left and right) if _side(before, here, after) >= 0.0 else (left or right))
 
 
-def _ears(points, ring):
+def _ears(points: np.ndarray, ring: list[int]) -> list[tuple[int, int, int]]:
     """Triangles of the area in a counter-clockwise ring: ears, corners without another point in them, are cut off."""
     ring, faces = list(ring), []
     while len(ring) > 3:
@@ -151,11 +151,11 @@ def _ears(points, ring):
     return [*faces, tuple(ring)]
 
 
-def _corner(ring, place):
+def _corner(ring: list[int], place: int) -> tuple[int, int, int]:
     return ring[place - 1], ring[place], ring[(place + 1) % len(ring)]
 
 
-def _turn(points, corner):
+def _turn(points: np.ndarray, corner: tuple[int, int, int]) -> float:
     return float(_side(*points[list(corner)]))
 
 

@@ -83,7 +83,8 @@ class Model:
     rows: section "lag" of `effects.read`. Raises SysidError for a description that is no Baxter's.
     """
 
-    def __init__(self, robot: Robot, rows: dict, recording: Recording, sides: tuple[str, ...], settings: Settings):
+    def __init__(self, robot: Robot, rows: dict, recording: Recording, sides: tuple[str, ...],
+                 settings: Settings) -> None:
         self.settings, self._period = settings, recording.period_s
         self.arms = [_Arm(side, arm_body(robot, side), hand_in_last(robot, side),
                           np.array([effects.per_joint(rows, number, joint_names(side)) for number in NUMBERS]),

@@ -57,7 +57,8 @@ def replay(body: ArmBody, known: ArmBody, numbers: Array, start: tuple[Array, Ar
 
 
 @_compiled
-def _replay(body, known, numbers, start, velocity, points, every):
+def _replay(body: ArmBody, known: ArmBody, numbers: Array, start: Array, velocity: Array, points: Array,
+            every: int) -> tuple[Array, Array, Array]:
     dt = TICK_S
     ticks, count = points.shape
     rows = ticks // every + 1

@@ -2,7 +2,7 @@
 """Descriptions of things that are made of boxes and cylinders, as URDF."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -70,11 +70,11 @@ def urdf(name: str, links: dict[str, Link], slides: Sequence[Slide] = ()) -> str
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def _text(numbers):
+def _text(numbers: Iterable[float]) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
-def _add_link(robot, name, body):
+def _add_link(robot: ElementTree.Element, name: str, body: Link) -> None:
     link = ElementTree.SubElement(robot, "link", name=name)
     masses = [part.mass_kg for part in body.parts]
     total = sum(masses)

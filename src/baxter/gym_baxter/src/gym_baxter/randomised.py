@@ -51,7 +51,7 @@ class Drawn(NamedTuple):
 class Randomiser:
     """Draws and applies for a lab with its things and cameras. Attribute `drawn`: of the present episode."""
 
-    def __init__(self, much: Randomised, lab: Lab, cameras: Sequence[str]):
+    def __init__(self, much: Randomised, lab: Lab, cameras: Sequence[str]) -> None:
         much.require()
         self._much, self._lab, self._cameras = much, lab, tuple(cameras)
         things = [thing.model for name, thing in lab.things.items()]

@@ -188,7 +188,7 @@ class Parts:
         for body in self.bodies:
             pybullet.removeBody(body, physicsClientId=self._client)
 
-    def _share(self, index):
+    def _share(self, index: np.ndarray) -> Sequence[tuple[int, list[int], slice | list[int] | None]]:
         """[(multibody, its joints, their rows among ``index``; None: all)]"""
         if len(self.bodies) == 1:
             return ((self.bodies[0], index.tolist(), None),)
@@ -200,7 +200,7 @@ class Parts:
             shares = self._shares[key] = self._make_share(index.tolist())
         return shares
 
-    def _make_share(self, index):
+    def _make_share(self, index: list[int]) -> list[tuple[int, list[int], slice | list[int] | None]]:
         rows_of = {}
         for row, number in enumerate(index):
             rows_of.setdefault(self.places[number].body, []).append(row)
