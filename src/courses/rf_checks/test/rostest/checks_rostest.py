@@ -198,7 +198,7 @@ class Wrong(Judged):
 
 
 class Planning(Judged):
-    """Programs for the exercise on planning that are wrong, and its skeleton."""
+    """Programs for the exercise on planning that are wrong, its skeleton, and the exercise on steering."""
 
 
 class Adversaries(Judged):
@@ -281,9 +281,10 @@ def fault(name, key, *words):
 
 
 for exercise in EXERCISES:
-    add(Exercises, exercise.name + "_solution", solution(exercise.name))
-    # A lab with move_group is restarted for each program: its skeleton is with the long tests.
-    add(Planning if exercise.name == "plan_around" else Exercises, exercise.name + "_skeleton", skeleton(exercise.name))
+    # A lab with move_group or a servo is restarted for each program, and time waits for a servo at each of its steps.
+    add(Planning if exercise.lab == "steering" else Exercises, exercise.name + "_solution", solution(exercise.name))
+    add(Planning if exercise.lab in ("moveit", "steering") else Exercises, exercise.name + "_skeleton",
+        skeleton(exercise.name))
 for suite, programs in ((Wrong, WRONG), (Planning, PLANNING), (Adversaries, ADVERSARIES)):
     for program, (key, *words) in programs.items():
         add(suite, program, fault(program, key, *words))
