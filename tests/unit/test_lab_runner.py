@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import uuid
 from pathlib import Path
 
@@ -348,11 +349,13 @@ def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path):
 
 
 @pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
-def test_a_temporary_file_that_a_test_leaves_fails_the_run(tmp_path, words):
+def test_a_temporary_file_that_a_test_leaves_is_named_and_removed(tmp_path, words):
     (tmp_path / "test_one.py").write_text("import os, tempfile\ndef test_one(tmp_path):\n    tempfile.mkstemp('left')\n"
                                           "    os.system('mktemp -t XXXXXXleft')")
+    before = set(Path(tempfile.gettempdir()).iterdir())
     done = run_pytest(tmp_path, *words)
-    assert "left 2 temporary files" in done.stdout and done.stdout.splitlines()[-1].startswith("1 passed, 1 failed")
+    assert "left 2 temporary files" in done.stdout and done.stdout.splitlines()[-1].startswith("1 passed, 0 failed")
+    assert not {path.name for path in set(Path(tempfile.gettempdir()).iterdir()) - before if "left" in path.name}
 
 
 def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):

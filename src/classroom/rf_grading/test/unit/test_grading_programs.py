@@ -64,7 +64,7 @@ def test_an_exported_program_counts_instead_of_its_notebook():
 
 
 def test_exercises_are_chosen_by_lab_and_name():
-    assert {one.lab for one in programs.exercises_of()} == {"lab2", "cwru", "moveit"}
+    assert {one.lab for one in programs.exercises_of()} == {"lab2", "cwru", "moveit", "steering"}
     for lab, names, words in (("lab7", (), "no lab 'lab7'"), ("lab2", ("wav",), "no exercise 'wav'")):
         with pytest.raises(UnknownExercise, match=words):
             programs.exercises_of(lab, names)
