@@ -70,9 +70,12 @@ class Replay:
 
 
 def actions_of(data: DataSet, number: int) -> np.ndarray:
-    """(n, 16) of an episode. Raises DemonstrationError for a set of other actions than positions."""
+    """(n, 16) of an episode. Raises DemonstrationError for other actions than finite positions."""
     names, wanted = data.schema.features[ACTION].names, tuple(name for name, _ in NAMED)
     if names != wanted:
         raise DemonstrationError("%s has the actions %s; a robot replays %s" % (
             data.folder, ", ".join(names or ("without names",)), ", ".join(wanted)))
-    return data.episode(number).columns[ACTION]
+    actions = data.episode(number).columns[ACTION]
+    if not np.isfinite(actions).all():
+        raise DemonstrationError("episode %d of %s has actions that are no finite numbers" % (number, data.folder))
+    return actions

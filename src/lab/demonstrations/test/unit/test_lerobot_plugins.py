@@ -231,7 +231,8 @@ def test_the_device_says_what_arms_and_grippers_are_told(bridge):
 
 
 def test_commands_that_say_nothing_leave_a_gripper_as_it_was():
-    for command in ({"command": "stop", "args": ""}, {"command": "go", "args": "{"}, {"command": "go", "args": "[]"}):
+    for command in ({"command": "stop", "args": ""}, *({"command": "go", "args": args} for args in (
+            "{", "[]", '{"position": NaN}', '{"position": 1%s}' % ("0" * 400)))):
         assert wire.gripper_wanted(command, 30.0) == 30.0
     assert wire.gripper_wanted({"command": "release", "args": ""}, 30.0) == 100.0
 

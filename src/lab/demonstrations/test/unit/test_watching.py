@@ -12,6 +12,7 @@ from std_msgs.msg import String
 
 from baxter_model import SIDES, joint_names
 from demonstrations.frames import ACTION, ENVIRONMENT, PICTURES, STATE, DemonstrationError, Episode, Schema, numbers
+from demonstrations.needed import need
 from demonstrations.over_ros import messages, recording
 from demonstrations.reading import DataSet
 from demonstrations.replaying import Limits, Replay, actions_of, reason_to_stop
@@ -196,6 +197,27 @@ def test_a_set_of_other_actions_is_not_replayed_on_a_robot(tmp_path):
         writer.add(Episode("Reach.", {ACTION: np.zeros((2, 1), np.float32)}, True, 0))
     with pytest.raises(DemonstrationError, match="left_hand.dx"):
         actions_of(DataSet(tmp_path), 0)
+
+
+def test_an_episode_with_a_number_that_is_none_does_not_move_a_robot(tmp_path):
+    with SetWriter(tmp_path, Schema(20, {ACTION: numbers(NAMED)}, about={"task": "Reach"})) as writer:
+        writer.add(Episode("Reach.", {ACTION: np.zeros((3, len(NAMED)), np.float32)}, True, 0))
+    pyarrow, parquet = need("pyarrow"), need("pyarrow", "parquet")
+    file, = tmp_path.glob("data/**/*.parquet")
+    table = parquet.read_table(file)
+    values = np.zeros((3, len(NAMED)), np.float32)
+    values[1, 4] = np.nan  # as others may write it; ours does not
+    column = pyarrow.array(list(values), type=table.schema.field(ACTION).type)
+    parquet.write_table(table.set_column(table.schema.names.index(ACTION), table.schema.field(ACTION), column), file)
+    with pytest.raises(DemonstrationError, match="finite"):
+        actions_of(DataSet(tmp_path), 0)
+
+
+def test_a_recording_with_other_messages_on_a_topic_is_named(tmp_path):
+    with rosbag.Bag(str(tmp_path / "x.bag"), "w") as file:
+        file.write("/robot/joint_states", String("s0"), rospy.Time(5))
+    with pytest.raises(DemonstrationError, match="std_msgs/String, expected sensor_msgs/JointState"):
+        list(recording.of_bag(tmp_path / "x.bag", messages.topics([], [])))
 
 
 def test_a_feed_of_a_robot_that_nobody_reads_any_more_holds_up_no_topic(monkeypatch):

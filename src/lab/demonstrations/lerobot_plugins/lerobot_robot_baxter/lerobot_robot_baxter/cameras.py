@@ -64,7 +64,7 @@ class Stream:
                         if self._ended:
                             return
                 raise OSError("the server has ended the stream")
-            except (OSError, ValueError) as error:
+            except Exception as error:  # whatever the server sends, the next try may be better
                 with self._came:
                     self._error = str(error) or type(error).__name__
                     self._came.wait(0.5)
@@ -79,7 +79,10 @@ class Stream:
                     raise ConnectionError("no picture younger than %g s from %s: %s" % (age_s, self.url, self._error))
                 self._came.wait(left)
             content = self._newest[0]
-        pixels = np.asarray(Image.open(io.BytesIO(content)).convert("RGB"))
+        try:
+            pixels = np.asarray(Image.open(io.BytesIO(content)).convert("RGB"))
+        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+            raise ConnectionError("%s sends what is no picture: %s" % (self.url, error)) from error
         if pixels.shape != self._shape:
             raise ConnectionError("%s sends pictures of %s; %s were asked for" % (self.url, pixels.shape, self._shape))
         return pixels

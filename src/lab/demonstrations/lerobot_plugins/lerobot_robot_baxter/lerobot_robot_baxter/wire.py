@@ -66,9 +66,10 @@ def gripper_wanted(command: Mapping[str, Any], before: float) -> float:
         return OPEN
     if command["command"] == "go":
         try:
-            return min(max(float(json.loads(command["args"])["position"]), CLOSED), OPEN)
-        except (ValueError, KeyError, TypeError):
+            position = float(json.loads(command["args"])["position"])
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             return before
+        return before if math.isnan(position) else min(max(position, CLOSED), OPEN)
     return before
 
 

@@ -56,8 +56,10 @@ def of_bag(path: Path, heard: Mapping[str, Heard]) -> Feed:
     try:
         with rosbag.Bag(str(path)) as bag:
             for topic, message, _ in bag.read_messages(topics=list(heard)):
+                if message._type != heard[topic].kind._type:
+                    raise ValueError("%s has %s, expected %s" % (topic, message._type, heard[topic].kind._type))
                 yield topic, message
-    except (OSError, ValueError, rosbag.ROSBagException) as error:
+    except Exception as error:  # rosbag has many for a broken file
         raise DemonstrationError("%s cannot be read: %s" % (path, error)) from error
 
 
