@@ -8,10 +8,12 @@ from pathlib import Path
 
 from labs import HERE, Lab, Process, memory_mb
 
+from lab_testing.waiting import wait_until
 from processes.family import children_of
 
-# What has only started still loads and connects [s]; how long a lab is watched at rest [s].
-SETTLE_S, RESTING_S = 3.0, 10.0
+# What has only started still loads and connects [s, simulated], and the wall time that may take; how long a lab is
+# watched at rest [s].
+SETTLE_S, LIMIT_S, RESTING_S = 3.0, 60.0, 10.0
 # A launch file with one empty node measures the time of roslaunch and rospy alone.
 EMPTY = '<launch><node name="bench_empty" pkg="workspace_tests" type="lab_part.py" args="empty"/></launch>'
 
@@ -46,7 +48,8 @@ def measure(report, quick, number):
             except (OSError, TypeError):
                 continue  # a node that has ended, such as spawn_model
         report.add("memory of all nodes", sum(used.values()), "MB", most=290.0)
-        time.sleep(SETTLE_S)
+        settled = lab.now() + SETTLE_S
+        wait_until(lambda: lab.now() >= settled, "the lab to settle", LIMIT_S)
         processes, begin = [Process(pid) for pid in children_of([os.getpid()]) - {os.getpid()}], time.monotonic()
         before = _cpu_s(processes)
         time.sleep(1.0 if quick else RESTING_S)
