@@ -11,6 +11,7 @@ from baxter_sim_hardware.arms import avoidance
 from baxter_sim_hardware.arms.actuators import Actuators, Wanted
 from baxter_sim_hardware.arms.joint_command import CommandParser, JointLimits, Mode
 from baxter_sim_hardware.arms.joint_sensors import JointSensors
+from baxter_sim_hardware.arms.raw_stream import RawStream
 from baxter_sim_hardware.arms.safety import blocks_of
 from baxter_sim_hardware.arms.setpoint import (
     SetPoints,
@@ -41,6 +42,7 @@ def load() -> None:
     for mode in Mode:
         command = parser.parse(mode, limits.names, [0.0])
     speeds = Speeds(bound, 1.0, bound)
+    RawStream(limits, bound, 1.0).take(points, np.zeros(1, dtype=int), command, 0.0)
     shares_in_step(command.index, command.values, points.position, speeds.numbers, 1.0)
     cruising_speeds(speeds.numbers, np.zeros(1, dtype=int), points.braking, here, points.speed)
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from disk_cache.compiled import compiler
+
 from .joint_modes import RAW_POSITION
 
 if TYPE_CHECKING:
@@ -16,6 +18,31 @@ if TYPE_CHECKING:
 STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
 FEED_FORWARD_S = 0.05  # time that a feed-forward velocity belongs to the raw commands that come in
 
+_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
+
+
+@_compiled
+def _take(numbers: np.ndarray, points: np.ndarray, bounds: np.ndarray, mode: np.ndarray, index: np.ndarray,
+          values: np.ndarray, time_s: float, dt: float) -> None:
+    """`RawStream.take`. numbers: of the stream, (4, n); points: of `SetPoints`; bounds: (3, n) lower, upper, speed;
+    values: (k,) of the joints `index`."""
+    stamp, earlier, velocity, velocity_stamp = numbers[0], numbers[1], numbers[2], numbers[3]
+    target, goal, pace = points[2], points[6], points[7]
+    for i, joint in enumerate(index):
+        # Commands that come between the same two ticks count as one, or the last would have only a tick for its way.
+        if stamp[joint] != time_s:
+            earlier[joint] = stamp[joint]
+        stamp[joint] = time_s
+        gap = max(time_s - earlier[joint], dt)
+        wanted, least, most, limit = values[i], bounds[0, joint], bounds[1, joint], bounds[2, joint]
+        if mode[joint] != RAW_POSITION or gap > STREAM_GAP_S:
+            target[joint] = wanted
+        elif time_s - velocity_stamp[joint] <= FEED_FORWARD_S:
+            # With a feed-forward velocity, the goal is the predicted next command.
+            wanted += velocity[joint] * min(gap, STREAM_GAP_S)
+        goal[joint] = min(max(wanted, least), most)
+        pace[joint] = min(max((goal[joint] - target[joint]) / gap, -limit), limit)
+
 
 class RawStream:
     """The times of the last raw set-points, and their velocities, for n joints.
@@ -24,12 +51,13 @@ class RawStream:
     """
 
     def __init__(self, limits: JointLimits, speed: np.ndarray, dt: float) -> None:
-        self._limits, self._speed, self._dt = limits, speed, dt
-        count = len(limits.names)
-        # Of the newest command, and of the newest one at an earlier time.
-        self._stamp, self._earlier = np.full(count, -np.inf), np.full(count, -np.inf)
-        self._velocity = np.zeros(count)  # [rad/s]
-        self._velocity_stamp = np.full(count, -np.inf)
+        self._bounds, self._dt = np.array([limits.lower, limits.upper, speed]), dt
+        self._speed = self._bounds[2]
+        # All are views of one array, which a compiled function takes sooner.
+        self._numbers = np.full((4, len(limits.names)), -np.inf)
+        # Of the newest command, and of the newest one at an earlier time; [rad/s].
+        self._stamp, self._earlier, self._velocity, self._velocity_stamp = self._numbers
+        self._velocity[:] = 0.0
 
     def reset(self) -> None:
         """Forget all set-points: after a reset of the clock they would seem recent."""
@@ -48,18 +76,4 @@ class RawStream:
     def take(self, points: SetPoints, mode: np.ndarray, command: JointCommand, time_s: float) -> None:
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
         stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
-        index = command.index
-        # Commands that come between the same two ticks count as one, or the last would have only a tick for its way.
-        stamp = self._stamp[index]
-        earlier = np.where(stamp == time_s, self._earlier[index], stamp)
-        gap = np.maximum(time_s - earlier, self._dt)
-        goes_on = (mode[index] == RAW_POSITION) & (gap <= STREAM_GAP_S)
-        points.target[index] = np.where(goes_on, points.target[index], command.values)
-        limit = self._speed[index]
-        # With a feed-forward velocity, the goal is the predicted next command.
-        is_fresh = goes_on & (time_s - self._velocity_stamp[index] <= FEED_FORWARD_S)
-        ahead = np.where(is_fresh, self._velocity[index] * np.minimum(gap, STREAM_GAP_S), 0.0)
-        goal = np.clip(command.values + ahead, self._limits.lower[index], self._limits.upper[index])
-        points.pace[index] = np.clip((goal - points.target[index]) / gap, -limit, limit)
-        points.goal[index] = goal
-        self._stamp[index], self._earlier[index] = time_s, earlier
+        _take(self._numbers, points.numbers, self._bounds, mode, command.index, command.values, time_s, self._dt)
