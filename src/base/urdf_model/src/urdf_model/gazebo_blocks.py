@@ -13,19 +13,40 @@ import numpy as np
 
 from . import bounds
 from .element_table import content
+from .gazebo_names import gazebo_links, in_gazebos_order
 from .materials import GLOWS, MATERIALS
-from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Surface, is_true
+from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Robot, Surface, is_true
 
 # Element -> field of Surface. Both spellings of the first one are in use.
 _SURFACE = {"mu": "friction", "mu1": "friction", "mu2": "friction_across", "kp": "stiffness", "kd": "damping",
             "maxVel": "leaving_speed", "max_vel": "leaving_speed"}
 
 
-def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) -> None:
-    """Apply a block that refers to ``link``: its surface, weight and colour.
+def apply_blocks(robot: Robot, warn: Callable[[Any, str], None]) -> None:
+    """Apply the <gazebo> elements of a robot to its links and joints, in Gazebo's order where it lumps links together.
 
     ``warn(element, text)`` is called for numbers that cannot be used; they are left out.
     """
+    of_links: dict[str, list[Any]] = {}
+    for element in robot.gazebo:
+        reference = element.get("reference")
+        if not reference:  # links may say otherwise
+            for part in element.iterchildren("self_collide"):
+                for link in robot.links.values():
+                    link.self_collide = is_true(part.text)
+        elif reference in robot.links:
+            of_links.setdefault(reference, []).append(element)
+        elif reference in robot.joints:
+            _read_joint_block(element, robot.joints[reference], warn)
+    wholes = gazebo_links(robot)
+    for name in in_gazebos_order(robot):
+        for element in of_links.get(name, ()):
+            _read_link_block(element, robot.links[name], robot.links[wholes.get(name, name)], warn)
+
+
+def _read_link_block(element: Any, link: Link, whole: Link, warn: Callable[[Any, str], None]) -> None:
+    """Apply a block that refers to ``link``: its surface and colour, and what Gazebo has for a whole link (weight,
+    self-collision, decay of the speed) to ``whole``, the link that it lumps ``link`` into."""
     found = {}
     for tag, field in _SURFACE.items():
         # Also as SDF has them, in <collision>.
@@ -46,11 +67,11 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
     for part in element.iterchildren("dampingFactor"):
         value = _number(part, "link '%s'" % link.name, False, warn)
         if value is not None:
-            link.decay = (_within(part, "link '%s'" % link.name, value, 1.0, warn),) * 2
+            whole.decay = (_within(part, "link '%s'" % link.name, value, 1.0, warn),) * 2
     for part in element.iterchildren("selfCollide", "self_collide"):
-        link.self_collide = is_true(content(part))
+        whole.self_collide = is_true(content(part))
     for part in element.iterchildren("turnGravityOff", "gravity"):
-        link.gravity = _has_weight(part)
+        whole.gravity = _has_weight(part)
     name = next((content(part) for part in element.iterchildren("material")), "")
     finish = Finish(emission=GLOWS[name]) if name in GLOWS else None
     for shape in link.visuals:
@@ -58,8 +79,7 @@ def read_link_block(element: Any, link: Link, warn: Callable[[Any, str], None]) 
         shape.finish = shape.finish or finish
 
 
-def read_joint_block(element: Any, joint: Joint, warn: Callable[[Any, str], None]) -> None:
-    """Apply a block that refers to ``joint``; ``warn``: as for :func:`read_link_block`."""
+def _read_joint_block(element: Any, joint: Joint, warn: Callable[[Any, str], None]) -> None:
     what = "joint '%s'" % joint.name
     for part in element.iterchildren("implicitSpringDamper", "cfmDamping"):
         joint.implicit_damping = is_true(content(part))

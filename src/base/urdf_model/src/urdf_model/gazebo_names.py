@@ -7,6 +7,7 @@ the world; the links of an SDF all stay. Names as sdformat's reader of URDF give
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from .model import Robot
@@ -45,7 +46,9 @@ def collision_names(robot: Robot) -> dict[tuple[str, int], CollisionName]:
         return {(link, number): CollisionName(link, shape.name or "collision")
                 for link in links for number, shape in enumerate(robot.links[link].collisions)}
     found, counts = {}, {}
-    for link in _in_order(robot, links):
+    for link in in_gazebos_order(robot):
+        if link not in links:
+            continue
         whole = links[link]
         for number, shape in enumerate(robot.links[link].collisions):
             count = counts[whole] = counts.get(whole, -1) + 1
@@ -56,14 +59,13 @@ def collision_names(robot: Robot) -> dict[tuple[str, int], CollisionName]:
     return found
 
 
-def _in_order(robot, links):
-    """The links in the order in which urdfdom has them: children by the names of their joints."""
+def in_gazebos_order(robot: Robot) -> Iterator[str]:
+    """The links in the order in which urdfdom has them: parents first, children by the names of their joints."""
     children = {name: [] for name in robot.links}
     for joint in sorted(robot.joints.values(), key=lambda joint: joint.name, reverse=True):
         children[joint.parent].append(joint.child)
     stack = [robot.root]
     while stack:
         link = stack.pop()
-        if link in links:
-            yield link
+        yield link
         stack += children[link]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .gazebo_names import gazebo_links
 from .model import Gear, Inertial, Joint, Loop, Robot, Shape, Surface
 
 
@@ -29,6 +30,7 @@ class MergedLink:
 
     Its frame is that of its joint; the bodies of roots have the model's frame. In a URDF that is the frame of the link
     that it is named after, but for loose ones. If its members have different surfaces, the first one counts.
+    ``weightless``: mass and centre of the members without weight, where others have it.
     """
 
     name: str
@@ -40,6 +42,7 @@ class MergedLink:
     gravity: bool = True
     self_collide: bool = False
     decay: tuple[float, float] = (0.0, 0.0)
+    weightless: Inertial | None = None
 
 
 @dataclass
@@ -98,7 +101,8 @@ def merge_fixed(robot: Robot, held: bool = False) -> MergedRobot:
             else:
                 stack.append((joint.child, body, origin @ joint.child_offset))
 
-    links = {body: _merge_group(robot, body, members, frames) for body, members in groups.items()}
+    wholes = gazebo_links(robot)
+    links = {body: _merge_group(robot, body, members, frames, wholes) for body, members in groups.items()}
     ordered = {joints[body].name: joints[body] for body in links if body in joints}
     loops = [replace(loop, parent=frames[loop.parent].link, child=frames[loop.child].link,
                      in_parent=frames[loop.parent].offset @ loop.in_parent,
@@ -109,9 +113,9 @@ def merge_fixed(robot: Robot, held: bool = False) -> MergedRobot:
                        tuple(body for body in links if body in loose))
 
 
-def _merge_group(robot, body, members, frames):
+def _merge_group(robot, body, members, frames, wholes):
     merged = MergedLink(body, None, members=list(members))
-    parts = []
+    parts = {}  # member -> (mass, centre, inertia)
     for name in members:
         link, offset = robot.links[name], frames[name].offset
         for source, target in ((link.visuals, merged.visuals), (link.collisions, merged.collisions)):
@@ -121,17 +125,25 @@ def _merge_group(robot, body, members, frames):
         if link.inertial is not None:
             rotation = offset[:3, :3]
             centre = rotation @ link.inertial.centre + offset[:3, 3]
-            parts.append((link.inertial.mass, centre, rotation @ link.inertial.inertia @ rotation.T))
-    merged.inertial = combine(parts)
+            parts[name] = link.inertial.mass, centre, rotation @ link.inertial.inertia @ rotation.T
+    merged.inertial = combine([*parts.values()])
     said = next((name for name in members if robot.links[name].surface is not None), None)
     if said is not None:
         merged.surface = surface = robot.links[said].surface
         if surface.direction is not None:
             turned = frames[said].offset[:3, :3] @ surface.direction
             merged.surface = replace(surface, direction=tuple(turned.tolist()))
-    merged.gravity = robot.links[body].gravity
-    merged.decay = robot.links[body].decay
-    merged.self_collide = any(robot.links[name].self_collide for name in members)
+    # What holds for a whole link of Gazebo's, of which a body can have several.
+    whole = {name: robot.links[wholes.get(name, name)] for name in members}
+    floats = [name for name in members if not whole[name].gravity]
+    merged.gravity = len(floats) < len(members)
+    if merged.gravity and any(parts[name][0] > 0.0 for name in floats if name in parts):
+        merged.weightless = combine([parts[name] for name in floats if name in parts])
+    if any(any(link.decay) for link in whole.values()):
+        shares = [parts[name][0] if name in parts else 0.0 for name in members]
+        merged.decay = tuple(np.average([whole[name].decay for name in members], axis=0,
+                                        weights=shares if sum(shares) > 0.0 else None).tolist())
+    merged.self_collide = any(link.self_collide for link in whole.values())
     return merged
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import bounds
 from .errors import UrdfError
-from .gazebo_blocks import read_joint_block, read_link_block
+from .gazebo_blocks import apply_blocks
 from .model import (
     MOVABLE_TYPES,
     Box,
@@ -105,17 +105,9 @@ class _Reader:
                              % (joint.name, joint.mimic.joint, ", ".join(joints)))
                 joint.mimic = None
         transmissions = [self.transmission(e) for e in self.root.iterchildren("transmission")]
-        # What is said for the whole model, links may say otherwise.
-        for part in self.root.iterfind("gazebo/self_collide"):
-            if not part.getparent().get("reference"):
-                for link in links.values():
-                    link.self_collide = is_true(part.text)
-        for element in self.root.iterchildren("gazebo"):
-            if element.get("reference") in links:
-                read_link_block(element, links[element.get("reference")], self.warn)
-            elif element.get("reference") in joints:
-                read_joint_block(element, joints[element.get("reference")], self.warn)
-        return Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
+        robot = Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
+        apply_blocks(robot, self.warn)
+        return robot
 
     def add_unique(self, table: dict[str, Named], item: Named, element: etree._Element, kind: str) -> None:
         if item.name in table:

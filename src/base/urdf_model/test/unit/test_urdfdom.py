@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from urdf_model import UrdfError, parse_urdf
+from urdf_model import UrdfError, merge_fixed, parse_urdf
 
 MASS = '<mass value="1"/>'
 INERTIAL = '<inertial>%s<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>' % MASS
@@ -212,6 +212,31 @@ def test_blocks_add_up():
     assert surface_of("<mu1>-1</mu1>").surface.friction == math.inf
     assert surface_of("<collision><surface><friction><ode><mu>0.3</mu></ode></friction></surface></collision>"
                       ).surface.friction == 0.3
+
+
+# Blocks of the links base, b and c, which Gazebo lumps together: what its one link has.
+@pytest.mark.parametrize("blocks, field, expected", [
+    ({"c": "<turnGravityOff>true</turnGravityOff>"}, "gravity", False),
+    ({"c": "<gravity>false</gravity>", "b": "<gravity>true</gravity>"}, "gravity", False),
+    ({"base": "<turnGravityOff>1</turnGravityOff>", "b": "<turnGravityOff>0</turnGravityOff>"}, "gravity", True),
+    ({"c": "<dampingFactor>0.3</dampingFactor>"}, "decay", (0.3, 0.3)),
+    ({"b": "<selfCollide>true</selfCollide>", "c": "<selfCollide>false</selfCollide>"}, "self_collide", False),
+    ({"c": "<selfCollide>true</selfCollide>"}, "self_collide", True)])
+def test_blocks_of_lumped_links_are_those_of_the_whole_link(blocks, field, expected):
+    def merged(more=""):
+        links = "".join('<link name="%s">%s</link>' % (name, INERTIAL) for name in ("c", "b", "base"))
+        joints = "".join('<joint name="to_%s" type="fixed"><parent link="%s"/><child link="%s"/></joint>'
+                         % (child, parent, child) for parent, child in (("base", "b"), ("b", "c")))
+        said = "".join('<gazebo reference="%s">%s</gazebo>' % item for item in blocks.items())
+        return merge_fixed(parse_urdf('<robot name="r">%s%s%s%s</robot>' % (links, joints, said, more))).links["base"]
+
+    assert getattr(merged(), field) == expected
+    # Links that stay have their own.
+    kept = merged('<gazebo reference="to_b"><preserveFixedJoint>1</preserveFixedJoint></gazebo>')
+    if field == "gravity" and not expected:
+        assert kept.gravity and kept.weightless.mass == 2.0
+    elif field == "decay":
+        assert kept.decay == pytest.approx((0.2, 0.2))
 
 
 @pytest.mark.parametrize("inside, weight", [

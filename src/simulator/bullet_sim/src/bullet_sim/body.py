@@ -76,10 +76,13 @@ class Body:
                          if any(link.decay) and not (self.static and link.name == merged.root)}
         #: The bodies whose friction depends on the direction.
         self.directed = directed_bodies(merged)
-        self._weightless = {}  # body's name -> its mass
+        self._weightless = {}  # body's name -> (mass, its centre (3,) in the body; None: of the whole body)
         for link in merged.links.values():
             if not link.gravity:
                 self.set_weight(link.name, False)
+            elif link.weightless is not None and not (self.static and link.name == merged.root):
+                self._weightless[link.name] = link.weightless.mass, link.weightless.centre
+                world.note_weightless(self, True)
 
     @property
     def body(self) -> int:
@@ -346,8 +349,8 @@ class Body:
             # After the mass, which makes PyBullet guess an inertia of its own.
             pybullet.changeDynamics(*place, localInertiaDiagonal=moments.tolist(), **arguments)
             link.inertial = Inertial(mass, link.inertial.centre, inertia)
-        if body in self._weightless:
-            self._weightless[body] = mass
+        if not self.has_weight(body):
+            self._weightless[body] = mass, None
         self.wake()
 
     def _rebuild_with(self, link: MergedLink, inertial: Inertial) -> None:
@@ -378,22 +381,24 @@ class Body:
     def has_weight(self, body: str) -> bool:
         """Whether gravity acts on the body ``body``."""
         self._body(body)
-        return body not in self._weightless
+        return body not in self._weightless or self._weightless[body][1] is not None
 
     def set_weight(self, body: str, wanted: bool) -> None:
         """Switch gravity on the body ``body`` on or off."""
         mass = self._body(body).inertial.mass
         self._weightless.pop(body, None)
         if not wanted and not (self.static and body == self.merged.root):
-            self._weightless[body] = mass
+            self._weightless[body] = mass, None
         self._world.note_weightless(self, bool(self._weightless))
         self.wake()
 
     def cancel_weight(self) -> None:
-        """For World: cancel gravity on the weightless bodies in the next step."""
+        """For World: cancel gravity on what is weightless in the next step."""
         gravity = np.array(self._world.gravity)
-        for body, mass in self._weightless.items():
-            self._push(self._link_index[body], -mass * gravity)
+        for body, (mass, centre) in self._weightless.items():
+            index = self._link_index[body]
+            place = None if centre is None else (self._body_matrix(index) @ [*centre, 1.0])[:3]
+            self._push(index, -mass * gravity, position=place)
 
     def slow_down(self) -> None:
         """For World: take away what the velocities of links lose in the next step (SDF's <velocity_decay>, as ODE)."""

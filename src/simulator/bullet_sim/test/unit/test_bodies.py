@@ -133,6 +133,21 @@ def test_a_soft_contact_gives_way(world):
     assert 0.05 - 0.011 < box.base_pose().position[2] < 0.0485
 
 
+def test_a_part_of_a_body_without_weight_is_not_pulled(world):
+    """Two links of 1 kg, 1 m apart; only one has weight: g/2, and g/2 m of moment on 0.5 m + 2 * 0.01 kg m^2."""
+    link = '<link name="%s"><inertial><mass value="1"/><inertia ixx=".01" iyy=".01" izz=".01"/></inertial></link>'
+    body = world.spawn(parse_urdf(
+        '<robot name="r">%s%s<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="1 0 0"/>'
+        '</joint><gazebo reference="j"><preserveFixedJoint>true</preserveFixedJoint></gazebo><gazebo reference="b">'
+        '<gravity>0</gravity></gazebo></robot>' % (link % "a", link % "b")), "r", Pose((0.0, 0.0, 5.0)))
+    assert body.has_weight("a")
+    step(world, 50)
+    time_s = 50 * world.time_step_s
+    linear, angular = (0.5 * (one + other) for one, other in zip(body.link_twist("a"), body.link_twist("b"), strict=True))
+    assert linear[2] == pytest.approx(world.gravity[2] / 2.0 * time_s, rel=0.01)
+    assert angular[1] == pytest.approx(world.gravity[2] * 0.5 / 0.52 * time_s, rel=0.02)
+
+
 def test_a_link_without_weight_floats_and_gets_it_back(world):
     xml = BOX % '<gazebo reference="box"><turnGravityOff>true</turnGravityOff></gazebo>'
     box = world.spawn(parse_urdf(xml), "box", Pose((0, 0, 1)))
