@@ -2,7 +2,7 @@
 """The files of a LeRobot data set, format v3.0: their names, and the one that describes it, meta/info.json.
 
 Beside the format's files there are two: meta/baxter.json, with units and with what `Schema.about` says, and
-meta/baxter_episodes.jsonl, with seed and success of each episode.
+meta/baxter_episodes.jsonl, with seed, success and frames of each episode.
 """
 from __future__ import annotations
 
@@ -116,6 +116,18 @@ def schema_of(folder: Path) -> tuple[Schema, dict[str, Any]]:
         raise DemonstrationError("%s is not as in format %s: %s %s" % (
             folder / INFO, VERSION, type(error).__name__, error)) from error
     return schema, info
+
+
+def outcomes_of(folder: Path) -> dict[int, dict[str, Any]]:
+    """{episode: its line} of what was told of each; lines that are cut off have none."""
+    path, found = folder / OUTCOMES, {}
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else ():
+        try:
+            outcome = json.loads(line)
+            found[outcome["episode"]] = outcome
+        except (ValueError, KeyError, TypeError):
+            continue
+    return found
 
 
 def _texts(names):

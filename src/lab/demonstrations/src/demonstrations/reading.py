@@ -2,7 +2,6 @@
 """Reads LeRobot data sets, format v3.0, and finds what is broken in them. By pyarrow and PyAV."""
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +13,7 @@ from . import layout
 from .films import frame_count, frames_of
 from .frames import DemonstrationError, Episode
 from .needed import need
+from .statistics import NAMES, Statistics
 
 
 def _read_table(path: Path, columns: list[str] | None = None) -> Any:
@@ -47,7 +47,7 @@ class DataSet:
         self.schema, self._info = layout.schema_of(self.folder)
         self.tasks = read_tasks(self.folder)
         self._rows = self._episode_rows()
-        self._outcomes = _outcomes(self.folder)
+        self._outcomes = layout.outcomes_of(self.folder)
         self._data: tuple[tuple[int, int], Any] | None = None
 
     def __len__(self) -> int:
@@ -79,6 +79,10 @@ class DataSet:
         if number not in self._rows:
             raise DemonstrationError("%s: no readable file in meta/episodes has episode %d" % (self.folder, number))
         return self._rows[number]
+
+    def length(self, number: int) -> int:
+        """Frames of an episode."""
+        return int(self._row(number)["length"])
 
     def episode(self, number: int) -> Episode:
         """The numbers of an episode."""
@@ -117,6 +121,20 @@ class DataSet:
         except KeyError as error:
             raise DemonstrationError("%s has no film of %s: no column %s" % (self.folder, camera, error)) from None
 
+    def films(self, number: int) -> tuple[dict[str, Path], dict[str, Statistics]]:
+        """{camera: file} of an episode, and {camera: statistics}. Raises DemonstrationError where the files have other
+        episodes, too."""
+        places = {(row["data/chunk_index"], row["data/file_index"]) for row in self._rows.values()}
+        if len(places) < len(self._rows):
+            raise DemonstrationError("%s has several episodes in a file; lerobot-edit-dataset changes such sets"
+                                     % self.folder)
+        row = self._row(number)
+        path = self.folder / (layout.EPISODES % (row["meta/episodes/chunk_index"], row["meta/episodes/file_index"]))
+        table = _read_table(path)
+        said = {camera: {name: np.asarray(table["stats/%s/%s" % (camera, name)][0].as_py()) for name in NAMES}
+                for camera in self.schema.cameras}
+        return {camera: self._film(number, camera) for camera in self.schema.cameras}, said
+
     def check(self, number: int) -> None:
         """Read an episode, and look whether its films have enough frames. Raises DemonstrationError."""
         self.episode(number)
@@ -132,18 +150,6 @@ def _column(values, feature):
     array = values.combine_chunks()
     flat = array.flatten() if feature.shape[0] > 1 else array
     return flat.to_numpy(zero_copy_only=False).reshape(-1, *feature.shape).astype(feature.dtype, copy=False)
-
-
-def _outcomes(folder):
-    """{episode: its line}; lines that are cut off have none."""
-    path, found = folder / layout.OUTCOMES, {}
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else ():
-        try:
-            outcome = json.loads(line)
-            found[outcome["episode"]] = outcome
-        except (ValueError, KeyError, TypeError):
-            continue
-    return found
 
 
 @dataclass

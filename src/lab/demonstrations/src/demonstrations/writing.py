@@ -12,7 +12,7 @@ import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,8 +51,8 @@ class SetWriter:
         self._drafts = folder / layout.DRAFTS
         shutil.rmtree(self._drafts, ignore_errors=True)
         self._rows: dict[str, list[np.ndarray]] = {}
-        self._films: dict[str, Film] = {}
-        self._pictures: dict[str, PictureStatistics] = {}
+        self._films: dict[str, Any] = {}  # each a Film, or as one
+        self._pictures: dict[str, Any] = {}
         self._begin()
 
     def _unlock(self):
@@ -126,6 +126,22 @@ class SetWriter:
             self.frame({key: values[row] for key, values in episode.columns.items()})
         return self.keep(episode.task, episode.success, episode.seed)
 
+    def adopt(self, episode: Episode, films: Mapping[str, Path], statistics: Mapping[str, Statistics]) -> int:
+        """Write an episode whose films, {camera: file}, are there with these statistics; a film gets a second name, or
+        is copied to another disk. Returns the episode's number. Raises DemonstrationError, OSError."""
+        self._rows = {key: list(values) for key, values in episode.columns.items()}
+        self._drafts.mkdir(parents=True, exist_ok=True)
+        for camera, path in films.items():
+            draft = self._drafts / ("%s.mp4" % camera)
+            draft.unlink(missing_ok=True)
+            try:
+                os.link(path, draft)
+            except OSError:
+                shutil.copyfile(path, draft)
+            self._films[camera] = _Whole(draft)
+            self._pictures[camera] = _Known(statistics[camera])
+        return self.keep(episode.task, episode.success, episode.seed)
+
     def close(self) -> None:
         """Forget an episode that was not kept."""
         self.drop()
@@ -157,7 +173,7 @@ class SetWriter:
             layout.write_whole(self.folder / layout.TASKS, lambda draft: _write_tasks(draft, tasks))
         if not (self.folder / layout.ABOUT).exists():
             layout.write_json(self.folder / layout.ABOUT, layout.about_of(self.schema))
-        self._tell_outcome({"episode": number, "seed": seed, "success": bool(success)})
+        self._tell_outcome({"episode": number, "seed": seed, "success": bool(success), "frames": length})
         total = {key: joined([self._statistics[key], part]) if key in self._statistics else part
                  for key, part in statistics.items()}
         layout.write_json(self.folder / layout.STATISTICS, as_lists(total))
@@ -196,6 +212,29 @@ class SetWriter:
         for key, part in as_lists(statistics).items():
             row |= {"stats/%s/%s" % (key, name): value for name, value in part.items()}
         return row | {"meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
+
+
+class _Whole(NamedTuple):
+    """A film that was written before; as `Film`."""
+
+    path: Path
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def drop(self) -> None:
+        """Give the file up."""
+        self.path.unlink(missing_ok=True)
+
+
+class _Known(NamedTuple):
+    """Statistics of pictures that were counted before; as `PictureStatistics`."""
+
+    known: Statistics
+
+    def result(self) -> Statistics:
+        """Of all pictures."""
+        return self.known
 
 
 def _locked(folder: Path) -> int:
