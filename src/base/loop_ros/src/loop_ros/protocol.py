@@ -36,6 +36,9 @@ class Publisher(Protocol):
 class Subscription(Protocol):
     """One topic that is subscribed to. It keeps up to ``depth`` unread messages for the loop."""
 
+    #: How many publishers are connected: a function without arguments.
+    senders: Callable[[], int]
+
     def take(self) -> Any:
         """The newest unread message, or None; older ones are dropped."""
         ...

@@ -21,8 +21,6 @@ class Subscription:
 
     #: Called once, when the subscription is closed.
     on_close: Callable[[], object] | None = None
-    #: How many publishers are connected: a function without arguments. 1 where nobody counts them.
-    senders: Callable[[], int] = staticmethod(lambda: 1)
 
     def __init__(self, depth: int = 1, notice: Callable[[], object] = lambda: None,
                  on_fault: Callable[[Exception | SystemExit], object] = _raise) -> None:
@@ -30,6 +28,8 @@ class Subscription:
         each that :meth:`guarded` drops. Raises ValueError for a depth below 1."""
         if depth < 1:
             raise ValueError("the depth of a subscription is %r, expected at least 1" % (depth,))
+        #: How many publishers are connected; 1 where nobody counts them.
+        self.senders: Callable[[], int] = lambda: 1
         #: Messages since the start; read by the lock-step service.
         self.delivered = 0
         self._notice = notice

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import rosgraph
 import rospy
 import rosservice
 
-from controller_manager_msgs.msg import ControllerState
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 from controller_manager_msgs.srv import ListControllers
 
 _TYPES = {
@@ -35,7 +36,7 @@ def get_controller_managers(namespace: str = "/", initial_guess: Iterable[str] |
     """Sorted list of the controller managers below ``namespace``. Entries of ``initial_guess``, an earlier result, that
     are still advertised are not checked again."""
     below = rosgraph.names.canonicalize_name(namespace).rstrip("/") + "/"
-    services = {name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]}
+    services = {name for name, _ in _system_state(rosgraph.Master(rospy.get_name()))[2]}
     marker = "/list_controllers"
     candidates = sorted(name[:-len(marker)] for name in services if name.endswith(marker) and name.startswith(below))
     candidates = [found for found in candidates if all("%s/%s" % (found, name) in services for name in _TYPES)]
@@ -87,7 +88,7 @@ def filter_by_hardware_interface(ctrl_list: Iterable[ControllerState], hardware_
     """The controllers that use that hardware interface, e.g. "hardware_interface::PositionJointInterface"."""
     return [controller for controller in ctrl_list
             if any(_matches(claim.hardware_interface, hardware_interface, match_substring)
-                   for claim in controller.claimed_resources)]
+                   for claim in _claims(controller))]
 
 
 def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterable[str],
@@ -97,7 +98,7 @@ def filter_by_resources(ctrl_list: Iterable[ControllerState], resources: Iterabl
     wanted = set(resources)
     found = []
     for controller in ctrl_list:
-        claimed = {name for claim in controller.claimed_resources
+        claimed = {name for claim in _claims(controller)
                    if hardware_interface in (None, claim.hardware_interface) for name in claim.resources}
         if (wanted & claimed) if match_any else (wanted <= claimed):
             found.append(controller)
@@ -114,6 +115,16 @@ def get_rosparam_controller_names(namespace: str = "/") -> list[str]:
     if not isinstance(tree, dict):
         return []
     return [name for name, value in tree.items() if isinstance(value, dict) and isinstance(value.get("type"), str)]
+
+
+def _system_state(master: Any) -> list[list[tuple[str, list[str]]]]:
+    """Publishers, subscribers and providers of services: (name, nodes) each. rosgraph has no types."""
+    return master.getSystemState()
+
+
+def _claims(controller: Any) -> list[HardwareInterfaceResources]:
+    """Generated messages have no types: to the checker, a list in one may be None."""
+    return controller.claimed_resources
 
 
 def _filtered(controllers, field, wanted, match_substring):

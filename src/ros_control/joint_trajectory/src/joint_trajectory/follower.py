@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +19,10 @@ from .trajectory import Trajectory, hold, stop
 
 _TURN = 2.0 * math.pi
 
+Goal = TypeVar("Goal")
 
-class Follower:
+
+class Follower(Generic[Goal]):
     """Desired state of n joints. Times [s] are of any one clock that never goes back; one thread only.
 
     Attributes
@@ -29,8 +32,8 @@ class Follower:
         Desired position, velocity, acceleration of the last :meth:`update`.
     error : (3, n) array
         Desired minus actual of the last :meth:`update`; positions the shorter way round, accelerations 0.
-    goal : object or None
-        The goal object of the active command.
+    goal : Goal or None
+        The active command's goal: any object of the caller.
     """
 
     def __init__(self, joint_names: Iterable[str], continuous: npt.ArrayLike | None = None,
@@ -52,7 +55,7 @@ class Follower:
         self.trajectory: Trajectory
         self.desired = np.zeros((3, count))
         self.error = np.zeros((3, count))
-        self.goal: object | None = None
+        self.goal: Goal | None = None
         self._monitor: GoalMonitor | None = None
         self._ahead = np.zeros((3, count))
         self._ahead_of: tuple[Trajectory, float] | None = None
@@ -68,7 +71,7 @@ class Follower:
         self.error[:] = 0.0
         self.trajectory = stop(time_s, np.array(position), np.array(velocity), self._stop_duration_s)
 
-    def accept(self, command: Command, now: float, position: npt.ArrayLike, goal: object | None = None,
+    def accept(self, command: Command, now: float, position: npt.ArrayLike, goal: Goal | None = None,
                tolerances: Tolerances | None = None) -> Replacement | None:
         """Follow ``command`` from now on; returns the :class:`Replacement`, or None for a command without points.
 
@@ -90,7 +93,7 @@ class Follower:
         self._watch(goal, tolerances, replacement.begins)
         return replacement
 
-    def stop(self, now: float, position: npt.ArrayLike, goal: object | None = None) -> None:
+    def stop(self, now: float, position: npt.ArrayLike, goal: Goal | None = None) -> None:
         """Come to rest: at once at the measured ``position`` (n,), or from the desired state within the stop duration.
 
         A ``goal`` is reached at the end of the stop, even if the joints still move.
@@ -137,7 +140,7 @@ class Follower:
             self._monitor = None
         return verdict
 
-    def _watch(self, goal: object | None, tolerances: Tolerances | None, begins: Floats) -> None:
+    def _watch(self, goal: Goal | None, tolerances: Tolerances | None, begins: Floats) -> None:
         self.goal = goal
         self._monitor = None
         if goal is not None:

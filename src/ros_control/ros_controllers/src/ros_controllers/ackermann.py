@@ -32,8 +32,8 @@ class AckermannSteeringController(VehicleController):
         self._turned = 0.0
 
     def _apart(self, front, rear):
-        places = self._place(front), self._place(rear)
-        return None if any(place is None for place in places) else abs(float(places[0][0] - places[1][0]))
+        one, other = self._place(front), self._place(rear)
+        return None if one is None or other is None else abs(float(one[0] - other[0]))
 
     def _note_wheels(self):
         self._turned = float(self.hardware.position[self._wheel])

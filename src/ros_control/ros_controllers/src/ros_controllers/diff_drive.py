@@ -61,10 +61,8 @@ class DiffDriveController(VehicleController):
         self._send_transform(values["enable_odom_tf"])
 
     def _apart(self, left, right):
-        places = self._place(left), self._place(right)
-        if any(place is None for place in places):
-            return None
-        return float(np.linalg.norm(places[0][:2] - places[1][:2]))
+        one, other = self._place(left), self._place(right)
+        return None if one is None or other is None else float(np.linalg.norm(one[:2] - other[:2]))
 
     def _angles(self):
         """Mean angle of the left wheels and of the right ones [rad]."""

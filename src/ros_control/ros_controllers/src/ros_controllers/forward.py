@@ -21,7 +21,8 @@ class ForwardController(Controller):
     wrong length, are reported and left out.
     """
 
-    interface = None
+    interface: str
+    msg_class: type
 
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
@@ -29,6 +30,10 @@ class ForwardController(Controller):
         self.index = self.claim(self.interface, self.joints)
         self._command = np.zeros(len(self.joints))
         self._subscription = context.subscription("command", self.msg_class)
+
+    def _read_joints(self) -> list[str]:
+        """The names of the joints, from the parameters."""
+        raise NotImplementedError
 
     def starting(self, time_s: float) -> None:
         self._subscription.take()  # drop commands from before the start
@@ -58,7 +63,7 @@ class SingleForwardController(ForwardController):
 
     msg_class = Float64
 
-    def _read_joints(self):
+    def _read_joints(self) -> list[str]:
         return [self.context.text("joint", "the name of a joint")]
 
 
@@ -67,7 +72,7 @@ class GroupForwardController(ForwardController):
 
     msg_class = Float64MultiArray
 
-    def _read_joints(self):
+    def _read_joints(self) -> list[str]:
         return self.context.texts("joints", "a list of joint names")
 
 

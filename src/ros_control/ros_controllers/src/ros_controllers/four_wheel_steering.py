@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 from four_wheel_steering_msgs.msg import FourWheelSteering
 
 from controller_manager import POSITION, VELOCITY, ControllerError
@@ -84,8 +85,8 @@ class FourWheelSteeringController(VehicleController):
         return joints
 
     def _apart(self, one, other, axis):
-        places = self._place(one), self._place(other)
-        return None if any(place is None for place in places) else abs(float(places[0][axis] - places[1][axis]))
+        place, beside = self._place(one), self._place(other)
+        return None if place is None or beside is None else abs(float(place[axis] - beside[axis]))
 
     def _note_wheels(self):
         self._turned = self.hardware.position[self._wheels].copy()
@@ -94,7 +95,7 @@ class FourWheelSteeringController(VehicleController):
         before, self._turned = self._turned, self.hardware.position[self._wheels].copy()
         rolled = self._radius * (self._turned - before)
         angles = self.hardware.position[self._steering]
-        along = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        along: npt.NDArray[np.float64] = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         places = self._pivots + self._beside[:, None] * np.stack([-along[:, 1], along[:, 0]], axis=1)
         # Each wheel gives two equations: its rolled distance, and no sideways slip. The motion (x, y, turn) is the
         # least-squares fit of the eight equations.
@@ -111,7 +112,8 @@ class FourWheelSteeringController(VehicleController):
     def _drive(self, linear, angular):
         speeds, angles = np.zeros(4), np.zeros(4)
         if self._axles is not None:
-            motion = _along(*self._axles, self._base)
+            front, rear = self._axles
+            motion = _along(front, rear, self._base)
             angles, rates = self._wheels_for(motion)  # at rest the wheels steer already
             speeds = linear * rates
             self._moved = tuple(linear * part for part in motion)

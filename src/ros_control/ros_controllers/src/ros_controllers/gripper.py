@@ -10,7 +10,7 @@ from control_msgs.msg import GripperCommandAction, GripperCommandResult
 
 from controller_manager import EFFORT, POSITION, Controller, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
-from loop_ros.action_server import ActionServer
+from loop_ros.action_server import ActionServer, GoalHandle
 
 if TYPE_CHECKING:
     from controller_manager import ControllerContext
@@ -26,7 +26,7 @@ class GripperController(Controller):
     stall; the drive continues. Base of the classes below.
     """
 
-    interface = None
+    interface: str
 
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
@@ -37,7 +37,7 @@ class GripperController(Controller):
         self._still_velocity = abs(context.number("stall_velocity_threshold", 0.001))
         self._stall_s = abs(context.number("stall_timeout", 1.0))
         self._running = False
-        self._goal = None
+        self._goal: GoalHandle | None = None
         self._target, self._max_effort = 0.0, self._default_effort
         self._moved_s = 0.0
         self._time_s = 0.0
@@ -56,11 +56,15 @@ class GripperController(Controller):
         self._server.spin(time_s)
         self._drive(dt)
         if self._goal is not None:
-            self._watch(time_s)
+            self._watch(self._goal, time_s)
 
     def stopping(self, time_s: float) -> None:
         self._running = False
         self._end_goal("the controller was stopped")
+
+    def _drive(self, dt: float) -> None:
+        """Command the joint towards the target."""
+        raise NotImplementedError
 
     def _hold(self):
         self._target = float(self.hardware.position[self.index[0]])
@@ -89,19 +93,19 @@ class GripperController(Controller):
         if handle is not None:
             handle.cancel(text=why)
 
-    def _watch(self, time_s):
+    def _watch(self, goal: GoalHandle, time_s: float) -> None:
         """End the goal if the joint has arrived, or does not move any more."""
         position = self.hardware.position[self.index[0]]
         # Time may have gone back in a reset.
         self._moved_s = min(self._moved_s, time_s)
         if abs(self._target - position) < self._tolerance:
-            handle, self._goal = self._goal, None
-            handle.succeed(self._result(position, reached_goal=True))
+            self._goal = None
+            goal.succeed(self._result(position, reached_goal=True))
         elif abs(self.hardware.velocity[self.index[0]]) > self._still_velocity:
             self._moved_s = time_s
         elif time_s - self._moved_s > self._stall_s:
-            handle, self._goal = self._goal, None
-            handle.abort(self._result(position, stalled=True))
+            self._goal = None
+            goal.abort(self._result(position, stalled=True))
 
     def _result(self, position, **flags):
         return GripperCommandResult(position=position, effort=self.hardware.effort[self.index[0]], **flags)

@@ -26,6 +26,7 @@ from joint_trajectory import (
     Outcome,
     Tolerances,
     TrajectoryError,
+    Verdict,
     bounds,
     code_of_error,
     code_of_outcome,
@@ -34,7 +35,7 @@ from joint_trajectory import (
     merge_tolerances,
     tolerances_of,
 )
-from loop_ros.action_server import ActionServer
+from loop_ros.action_server import ActionServer, GoalHandle
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
 
@@ -64,13 +65,15 @@ class JointTrajectoryController(Controller):
     Inside, times are the seconds for which the controller has run; they never run backwards.
     """
 
+    interface: str
+
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
         self._joints = context.texts("joints", "a list of joint names")
         self._index = self.claim(self.interface, self._joints)
         self._allow_partial = context.flag("allow_partial_joints_goal", False)
-        self._follower = Follower(self._joints, self._continuous(), self._not_negative("stop_trajectory_duration", 0.0),
-                                  self._allow_partial)
+        self._follower: Follower[GoalHandle] = Follower(
+            self._joints, self._continuous(), self._not_negative("stop_trajectory_duration", 0.0), self._allow_partial)
         self._tolerances = self._default_tolerances()
         self._state_pace = Pace(self._not_negative("state_publish_rate", 50.0))
         self._feedback_pace = Pace(self._not_negative("action_monitor_rate", 20.0))
@@ -81,7 +84,7 @@ class JointTrajectoryController(Controller):
         self._began = 0.0  # uptime at which the last command was accepted
         self._position = np.zeros(len(self._joints))
         self._velocity = np.zeros(len(self._joints))
-        self._next = None
+        self._next = np.zeros((3, len(self._joints)))
         self._make_adapter()
         self._server = ActionServer(context, "follow_joint_trajectory", FollowJointTrajectoryAction, self._on_goal,
                                     self._on_cancel)
@@ -133,10 +136,10 @@ class JointTrajectoryController(Controller):
         self._time_s, self._dt = time_s, dt
         self._uptime += dt
         self._measure()
-        follower = self._follower
+        follower, goal = self._follower, self._follower.goal
         verdict = follower.update(self._uptime, self._position, self._velocity)
-        if verdict is not None:
-            self._conclude(verdict)
+        if verdict is not None and goal is not None:
+            self._conclude(goal, verdict)
         self._server.spin(time_s)
         self._commands.handle(self._on_command)
         # A command acts until the next tick, so it is the desired state at that tick.
@@ -222,8 +225,7 @@ class JointTrajectoryController(Controller):
                           % (self.context.namespace, replacement.dropped, counted(len(message.points), "point"),
                              replacement.late_s))
 
-    def _conclude(self, verdict):
-        handle = self._follower.goal
+    def _conclude(self, handle: GoalHandle, verdict: Verdict) -> None:
         self._follower.release()
         result = FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), verdict.text)
         if verdict.outcome is Outcome.SUCCEEDED:

@@ -14,6 +14,8 @@ from controller_manager.pid_tuning import TunablePids
 from sim_time.stamps import stamp
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+
     from controller_manager import ControllerContext
     from controller_manager.hardware import RobotHardware
 
@@ -30,6 +32,7 @@ class PidController(Controller):
     """
 
     interface = EFFORT
+    msg_class: type
 
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)
@@ -62,6 +65,18 @@ class PidController(Controller):
         else:
             self._command = self._limited(values)
 
+    def _read_joints(self) -> tuple[list[str], list[str]]:
+        """The names of the joints and of the parameters with their gains."""
+        raise NotImplementedError
+
+    def _start_command(self) -> npt.NDArray[np.float64]:
+        """The command (k,) at the start."""
+        raise NotImplementedError
+
+    def _error(self) -> npt.NDArray[np.float64]:
+        """(k,): command minus state."""
+        raise NotImplementedError
+
     def _read_limits(self):
         """Subclasses with limits read them here."""
 
@@ -72,7 +87,7 @@ class PidController(Controller):
         """Hook for a subclass's publications after an update."""
 
 
-class _Single:
+class _Single(PidController):
     """For the joint in parameter ``joint``, gains in ``pid``; std_msgs/Float64 on ``command``, state on ``state``."""
 
     msg_class = Float64
@@ -82,7 +97,7 @@ class _Single:
         self._updates = 0
         self._publisher = context.publisher("state", JointControllerState)
 
-    def _read_joints(self):
+    def _read_joints(self) -> tuple[list[str], list[str]]:
         return [self.context.text("joint", "the name of a joint")], ["pid"]
 
     def _after(self, time_s, dt, error, output):
@@ -94,11 +109,16 @@ class _Single:
             set_point=self._command[0], error=error[0], time_step=dt, command=output[0], p=gains.p[0], i=gains.i[0],
             d=gains.d[0], i_clamp=gains.i_max[0], antiwindup=bool(gains.antiwindup[0]))
         message.header.stamp = stamp(time_s)
-        self._fill(message, self.hardware.position[self.index[0]], self.hardware.velocity[self.index[0]])
+        self._fill(message, float(self.hardware.position[self.index[0]]), float(self.hardware.velocity[self.index[0]]))
         self._publisher.publish(message)
 
+    @staticmethod
+    def _fill(message: JointControllerState, position: float, velocity: float) -> None:
+        """Fill in the state that is controlled."""
+        raise NotImplementedError
 
-class _Position:
+
+class _Position(PidController):
     """Holds positions [rad or m], clamped to the URDF's range; continuous joints take the shorter way."""
 
     def _read_limits(self):
@@ -118,10 +138,10 @@ class _Position:
     def _limited(self, command):
         return np.clip(command, self._lower, self._upper)
 
-    def _start_command(self):
+    def _start_command(self) -> npt.NDArray[np.float64]:
         return self.hardware.position[self.index]
 
-    def _error(self):
+    def _error(self) -> npt.NDArray[np.float64]:
         # Command and position of a joint with a range lie within it, and so do all values between them.
         error = self._command - self.hardware.position[self.index]
         if self._around.any():
@@ -133,23 +153,23 @@ class _Position:
         message.process_value, message.process_value_dot = position, velocity
 
 
-class EffortJointPositionController(_Position, _Single, PidController):
+class EffortJointPositionController(_Position, _Single):
     """effort_controllers/JointPositionController"""
 
 
-class VelocityJointPositionController(_Position, _Single, PidController):
+class VelocityJointPositionController(_Position, _Single):
     """velocity_controllers/JointPositionController"""
 
     interface = VELOCITY
 
 
-class EffortJointVelocityController(_Single, PidController):
+class EffortJointVelocityController(_Single):
     """effort_controllers/JointVelocityController: holds a velocity [rad/s or m/s]."""
 
-    def _start_command(self):
+    def _start_command(self) -> npt.NDArray[np.float64]:
         return np.zeros(len(self.joints))
 
-    def _error(self):
+    def _error(self) -> npt.NDArray[np.float64]:
         return self._command - self.hardware.velocity[self.index]
 
     @staticmethod
@@ -157,12 +177,12 @@ class EffortJointVelocityController(_Single, PidController):
         message.process_value = velocity
 
 
-class EffortJointGroupPositionController(_Position, PidController):
+class EffortJointGroupPositionController(_Position):
     """effort_controllers/JointGroupPositionController: joints in ``joints``, gains of each in ``<joint>/pid``,
     std_msgs/Float64MultiArray on ``command``; no state topic."""
 
     msg_class = Float64MultiArray
 
-    def _read_joints(self):
+    def _read_joints(self) -> tuple[list[str], list[str]]:
         joints = self.context.texts("joints", "a list of joint names")
         return joints, ["%s/pid" % joint for joint in joints]

@@ -25,7 +25,8 @@ class _SensorController(Controller):
     Parameter: ``publish_rate`` [Hz], required.
     """
 
-    interface = message_class = None
+    interface: str
+    message_class: type
 
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext) -> None:
         super().__init__(name, hardware, context)

@@ -103,8 +103,9 @@ class VehicleController(Controller):
             self._wanted = (0.0, 0.0)
         speeds = []
         for limits, wanted, history in zip(self._limits, self._wanted, self._last, strict=True):
-            speed = limits.limit(wanted, *history, dt) if dt > 0.0 else history[0]
-            history[:] = speed, history[0]
+            last, before = history
+            speed = limits.limit(wanted, last, before, dt) if dt > 0.0 else last
+            history[:] = speed, last
             speeds.append(speed)
         self._drive(*speeds)
         if self._pace.take(time_s):
