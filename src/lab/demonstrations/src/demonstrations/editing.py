@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes of a set that was recorded here, and looks at it: what it has, strips of its films, without an episode, as one
-file."""
+"""A set that was recorded here: what it has, strips of its films, the set without an episode, and as one file."""
 from __future__ import annotations
 
 import shutil
