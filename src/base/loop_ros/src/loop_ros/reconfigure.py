@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import rospy
 from dynamic_reconfigure.msg import (
@@ -23,8 +23,6 @@ from dynamic_reconfigure.msg import (
     ParamDescription,
 )
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
-
-from loop_ros.protocol import Topics
 
 __all__ = ["Setting", "SettingsServer"]
 
@@ -59,14 +57,31 @@ class Setting:
         return value if self.kind is bool else min(max(value, self.low), self.high)
 
 
+class Sender(Protocol):
+    """A publisher of settings."""
+
+    def publish(self, message: Any) -> object:
+        """Send ``message`` to all subscribers."""
+
+
+class SettingsTopics(Protocol):
+    """The part of :class:`loop_ros.protocol.Topics` that settings need."""
+
+    def publisher(self, topic: str, msg_class: type, latch: bool) -> Sender:
+        """Publish ``topic``."""
+        ...
+
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> object:
+        """Serve ``name``."""
+
+
 class SettingsServer:
     """Serves the settings of one name. Every method belongs to the loop's thread."""
 
-    def __init__(self, topics: Topics, name: str, settings: Iterable[Setting],
+    def __init__(self, topics: SettingsTopics, name: str, settings: Iterable[Setting],
                  apply: Callable[[dict[str, Any]], object]) -> None:
         """Open ``<name>/set_parameters``, ``<name>/parameter_descriptions`` and ``<name>/parameter_updates``.
 
-        ``topics`` makes them: a ``loop_ros.protocol.Topics``, of which ``publisher`` and ``service`` are called.
         ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of them when a client
         changes some; it may raise ``ValueError`` to refuse.
         """

@@ -52,7 +52,7 @@ class CameraSettings:
         :class:`SensorError` for a parameter that is of no use."""
         given = {**_parameters(ALL_CAMERAS), **_parameters(name)}
         settings = [_given(name, setting, given) for setting in (*more, *_camera_settings(noise))]
-        self._values = {setting.name: setting.value for setting in settings}
+        self._values: dict[str, Any] = {setting.name: setting.value for setting in settings}
         self._apply = apply
         apply(self)
         self._server = ReconfigureServer(name, settings, self._changed)

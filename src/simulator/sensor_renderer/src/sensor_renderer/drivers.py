@@ -141,7 +141,7 @@ class TriggeredCamera(Camera):
         super().__init__(entry)
         self._triggers = [Trigger(self.under_camera(entry.text("triggerTopicName", "image_trigger"), folder))
                           for folder in self._folders]
-        self.topics += self._triggers
+        self.topics = [*self.topics, *self._triggers]
 
     def is_due(self, time_s: float) -> bool:
         if not self.has_listeners:
@@ -203,7 +203,7 @@ class DepthCamera(Driver):
         if want_colour or want_depth:
             moment, picture, depth = self._imager.taken(moment, want_colour, want_depth)
         time_s = moment.time_s
-        if want_depth:
+        if depth is not None:
             if pattern is not None:
                 depth = pattern.measured(depth, time_s)
             depth = within(depth, self._nearest, self._furthest)
@@ -213,7 +213,7 @@ class DepthCamera(Driver):
         if depth is not None and self._depth.has_listeners:
             values = millimetres(depth) if self._in_millimetres else depth
             self._depth.publish(convert.header(convert.depth_image(values), time_s, self._frame))
-        if points:
+        if points and picture is not None and depth is not None:
             found = self._cloud.points(depth, picture)
             self._points.publish(convert.header(convert.point_cloud(found), time_s, self._frame))
         self._learning.publish(moment, self._camera, self._frame)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensor_renderer.mirror import FLOOR_HALF_M
+from sensor_renderer.programs import uniform
 
 if TYPE_CHECKING:
     import moderngl
@@ -33,8 +34,9 @@ class Floor:
         self._rows = np.zeros((8, 10), dtype=np.float32)
         self._rows[:, 5] = 1.0
         self._buffer = context.buffer(self._rows.tobytes())
-        self._inner_index, self._ring_index = (context.buffer(np.int32(index).tobytes()) for index in (_INNER, _RING))
-        self._arrays = ()
+        self._inner_index, self._ring_index = (context.buffer(np.array(index, np.int32).tobytes())
+                                               for index in (_INNER, _RING))
+        self._arrays: tuple[moderngl.VertexArray, ...] = ()
 
     def build(self) -> None:
         """Make the vertex arrays for the programs as they are now."""
@@ -60,7 +62,7 @@ class Floor:
         self._rows[:, 6:9] = colour[:3]
         self._buffer.write(self._rows.tobytes())
         for array in self._arrays:
-            array.program["body"].write(packed)
+            uniform(array.program, "body").write(packed)
             array.render()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.floor import Floor
 from sensor_renderer.links import Links, visible
-from sensor_renderer.programs import Programs, draw, draw_textured, matrix_bytes
+from sensor_renderer.programs import Programs, draw, draw_textured, matrix_bytes, uniform
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
 from sensor_renderer.sides import Sides
@@ -55,7 +55,9 @@ class GlRenderer:
         try:
             import moderngl
 
-            self._context = moderngl.create_context(standalone=True, backend="egl", require=330)
+            self._context = moderngl.create_context(
+                standalone=True, require=330,
+                backend="egl")  # pyright: ignore[reportArgumentType]  (moderngl calls each setting a dict)
         except Exception as error:  # noqa: BLE001  (each layer below raises its own kind)
             raise RenderingError("no OpenGL 3.3 on EGL: %s" % error) from error
         #: Name of the renderer, as the driver gives it.
@@ -112,14 +114,14 @@ class GlRenderer:
             self._draw(seen, [entry for entry in textured if entry[2].opacity >= 1.0], pinhole)
             self._screens.draw(screens, to_clip)
             if mirror.light.sky:
-                self._programs.sky["from_clip"].write(matrix_bytes(_rays(pinhole, pose)))
+                uniform(self._programs.sky, "from_clip").write(matrix_bytes(_rays(pinhole, pose)))
                 target.draw_behind(self._sky)
             # Far ones first.
             self._draw_textured([entry for entry in reversed(textured) if entry[2].opacity < 1.0])
             picture = target.picture()
         else:
             target.clear()
-            self._programs.shadow["to_clip"].write(matrix_bytes(to_clip))
+            uniform(self._programs.shadow, "to_clip").write(matrix_bytes(to_clip))
             draw(self._programs.shadow, [(arrays.depth, packed) for arrays, _, packed, _, _ in seen])
         if depth:
             distance = pinhole.depth_from_buffer(target.depth())
@@ -142,10 +144,10 @@ class GlRenderer:
         buffer.use()
         buffer.clear(depth=1.0)
         program, links = self._programs.shadow, []
-        program["to_clip"].write(matrix_bytes(pinhole.clip_matrix() @ view))
+        uniform(program, "to_clip").write(matrix_bytes(pinhole.clip_matrix() @ view))
         for array, name, packed in seen:
             links.append(name)
-            program["number"].value = len(links)
+            uniform(program, "number").value = len(links)
             draw(program, [(array, packed)])
         size = pinhole.height, pinhole.width
         numbers = np.frombuffer(buffer.read(components=1, dtype="u2", alignment=1), np.uint16).reshape(size)

@@ -47,6 +47,6 @@ class Imager:
             times = moment.time_s - seconds * (np.arange(count)[::-1] + 0.5) / count
             pictures = [self.camera.view(moment.at(float(time_s)), True, False)[0] for time_s in times]
             distance = self.camera.view(middle, False, True)[1] if depth else None
-        picture = self._sensor.developed(pictures, settings, middle.time_s)
+        picture = self._sensor.developed([taken for taken in pictures if taken is not None], settings, middle.time_s)
         noise = self._noise
         return middle, picture if noise is None else noise.add(picture), distance

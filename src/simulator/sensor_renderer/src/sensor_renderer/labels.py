@@ -73,8 +73,7 @@ def classes_of_parameter(value: object) -> list[tuple[str, list[str]]]:
     ``ValueError``."""
     found = []
     for row in value if isinstance(value, list) else [value]:
-        fits = isinstance(row, dict) and set(row) == {"class", "models"} and isinstance(row["models"], list)
-        if not fits:
+        if not (isinstance(row, dict) and set(row) == {"class", "models"} and isinstance(row["models"], list)):
             raise ValueError("semantic_classes has %r; expected a list of {class: NAME, models: [PATTERN, ...]}"
                              % (row,))
         found.append((str(row["class"]), [str(pattern) for pattern in row["models"]]))

@@ -259,7 +259,8 @@ def _thinned(rows):
 def _rows(parts, triangles):
     """(n, 10) position, normal, colour and gloss of the corners of all parts. One call draws a link: in software a call
     costs as much as some hundred triangles."""
-    return np.concatenate([np.hstack([rows, np.tile(np.float32([*_factor(part), part.gloss]), (len(rows), 1))])
+    return np.concatenate([np.hstack([rows, np.tile(np.array([*_factor(part), part.gloss], np.float32),
+                                                    (len(rows), 1))])
                            for part, rows in zip(parts, triangles, strict=True)])
 
 

@@ -90,6 +90,8 @@ class Part(NamedTuple):
         """The places of the corners of the level of that number in the picture of its material (3 m, 2): to the right
         and down, in widths and heights of it."""
         uv = self.levels[number].uv() if self.levels else self.uv
+        if uv is None or self.material is None:
+            raise ValueError("a part without a picture has no places of corners in it")
         return uv * self.material.repeats
 
 

@@ -214,7 +214,7 @@ def _find_snapshot(stop):
         try:
             folder = rospy.get_param("/gazebo/snapshot", None)
             if folder is not None:
-                reader = SnapshotReader(folder)
+                reader = SnapshotReader(str(folder))
                 if reader.is_alive:
                     return reader
         except (SnapshotError, OSError):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from sensor_renderer.mirror import Material
     from sensor_renderer.shadows import Shadows
     from sensor_renderer.textures import Textures
+
+    #: Whether the sun casts shadows, whether there is a sky, and the kind of each lamp.
+    _Kinds = tuple[bool, bool, tuple[tuple[str, bool], ...]]
 
 # What is seen of a mesh and what casts its shadow differ by up to about this much [m].
 _THINNED_M = 0.015
@@ -36,10 +39,16 @@ class Programs:
         self.screen = context.program(vertex_shader=shaders.SCREEN_VERTEX, fragment_shader=shaders.SCREEN_FRAGMENT)
         self.shadow = context.program(vertex_shader=shaders.SHADOW_VERTEX, fragment_shader=shaders.SHADOW_FRAGMENT)
         self.sky = context.program(vertex_shader=shaders.SKY_VERTEX, fragment_shader=shaders.SKY_FRAGMENT)
-        self.mesh = self.solid = self.floor = self.bare_floor = None
-        self._lit = ()
-        self._textured = None
-        self._kinds = self._light = self._shadows = None
+        # Made by compile().
+        self.mesh: moderngl.Program
+        self.solid: moderngl.Program
+        self.floor: moderngl.Program
+        self.bare_floor: moderngl.Program
+        self._lit: tuple[moderngl.Program, ...] = ()
+        self._textured: moderngl.Program | None = None
+        self._kinds: _Kinds | None = None
+        self._light: Light
+        self._shadows: Shadows | None = None
 
     def fit(self, light: Light) -> bool:
         """Whether the programs are the ones for ``light`` already."""
@@ -62,7 +71,7 @@ class Programs:
         """The program for what has a picture or light of its own. It is made when it is first needed: most worlds do
         without it, and each program costs time in each picture."""
         if self._textured is None:
-            shadow, _, lamps = self._kinds
+            shadow, _, lamps = _kinds(self._light)
             self._textured = self._program(shaders.textured_shaders(shadow, lamps, self._taps))
             self._lit = *self._lit, self._textured
             self._light_by(self._light, self._textured)
@@ -90,7 +99,7 @@ class Programs:
     def look(self, to_clip: np.ndarray, eye: np.ndarray) -> None:
         """Set the camera: from the world to clip space (4, 4), its place (3)."""
         for program in self._lit:
-            program["to_clip"].write(matrix_bytes(to_clip))
+            uniform(program, "to_clip").write(matrix_bytes(to_clip))
             set_uniform(program, "eye", tuple(eye))
 
     def shadow_by(self, shadows: Shadows) -> None:
@@ -101,10 +110,10 @@ class Programs:
 
     def _shadow_by(self, shadows, program):
         if "to_shadow" in program:
-            program["to_shadow"].write(matrix_bytes(shadows.to_map))
+            uniform(program, "to_shadow").write(matrix_bytes(shadows.to_map))
         for number, matrix in shadows.lamp_matrices.items():
             if "lamp_matrix_%d" % number in program:
-                program["lamp_matrix_%d" % number].write(matrix_bytes(matrix))
+                uniform(program, "lamp_matrix_%d" % number).write(matrix_bytes(matrix))
         of_meshes = program in (self.mesh, self._textured)
         set_uniform(program, "margin", shadows.margin_m + (_THINNED_M if of_meshes else 0.0))
 
@@ -113,14 +122,20 @@ class Programs:
         return self._context.program(vertex_shader=vertex, fragment_shader=fragment)
 
 
+def uniform(program: moderngl.Program, name: str) -> moderngl.Uniform:
+    """The uniform ``name`` of ``program``."""
+    return cast("moderngl.Uniform", program[name])
+
+
 def set_uniform(program: moderngl.Program, name: str, value: float | tuple[float, ...]) -> None:
     """Set the uniform ``name`` of ``program``, if it has it."""
     # The compiler leaves out what a program does not use.
     if name in program:
-        program[name].value = value
+        uniform(program, name).value = value
 
 
-def _kinds(light):
+def _kinds(light: Light) -> _Kinds:
+    """What the programs depend on."""
     return light.shadows and any(light.sun), light.sky, tuple(lamp.kind for lamp in light.lamps)
 
 
@@ -132,7 +147,7 @@ def matrix_bytes(matrix: np.ndarray) -> bytes:
 def draw(program: moderngl.Program,
          listed: Iterable[tuple[VertexArray, np.ndarray] | tuple[VertexArray, np.ndarray, int]]) -> None:
     """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, how many corners if not all)."""
-    body = program["body"]
+    body = uniform(program, "body")
     for array, packed, *corners in listed:
         body.write(packed)
         array.render(vertices=corners[0] if corners else -1)
@@ -146,7 +161,7 @@ def draw_textured(program: moderngl.Program, listed: Sequence[tuple[VertexArray,
 
     As in Gazebo, pictures are seen from the front: signs have one sheet for each side, in the same place.
     """
-    body, context = program["body"], textures.context
+    body, context = uniform(program, "body"), textures.context
     if listed[0][2].opacity < 1.0:
         context.enable(context.BLEND)
         context.blend_func = context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA
@@ -155,9 +170,9 @@ def draw_textured(program: moderngl.Program, listed: Sequence[tuple[VertexArray,
     for array, packed, material in listed:
         (context.disable if material.two_sided else context.enable)(context.CULL_FACE)
         textures.of(material.texture).use(1)
-        program["emission"].value = material.emission
-        program["least"].value = 0.5 if material.cut_out else 0.0
-        program["opacity"].value = material.opacity
+        uniform(program, "emission").value = material.emission
+        uniform(program, "least").value = 0.5 if material.cut_out else 0.0
+        uniform(program, "opacity").value = material.opacity
         body.write(packed)
         array.render()
     context.disable(context.CULL_FACE | context.BLEND)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensor_renderer.links import Link, visible
-from sensor_renderer.programs import matrix_bytes
+from sensor_renderer.programs import matrix_bytes, uniform
 
 if TYPE_CHECKING:
     import moderngl
@@ -28,7 +28,7 @@ class Screens:
         self._context = context
         self._program = program
         self._flat, self._bent = (self._stripes(count) for count in (1, _STRIPES))
-        self._program["picture"].value = 1
+        uniform(self._program, "picture").value = 1
         self._pictures = {}
         self._lit = set()  # those with a pixel that is not black
 
@@ -40,11 +40,11 @@ class Screens:
     def draw(self, screens: Sequence[tuple[moderngl.Texture, np.ndarray, Screen]], to_clip: np.ndarray) -> None:
         """Draw ``screens``, as :meth:`visible` lists them."""
         if screens:
-            self._program["to_clip"].write(matrix_bytes(to_clip))
+            uniform(self._program, "to_clip").write(matrix_bytes(to_clip))
         for texture, matrix, screen in screens:
             texture.use(1)
-            self._program["body"].write(matrix_bytes(matrix))
-            self._program["shape"].value = (*screen.size, 1.0 / screen.radius if screen.radius else 0.0)
+            uniform(self._program, "body").write(matrix_bytes(matrix))
+            uniform(self._program, "shape").value = (*screen.size, 1.0 / screen.radius if screen.radius else 0.0)
             if screen.glows:
                 self._context.enable(self._context.BLEND)
                 self._context.blend_func = self._context.ONE, self._context.ONE_MINUS_SRC_ALPHA

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sensor_renderer.light import LAMP_NEAR_M, MAX_SHADOWS
-from sensor_renderer.programs import draw, matrix_bytes
+from sensor_renderer.programs import draw, matrix_bytes, uniform
 
 if TYPE_CHECKING:
     import moderngl
@@ -50,10 +50,14 @@ class Shadows:
         self._program = program
         self._pixels, self._taps = pixels, taps
         self._map, self._buffer = self._depth_map(pixels, pixels)
-        self._lamp_map = self._lamp_buffer = None
+        self._lamp_map: moderngl.Texture | None = None
+        self._lamp_buffer: moderngl.Framebuffer | None = None
         self._drawn = self._lamps_drawn = None
         self._poses = _Poses([])
-        self._right = self._up = self._away = None
+        # Axes of the sun's map, by light_by().
+        self._right: np.ndarray
+        self._up: np.ndarray
+        self._away: np.ndarray
         self.to_map, self.margin_m, self.lamp_matrices = np.eye(4), 0.0, {}
         self.corners = np.zeros((4, 3)), np.array((0.0, 0.0, 1.0))
 
@@ -79,9 +83,9 @@ class Shadows:
         spheres = _spheres(casters)
         if light.shadows and any(light.sun):
             changed = self._draw_sun(casters, spheres, pinhole, pose)
-        if self._lamps_drawn != now and self._lamp_map is not None:
+        if self._lamps_drawn != now and self._lamp_buffer is not None:
             self._lamps_drawn = now
-            self._draw_lamps(light, casters, spheres)
+            self._draw_lamps(self._lamp_buffer, light, casters, spheres)
             changed = True
         return changed
 
@@ -116,7 +120,8 @@ class Shadows:
         self._buffer.use()
         self._buffer.viewport = 0, 0, self._pixels, self._pixels
         self._buffer.clear(depth=1.0)
-        self._buffer.viewport = _BORDER, _BORDER, *[self._pixels - 2 * _BORDER] * 2
+        inner = self._pixels - 2 * _BORDER
+        self._buffer.viewport = _BORDER, _BORDER, inner, inner
         if self._one_sided:
             # This map is not upside down, as pictures are.
             self._context.front_face = "ccw"
@@ -145,9 +150,9 @@ class Shadows:
         low, high = np.maximum(low, corners.min(axis=0)), np.minimum(high, corners.max(axis=0))
         return (low, high) if (low < high).all() else (low, low)
 
-    def _draw_lamps(self, light, casters, spheres):
-        self._lamp_buffer.use()
-        self._lamp_buffer.clear(depth=1.0)
+    def _draw_lamps(self, buffer, light, casters, spheres):
+        buffer.use()
+        buffer.clear(depth=1.0)
         self.lamp_matrices = {}
         side = self._pixels // 2
         for number, lamp in enumerate(light.lamps):
@@ -157,16 +162,16 @@ class Shadows:
             near = [casters[k] for k in np.flatnonzero(np.linalg.norm(away, axis=1) - spheres[1] < lamp.far_m)]
             clips = [_spot_clip(lamp)] if lamp.type == "spot" else _point_clips(lamp)
             for column, clip in enumerate(clips):
-                self._lamp_buffer.viewport = column * side, lamp.shadow * side, side, side
+                buffer.viewport = column * side, lamp.shadow * side, side, side
                 self._draw_from(clip, near)
             if lamp.type == "spot":
                 tile = np.diag([1.0 / 6.0, 1.0 / MAX_SHADOWS, 1.0, 1.0])
                 tile[1, 3] = lamp.shadow / MAX_SHADOWS
                 self.lamp_matrices[number] = tile @ _HALVED @ clips[0]
-        self._lamp_buffer.viewport = 0, 0, 6 * side, MAX_SHADOWS * side
+        buffer.viewport = 0, 0, 6 * side, MAX_SHADOWS * side
 
     def _draw_from(self, to_clip, casters):
-        self._program["to_clip"].write(matrix_bytes(to_clip))
+        uniform(self._program, "to_clip").write(matrix_bytes(to_clip))
         draw(self._program, [(link.caster, packed) for link, _, packed in casters])
 
     def _depth_map(self, width, height):

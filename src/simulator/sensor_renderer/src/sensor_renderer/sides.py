@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sensor_renderer.programs import matrix_bytes, uniform
+
 if TYPE_CHECKING:
     import moderngl
 
@@ -81,7 +83,7 @@ class Sides:
         self._buffer.clear(depth=1.0)
         for number, away in enumerate(_directions()):
             self._buffer.viewport = (number % _COLUMNS) * _PIXELS, (number // _COLUMNS) * _PIXELS, _PIXELS, _PIXELS
-            self._program["to_clip"].write(_looking(away, centre, radius * _ROOM).T.astype(np.float32).tobytes())
+            uniform(self._program, "to_clip").write(matrix_bytes(_looking(away, centre, radius * _ROOM)))
             array.render()
         numbers = np.frombuffer(self._buffer.read(components=1, dtype="u4", alignment=1), np.uint32)
         array.release()

@@ -51,7 +51,8 @@ class Target:
     def clear(self, colour: tuple[float, ...] = (0.0, 0.0, 0.0)) -> None:
         """Draw into this target from now on; it is empty."""
         self._drawn.use()
-        self._drawn.clear(*colour, 1.0, depth=1.0)
+        red, green, blue = colour
+        self._drawn.clear(red, green, blue, 1.0, depth=1.0)
 
     def draw_behind(self, array: moderngl.VertexArray) -> None:
         """Render ``array`` where nothing has been drawn; its depth is not kept."""

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -89,6 +90,10 @@ class DrawingCache:
 
     def begin_scene(self) -> None:
         """A viewer begins to ask for the meshes of a scene."""
+
+    def is_making(self, keys: Iterable[str]) -> bool:
+        """Whether one of ``keys`` is still being simplified: never, where :meth:`parts` waits for it."""
+        return False
 
     def parts(self, path: str | os.PathLike[str], textured: bool = False,
               part: tuple[str, bool] = WHOLE) -> list[MeshPart]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from PyQt5.QtCore import QPointF, Qt
 from PyQt5.QtGui import QColor, QFont, QImage, QPainter, QPen
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from world_window.window import CanvasEvents
 
-_BUTTONS = {Qt.LeftButton: LEFT, Qt.MiddleButton: MIDDLE, Qt.RightButton: RIGHT}
+_BUTTONS = {Qt.MouseButton.LeftButton: LEFT, Qt.MouseButton.MiddleButton: MIDDLE, Qt.MouseButton.RightButton: RIGHT}
 _SKY = QColor(158, 178, 204)
 _PER_NOTCH = 120.0  # of Qt's wheel
 
@@ -30,22 +30,23 @@ class Canvas(QWidget):
     def __init__(self, events: CanvasEvents, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._events = events
-        self._image = None
-        self._shapes = ()
+        self._image: QImage | None = None
+        self._shapes: Sequence[overlay.Shape] = ()
         #: Words in the middle while there is no picture.
         self.words = "waiting for the simulator"
         self._font = QFont("Sans", 9)
-        self.setFocusPolicy(Qt.StrongFocus)
-        self.setAttribute(Qt.WA_OpaquePaintEvent)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setMinimumSize(200, 150)
 
     def show_frame(self, pixels: np.ndarray, shapes: Sequence[overlay.Shape]) -> None:
         """Show ``pixels`` (height, width, 3) with ``shapes`` of :mod:`world_window.overlay` over them."""
         height, width = pixels.shape[:2]
         self._shapes = shapes
+        data = cast("bytes", pixels.data)  # Qt takes any buffer
         # Qt enlarges this format in half of the time, and the copy outlives the pixels.
-        self._image = QImage(pixels.data, width, height, 3 * width, QImage.Format_RGB888).convertToFormat(
-            QImage.Format_RGB32)
+        self._image = QImage(data, width, height, 3 * width, QImage.Format.Format_RGB888).convertToFormat(
+            QImage.Format.Format_RGB32)
         self.update()
 
     def show_nothing(self, words: str) -> None:
@@ -57,14 +58,14 @@ class Canvas(QWidget):
         painter = QPainter(self)
         if self._image is None:
             painter.fillRect(self.rect(), _SKY)
-            painter.drawText(self.rect(), Qt.AlignCenter, self.words)
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self.words)
             return
         if self._image.size() == self.size():
             painter.drawImage(0, 0, self._image)
         else:
-            painter.setRenderHint(QPainter.SmoothPixmapTransform)
+            painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
             painter.drawImage(self.rect(), self._image)
-        painter.setRenderHint(QPainter.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setFont(self._font)
         for shape in self._shapes:
             _paint(painter, shape)
@@ -76,8 +77,8 @@ class Canvas(QWidget):
         button = _BUTTONS.get(event.button())
         if button is not None:
             keys = event.modifiers()
-            self._events.press(button, event.x(), event.y(), bool(keys & Qt.ShiftModifier),
-                               bool(keys & Qt.ControlModifier))
+            self._events.press(button, event.x(), event.y(), bool(keys & Qt.KeyboardModifier.ShiftModifier),
+                               bool(keys & Qt.KeyboardModifier.ControlModifier))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self._events.move(event.x(), event.y())
@@ -98,7 +99,7 @@ def _paint(painter, shape):
         painter.setPen(QPen(QColor(*shape.colour), shape.width))
         painter.drawLine(QPointF(shape.x0, shape.y0), QPointF(shape.x1, shape.y1))
     elif isinstance(shape, overlay.Dot):
-        painter.setPen(Qt.NoPen)
+        painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(*shape.colour))
         painter.drawEllipse(QPointF(shape.x, shape.y), shape.radius, shape.radius)
     else:

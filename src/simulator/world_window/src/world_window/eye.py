@@ -30,7 +30,8 @@ class Eye(NamedTuple):
     def looking_at(cls, position: Sequence[float] | np.ndarray, target: Sequence[float] | np.ndarray) -> Eye:
         """An eye at ``position`` (3,) with ``target`` (3,) [m] in its middle."""
         x, y, z = np.subtract(target, position)
-        return cls(tuple(map(float, position)), math.atan2(y, x), _not_steeper(math.atan2(z, math.hypot(x, y))))
+        place = (float(position[0]), float(position[1]), float(position[2]))
+        return cls(place, math.atan2(y, x), _not_steeper(math.atan2(z, math.hypot(x, y))))
 
     def rotation(self) -> np.ndarray:
         """(3, 3): columns right, down and ahead, in the world: the optical frame of REP-103."""

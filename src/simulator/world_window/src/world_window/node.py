@@ -106,8 +106,13 @@ def _show(ending):
     window.build(viewer, simulator)
     viewer.start()
     alone = _watch_for_master(ending)
+
+    def end_if_asked():
+        if ending.is_set() or rospy.is_shutdown() or alone.is_set():
+            application.quit()
+
     timer = QTimer()
-    timer.timeout.connect(lambda: (ending.is_set() or rospy.is_shutdown() or alone.is_set()) and application.quit())
+    timer.timeout.connect(end_if_asked)
     timer.start(_SIGNALS_MS)
     window.show()
     window.activateWindow()
@@ -129,10 +134,11 @@ def _publish(ending):
     viewer.end()
 
 
-def _folder():
+def _folder() -> str | None:
     """The folder of the snapshot of the simulator on this master, or None."""
     try:
-        return rospy.get_param("/gazebo/snapshot", None)
+        folder = rospy.get_param("/gazebo/snapshot", None)
+        return None if folder is None else str(folder)
     except (OSError, rosgraph.MasterException):
         return None
 

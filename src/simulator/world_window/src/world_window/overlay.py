@@ -81,14 +81,14 @@ class Overlay:
             a = a + (b - a) * (near - a[2]) / (b[2] - a[2])
         elif b[2] < near:
             b = b + (a - b) * (near - b[2]) / (a[2] - b[2])
-        ends = self._pinhole.project([a, b])
-        self.shapes.append(Line(*ends.ravel().tolist(), colour, width))
+        (x0, y0), (x1, y1) = self._pinhole.project([a, b]).tolist()
+        self.shapes.append(Line(x0, y0, x1, y1, colour, width))
 
     def dot(self, point: Sequence[float] | np.ndarray, colour: tuple[int, int, int], radius: float = 3.0) -> None:
         """A dot; nothing behind the eye."""
         place = self._place(point)
         if place is not None:
-            self.shapes.append(Dot(*place, colour, radius))
+            self.shapes.append(Dot(place[0], place[1], colour, radius))
 
     def text(self, point: Sequence[float] | np.ndarray, words: str) -> None:
         """Words beside a point; nothing behind the eye."""

@@ -18,9 +18,9 @@ from world_window.eye import Eye
 from world_window.overlay import Overlay, bounds_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from sensor_renderer.mirror import Mirror
+    from sensor_renderer.mirror import Body, Mirror
     from world_window.overlay import Contact, Shape
 
 LEFT, MIDDLE, RIGHT = "left", "middle", "right"
@@ -65,15 +65,16 @@ class Stage:
         self.version = 0
         self.eye = FIRST_EYE
         #: (model, link) or None; the link may be "" for the whole model.
-        self.selected = self.followed = None
-        #: :class:`Pull`, or None.
-        self.pull = None
+        self.selected: tuple[str, str] | None = None
+        self.followed: tuple[str, str] | None = None
+        self.pull: Pull | None = None
         #: Whether the left button pulls without control.
         self.pulls_by_left = False
-        self.layers = dict.fromkeys(LAYERS, False)
-        self._contacts = ()
-        self._mirror = None
-        self._gesture = self._pointer = None
+        self.layers: dict[str, bool] = dict.fromkeys(LAYERS, False)
+        self._contacts: Sequence[Contact] = ()
+        self._mirror: Mirror | None = None
+        self._gesture: _Gesture | None = None
+        self._pointer = (0.0, 0.0)
         self._is_drag = False  # the gesture is no click any more
         self._moved_by_user = False
         self._fitted_to = None
@@ -143,9 +144,9 @@ class Stage:
         kind = {LEFT: "pan", MIDDLE: "orbit", RIGHT: "zoom"}[button]
         if button == LEFT and shift:
             kind = "orbit"
-        elif button == LEFT and (control or self.pulls_by_left) and self._can_move(hit):
+        elif button == LEFT and (control or self.pulls_by_left) and hit is not None and self._can_move(hit):
             kind = "pull"
-            matrix = self._mirror.bodies[hit.model].link_matrix(hit.link)
+            matrix = self._bodies[hit.model].link_matrix(hit.link)
             self.pull = Pull(hit.model, hit.link, matrix[:3, :3].T @ (hit.point - matrix[:3, 3]), hit.point)
             self.selected = hit.model, hit.link
             self.version += 1
@@ -186,7 +187,10 @@ class Stage:
             return None
         hit, _ = self._under(x, y)
         if button != MIDDLE:
-            self.select(*((hit.model, hit.link) if self._is_thing(hit) else (None, "")))
+            if hit is not None and self._is_thing(hit):
+                self.select(hit.model, hit.link)
+            else:
+                self.select(None)
         return hit
 
     def wheel(self, steps: float, x: float, y: float) -> None:
@@ -244,6 +248,10 @@ class Stage:
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
+    @property
+    def _bodies(self) -> Mapping[str, Body]:
+        return {} if self._mirror is None else self._mirror.bodies
+
     def _look(self, eye):
         self.eye = eye
         self._moved_by_user = True
@@ -261,7 +269,7 @@ class Stage:
         self.version += 1
 
     def _has_things(self):
-        return any(bounds_of(parts) is not None for body in self._mirror.bodies.values() for parts in body.parts)
+        return any(bounds_of(parts) is not None for body in self._bodies.values() for parts in body.parts)
 
     def _follow(self):
         if self.followed is None:
@@ -290,23 +298,24 @@ class Stage:
         return hit, (origin + _EMPTY_M * direction if hit is None else hit.point)
 
     def _is_thing(self, hit):
-        return hit is not None and not any(
-            part.is_floor for parts in self._mirror.bodies[hit.model].parts for part in parts)
+        return not any(part.is_floor for parts in self._bodies[hit.model].parts for part in parts)
 
     def _can_move(self, hit):
-        return self._is_thing(hit) and not self._mirror.bodies[hit.model].is_fixed(hit.link)
+        return self._is_thing(hit) and not self._bodies[hit.model].is_fixed(hit.link)
 
     def _pull_to(self, x, y):
         """The target moves in the plane through itself across the view."""
-        pose = self.eye.pose()
-        place = picking.on_plane(*picking.ray(self.pinhole, pose, x, y), self.pull.target, pose[:3, 2])
+        pull, pose = self.pull, self.eye.pose()
+        if pull is None:
+            return
+        place = picking.on_plane(*picking.ray(self.pinhole, pose, x, y), pull.target, pose[:3, 2])
         if place is not None:
-            self.pull = self.pull._replace(target=place)
+            self.pull = pull._replace(target=place)
             self.version += 1
 
     def _centre(self, model, link):
         """(centre (3,), radius) of a link, or of the model's links; None if there is nothing to see."""
-        body = self._mirror.bodies[model]
+        body = self._bodies[model]
         boxes = []
         for name, parts, matrix in zip(body.link_names, body.parts, body.matrices, strict=True):
             found = bounds_of(parts) if link in ("", name) else None
@@ -326,19 +335,21 @@ class Stage:
 
     @staticmethod
     def _draw_names(overlay, model, body, with_links):
-        boxes = [(name, bounds_of(parts), matrix)
-                 for name, parts, matrix in zip(body.link_names, body.parts, body.matrices, strict=True)]
-        boxes = [entry for entry in boxes if entry[1] is not None]
+        boxes = []
+        for name, parts, matrix in zip(body.link_names, body.parts, body.matrices, strict=True):
+            found = bounds_of(parts)
+            if found is not None:
+                boxes.append((name, *found, matrix))
         if with_links:
-            for name, (low, high), matrix in boxes:
+            for name, low, high, matrix in boxes:
                 overlay.text(matrix[:3, :3] @ ((low + high) / 2.0) + matrix[:3, 3], name)
         elif boxes:
             tops = [matrix[:3, :3] @ ((low + high) / 2.0) + matrix[:3, 3]
-                    + (0.0, 0.0, float(np.abs(matrix[2, :3]) @ (high - low)) / 2.0) for _, (low, high), matrix in boxes]
+                    + (0.0, 0.0, float(np.abs(matrix[2, :3]) @ (high - low)) / 2.0) for _, low, high, matrix in boxes]
             overlay.text(max(tops, key=lambda top: top[2]), model)
 
     def _draw_selection(self, overlay, model, link):
-        body = self._mirror.bodies.get(model)
+        body = self._bodies.get(model)
         if body is None:
             return
         for name, parts, matrix in zip(body.link_names, body.parts, body.matrices, strict=True):

@@ -137,7 +137,7 @@ class Viewer(threading.Thread):
             stage.let_go()
         if follower is not None:
             before = follower.revision
-            if follower.follow():
+            if follower.follow() and follower.snapshot is not None:
                 self._clock.take(follower.snapshot.time_s, follower.snapshot.paused, now)
                 stage.take(follower.mirror, follower.revision != before)
         self._tell_pull(now)
@@ -159,11 +159,11 @@ class Viewer(threading.Thread):
             state = (id(follower), mirror.version, mirror.picture_versions, stage.version, stage.pinhole)
             if state != self._drawn:
                 self._drawn = state
-                pixels = self._picture(now, self._sharpness.scale)
+                pixels = self._picture(mirror, now, self._sharpness.scale)
                 pinhole = stage.pinhole
                 self._sharpness.take(time.monotonic() - now, pinhole.width * pinhole.height)
             elif self._drawn_scale < 1.0 and now - self._drawn_at[-1] > _REST_S:
-                pixels = self._picture(now, 1.0)
+                pixels = self._picture(mirror, now, 1.0)
         if pixels is None and self._shown_at is not None and now - self._shown_at < _STATUS_S:
             return
         self._shown_at = now
@@ -176,11 +176,10 @@ class Viewer(threading.Thread):
             {name: body.link_names for name, body in bodies.items()}, stage.selected, stage.followed,
             float(len([then for then in self._drawn_at if now - then < 1.0]))))
 
-    def _picture(self, now, scale):
+    def _picture(self, mirror, now, scale):
         if self._renderer is None:
             self._renderer = self._make_renderer()
         self._drawn_scale = scale
         self._drawn_at.append(now)
-        pixels, _ = self._renderer.render(self._follower.mirror, self.stage.smaller_pinhole(scale),
-                                          self.stage.eye.pose())
+        pixels, _ = self._renderer.render(mirror, self.stage.smaller_pinhole(scale), self.stage.eye.pose())
         return pixels

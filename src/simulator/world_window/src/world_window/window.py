@@ -86,12 +86,13 @@ class Window(QMainWindow):
     _frame_came = pyqtSignal()
     _told = pyqtSignal(str)
     _menu_wanted = pyqtSignal(str, str, int, int)
-    _viewer = None  # Qt sends events before the window is built
+    _built = False  # Qt sends events before the window is built
+    _viewer: Viewer
+    _simulator: Simulator
 
     def __init__(self) -> None:
         super().__init__()
         self.setWindowTitle("Gazebo")
-        self._simulator = None
         self._waiting = None  # the newest frame that the window has not shown
         self._paused, self._models, self._selected, self._followed = False, {}, None, None
         self._frame_came.connect(self._take_frame)
@@ -109,6 +110,7 @@ class Window(QMainWindow):
         self.statusBar().addPermanentWidget(self._status)
         self.resize(1000, 760)
         self.canvas.setFocus()
+        self._built = True
 
     # -- any thread -----------------------------------------------------------------------------------------------
 
@@ -147,7 +149,7 @@ class Window(QMainWindow):
 
     def _show_clock(self, simulated_s, paused, factor, rate):
         self._paused = paused
-        icon = QStyle.SP_MediaPlay if paused else QStyle.SP_MediaPause
+        icon = QStyle.StandardPixmap.SP_MediaPlay if paused else QStyle.StandardPixmap.SP_MediaPause
         self._pause.setIcon(self.style().standardIcon(icon))
         self._pause.setText("Go on" if paused else "Pause")
         minutes, seconds = divmod(simulated_s, 60.0)
@@ -159,19 +161,21 @@ class Window(QMainWindow):
     def _add_buttons(self):
         bar = QToolBar("world", self)
         bar.setMovable(False)
-        bar.setToolButtonStyle(Qt.ToolButtonTextBesideIcon)
+        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         self.addToolBar(bar)
         simulator, post = self._simulator, self._viewer.post
         icon = self.style().standardIcon
         self._pause = self._action(bar, "Pause", "Space", "pause the world, or let it go on", self._pause_or_go_on)
         self._action(bar, "Step", ".", "make some steps, then pause", lambda: simulator.step(self._steps.value())
-                     ).setIcon(icon(QStyle.SP_MediaSkipForward))
-        self._steps = QSpinBox(minimum=1, maximum=MAX_STEPS, value=1, toolTip="steps of the button")
-        self._steps.setFocusPolicy(Qt.ClickFocus)
+                     ).setIcon(icon(QStyle.StandardPixmap.SP_MediaSkipForward))
+        self._steps = QSpinBox()
+        self._steps.setRange(1, MAX_STEPS)
+        self._steps.setToolTip("steps of the button")
+        self._steps.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._steps.editingFinished.connect(self.canvas.setFocus)
         bar.addWidget(self._steps)
         self._action(bar, "Reset", "Ctrl+R", "put all models back to their start", simulator.reset_world
-                     ).setIcon(icon(QStyle.SP_BrowserReload))
+                     ).setIcon(icon(QStyle.StandardPixmap.SP_BrowserReload))
         reset_time = self._action(None, "Reset time, too", "Ctrl+Shift+R",
                                   "put all models back to their start, and time to zero", simulator.reset_simulation)
         separator = bar.addSeparator()
@@ -196,7 +200,9 @@ class Window(QMainWindow):
         bar.insertAction(separator, reset_time)
 
     def _action(self, bar, text, key, tip, function, checkable=False):
-        action = QAction(text, self, checkable=checkable, toolTip="%s (%s)" % (tip, key))
+        action = QAction(text, self)
+        action.setCheckable(checkable)
+        action.setToolTip("%s (%s)" % (tip, key))
         action.setShortcut(QKeySequence(key))
         # Only what the user does counts: a frame from before the last click sets buttons back for a moment.
         action.triggered.connect(function if checkable else lambda *_: function())
@@ -208,11 +214,12 @@ class Window(QMainWindow):
     def _add_list(self):
         self._tree = QTreeWidget()
         self._tree.setHeaderHidden(True)
-        self._tree.itemClicked.connect(lambda item: self._viewer.post(Stage.select, *item.data(0, Qt.UserRole)))
+        self._tree.itemClicked.connect(
+            lambda item: self._viewer.post(Stage.select, *item.data(0, Qt.ItemDataRole.UserRole)))
         self._tree.itemDoubleClicked.connect(lambda *_: self._viewer.post(Stage.go_to_selected))
         dock = QDockWidget("Models", self)
         dock.setWidget(self._tree)
-        self.addDockWidget(Qt.LeftDockWidgetArea, dock)
+        self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, dock)
         dock.hide()
         show = dock.toggleViewAction()
         show.setShortcut("M")
@@ -226,10 +233,10 @@ class Window(QMainWindow):
         self._tree.clear()
         for model, links in self._models.items():
             item = QTreeWidgetItem([model])
-            item.setData(0, Qt.UserRole, (model, ""))
+            item.setData(0, Qt.ItemDataRole.UserRole, (model, ""))
             for link in links:
                 child = QTreeWidgetItem([link or model])
-                child.setData(0, Qt.UserRole, (model, link))
+                child.setData(0, Qt.ItemDataRole.UserRole, (model, link))
                 item.addChild(child)
             self._tree.addTopLevelItem(item)
             item.setExpanded(model in opened)
@@ -256,13 +263,13 @@ class Window(QMainWindow):
         (self.showNormal if self.isFullScreen() else self.showFullScreen)()
 
     def _show_help(self):
-        box = QMessageBox(QMessageBox.NoIcon, "Mouse and keys", HELP, QMessageBox.Close, self)
-        box.setAttribute(Qt.WA_DeleteOnClose)
+        box = QMessageBox(QMessageBox.Icon.NoIcon, "Mouse and keys", HELP, QMessageBox.StandardButton.Close, self)
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         box.open()
 
     def _open_menu(self, model, link, x, y):
         menu = QMenu(self)
-        menu.setAttribute(Qt.WA_DeleteOnClose)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         title = menu.addAction("%s::%s" % (model, link))
         title.setEnabled(False)
         menu.addSeparator()
@@ -272,7 +279,7 @@ class Window(QMainWindow):
         menu.popup(self.canvas.mapToGlobal(QPoint(x, y)))
 
     def changeEvent(self, event: QEvent) -> None:
-        if self._viewer is not None:
+        if self._built:
             self._viewer.set_visible(not self.isMinimized())
         super().changeEvent(event)
 
