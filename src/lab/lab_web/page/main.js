@@ -2,6 +2,7 @@
 // The lab's page: connects what the server sends to what is on the screen.
 import {Camera} from "./camera.js";
 import {Controls} from "./controls.js";
+import {Episodes} from "./episodes.js";
 import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
 import {Headset} from "./headset.js";
@@ -40,6 +41,7 @@ let view = null;
 const hands = new Hands(send, () => view, plans);
 const controls = new Controls(send, query, () => state.number, note);
 const recordings = new Recordings(send, query, () => state.number, note);
+const episodes = new Episodes(send, query);
 const plots = new Plots();
 const numbers = new Numbers(() => new Topics(`${sockets}rosbridge${query}`));
 const exercises = new Exercises();
@@ -100,6 +102,7 @@ function refresh() {
   const [acting, driving] = [state.may_act, state.mine].map((is) => Boolean(is && state.connected));
   controls.allow(driving);
   recordings.allow(acting, driving);
+  episodes.allow(acting);
   simulation.allow(driving);
   hands.allow(acting, driving);
   steering.allow(driving);
@@ -164,6 +167,9 @@ const served = {
   },
   recording(kept) {
     recordings.show(kept);
+  },
+  episodes(state) {
+    episodes.show(state);
   },
   result(result) {
     exercises.show(result);
@@ -230,6 +236,7 @@ function buildPanels() {
   hands.build(robot.hands ?? []);
   steering.build(robot);
   controls.build(robot);
+  episodes.build();
   plots.build(robot.joints ?? []);
   simulation.build(robot);
 }
@@ -276,6 +283,7 @@ function startChoices(language) {
     await load(byId("language").value);
     buildPanels();
     camera.build(robot.cameras ?? []);
+    episodes.list();
     exercises.refresh();
     comparison.refresh();
     notebook.refresh();
@@ -336,4 +344,4 @@ setInterval(sayAlive, ALIVE_MS);
 document.addEventListener("visibilitychange", sayAlive);
 startTopics();
 // For the console, and for tests.
-globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, steering, headset, served};
+globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, steering, headset, episodes, served};

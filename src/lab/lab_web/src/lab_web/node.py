@@ -30,6 +30,7 @@ from lab_web import jupyter, page_files
 from lab_web.buttons import Buttons
 from lab_web.certificate import CertificateError, certificate
 from lab_web.comparison import Comparison, findings_of
+from lab_web.episodes import Episodes, of_workspace
 from lab_web.errands import Errands
 from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
@@ -45,7 +46,7 @@ from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
-from lab_web.serving import Pages, routes, upload_routes
+from lab_web.serving import Pages, episode_routes, routes, upload_routes
 from lab_web.servos import Servos
 from lab_web.sights import Sights
 from lab_web.sim_clock import LINGER_S, SimClock
@@ -209,6 +210,7 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
 
     notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
+                                      *episode_routes(pages, equipment.episodes),
                                       *_notebook_routes(notebooks, access),
                                       (r"/snapshot", SnapshotHandler, {"server": video}))
     try:
@@ -232,6 +234,7 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
         for thread in threads:
             thread.join()
         equipment.guard.close()
+        equipment.episodes.close()
         clients.shut_down()
         for one in (serving, secure):
             if one is not None:
@@ -240,13 +243,16 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
         loop_thread.stop()
 
 
+def _workspace() -> Path:
+    return Path(rospkg.RosPack().get_path("lab_web")).parents[2]
+
+
 def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
     """The Notebooks of the page, or None where it offers none. Raises Failure."""
     offered = not options.public if options.notebook is None else options.notebook
     if not offered or importlib.util.find_spec("jupyterlab") is None:
         return None
-    packages = rospkg.RosPack()
-    workspace, root = Path(packages.get_path("lab_web")).parents[2], options.notebook_root
+    packages, workspace, root = rospkg.RosPack(), _workspace(), options.notebook_root
     try:
         if root is None and (workspace / "src").is_dir():
             root, files = workspace, jupyter.notebooks(workspace)
@@ -281,6 +287,7 @@ class _Equipment(NamedTuple):
     guard: ReleaseGuard
     sights: Sights
     servos: Servos
+    episodes: Episodes
     loops: dict
 
 
@@ -294,7 +301,7 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
     lab.add("watch", overlay.watch, needs_control=False, for_viewers=True)
     pages.when_closed = overlay.forget
     parts = Parts()
-    errands, switches, plans, comparisons = (Errands(pages.tell, faults) for _ in range(4))
+    errands, switches, plans, comparisons, edits = (Errands(pages.tell, faults) for _ in range(5))
     guard = ReleaseGuard()
     buttons = Buttons(parts.switch, switches, guard.pressed)
     simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
@@ -314,17 +321,19 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
         side + "_s0", lambda why: pages.tell(lab.holder, "held", "the %s arm: %s" % (side, why))), hands.pose)
     lab.add("steer", steer_operation(lab, steering, lambda: servos.hands))
     lab.add("mark", servos.mark)
+    episodes = of_workspace(_workspace(), servos.tell, edits, partial(pages.share, "episodes"))
+    lab.add("episodes", episodes.ask, needs_control=False)
     comparison = Comparison(_findings, comparisons, partial(pages.share, "interface"), time.time)
     lab.add("compare", comparison.ask, needs_control=False)
     lab.add("nod", parts.nod, needs_power=True)
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
-    return _Equipment(hands, simulation, recorder, guard, sights, servos, {
+    return _Equipment(hands, simulation, recorder, guard, sights, servos, episodes, {
         **{name: attended(pages.present, loop) for name, loop in (
             ("the arms", lab.run), ("the 3D view", partial(_follow, pages)), ("points and frames", overlay.run),
             ("the hands", hands.run), ("errands", errands.run), ("plans", plans.run),
-            ("comparison", comparisons.run))},
+            ("comparison", comparisons.run), ("episodes", edits.run))},
         # Those of a page that has gone are released after that.
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 

@@ -7,11 +7,13 @@ import base64
 import hashlib
 import json
 import re
+import tempfile
 import threading
 from typing import TYPE_CHECKING
 
 from tornado import web
 
+from demonstrations.frames import DemonstrationError
 from lab_web.control import HEARTBEAT_S, PAGE_HANGS_S
 from lab_web.motion import MotionError
 from lab_web.playback import recording_of, text_of
@@ -21,9 +23,10 @@ from web_bridge.websocket import BufferedSocket, token_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
-    from typing import Any
+    from typing import Any, BinaryIO
 
     from lab_web import scene
+    from lab_web.episodes import Episodes
     from lab_web.playback import Recorder
     from web_bridge.access import Access
     from web_bridge.loop_thread import LoopThread
@@ -34,6 +37,8 @@ MAX_PAGES = 100
 _LARGEST_OPERATION = 65536
 #: A file from a page, such as ten minutes of both arms [bytes].
 _LARGEST_UPLOAD = 16 << 20
+#: A part of a file to a page [bytes].
+_CHUNK = 1 << 18
 #: The robot's screen, width and height [pixels]; pages send it whole.
 SCREEN = (1024, 600)
 # Everything comes from this server, so that the page works without a network and loads nothing foreign.
@@ -262,6 +267,48 @@ class RecordingFile(_WithToken):
         self.finish(text)
 
 
+class EpisodePicture(_WithToken):
+    """The strip of an episode; ``picture(number)``: a JPEG, raises DemonstrationError."""
+
+    def initialize(self, pages: Pages, picture: Callable[[int], bytes]) -> None:
+        super().initialize(pages)
+        self._picture = picture
+
+    async def get(self, number: str) -> None:
+        try:
+            content = await asyncio.get_running_loop().run_in_executor(None, self._picture, int(number))
+        except (DemonstrationError, OSError) as error:
+            self.set_status(404)
+            self.finish("%s\n" % error)
+            return
+        self.set_header("Content-Type", "image/jpeg")
+        self.finish(content)
+
+
+class EpisodesFile(_WithToken):
+    """All episodes as one file; ``write(file)``, raises OSError."""
+
+    def initialize(self, pages: Pages, write: Callable[[BinaryIO], None]) -> None:
+        super().initialize(pages)
+        self._write = write
+
+    async def get(self) -> None:
+        loop = asyncio.get_running_loop()
+        with tempfile.TemporaryFile() as file:
+            try:
+                await loop.run_in_executor(None, self._write, file)
+            except OSError as error:
+                self.set_status(500)
+                self.finish("%s\n" % error)
+                return
+            file.seek(0)
+            self.set_header("Content-Type", "application/zip")
+            self.set_header("Content-Disposition", "attachment; filename=episodes.zip")
+            while chunk := await loop.run_in_executor(None, file.read, _CHUNK):
+                self.write(chunk)
+                await self.flush()
+
+
 class Files(web.StaticFileHandler):
     """The page's scripts, styles and texts, and its libraries: nothing of the lab, so no token."""
 
@@ -337,6 +384,12 @@ def upload_routes(pages: Pages, recorder: Recorder) -> list[tuple[str, type[web.
     return [(r"/screen", Upload, {"pages": pages, "operation": "screen"}),
             (r"/recording", Upload, {"pages": pages, "operation": "load", "read": recording_of}),
             (r"/recording.csv", RecordingFile, {"pages": pages, "get_text": text})]
+
+
+def episode_routes(pages: Pages, episodes: Episodes) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:
+    """The routes of films and files of episodes; ``episodes``: :class:`lab_web.episodes.Episodes`."""
+    return [(r"/episodes/([0-9]{1,9}).jpg", EpisodePicture, {"pages": pages, "picture": episodes.picture}),
+            (r"/episodes.zip", EpisodesFile, {"pages": pages, "write": episodes.write_zip})]
 
 
 def routes(pages: Pages, page: Path, libraries: Path) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:

@@ -20,8 +20,12 @@ class Servos:
         """The operation "mark" of a page: ``mark``, success, failure or again. Raises RobotError."""
         if asked.get("mark") not in MARKS:
             raise RobotError("a mark is one of %s" % ", ".join(MARKS))
+        self.tell(asked["mark"])
+
+    def tell(self, mark: str) -> None:
+        """Tell recorders one of MARKS."""
         if self._marks is not None:
-            self._marks.publish(String(asked["mark"]))
+            self._marks.publish(String(mark))
 
     def listen(self) -> None:
         """Advertise and subscribe. Waits for the master."""

@@ -15,13 +15,14 @@ from tornado import web, websocket
 
 from lab_testing.waiting import wait_until
 from lab_web.buttons import Buttons
+from lab_web.episodes import Episodes
 from lab_web.errands import Errands
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.motion import Limits
 from lab_web.playback import Recorder, play
 from lab_web.scene import SceneFollower
-from lab_web.serving import Pages, routes, upload_routes
+from lab_web.serving import Pages, episode_routes, routes, upload_routes
 from lab_web.steering import Steering
 from lab_web.steering import operation as steer_operation
 from loop_ros.faults import Faults
@@ -93,6 +94,24 @@ class Servo:
     @property
     def moves(self):
         return bool(self.sent) and any(self.sent[-1][0])
+
+
+class EpisodeRecorder:
+    """Instead of the recorder's process. ``asked``: what pages have asked for, task and camera of each recording."""
+
+    def __init__(self):
+        self.asked, self.said, self._ended = [], None, None
+
+    def start(self, task, camera, said, ended):
+        self.asked.append((task, camera))
+        self.said, self._ended = said, ended
+        return self
+
+    def end(self):
+        threading.Thread(target=self._ended).start()
+
+    def join(self):
+        pass
 
 
 class Rosbridge(websocket.WebSocketHandler):
@@ -170,6 +189,10 @@ class Server:
         self.lab.add("steer", steer_operation(self.lab, steering, lambda: self.servos))
         self.marks = []
         self.lab.add("mark", lambda client, asked: self.marks.append(asked["mark"]))
+        self.episode_recorder = EpisodeRecorder()
+        self.episodes = Episodes(folder / "episodes", self.episode_recorder.start, self.marks.append, errands,
+                                 lambda state: self.pages.share("episodes", state))
+        self.lab.add("episodes", self.episodes.ask, needs_control=False)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
         self.shown, self.planned, self.notebook_asks, self.watched, self.compared = [], [], [], {}, []
         self.lab.add("watch", self.watched.__setitem__, needs_control=False, for_viewers=True)
@@ -195,6 +218,7 @@ class Server:
             "poses": ["neutral"], "hands": hands.sides, "servos": SIDES, "grippers": SIDES,
             "cameras": [CAMERA], "has_scene": True, "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
+                                       *episode_routes(self.pages, self.episodes),
                                        (r"/notebook/(?:lab|doc).*", Frame),
                                        (r"/rosbridge", Rosbridge, {"sockets": self._sockets})])
         self._serving = Serving(self.loop, application, 0, "127.0.0.1")
