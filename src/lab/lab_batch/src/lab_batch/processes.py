@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
@@ -43,7 +43,7 @@ class Limits:
     memory_bytes: int | None = None
 
 
-def map_seeds(spec: Spec, seeds: range | list[int], limits: Limits) -> Iterator[Outcome]:
+def map_seeds(spec: Spec, seeds: range | list[int], limits: Limits) -> Generator[Outcome, None, None]:
     """Yield an Outcome for each seed, in the order in which they end. spec: Spec, seeds: iterable of int.
 
     Raises JobError where the job cannot start. When the caller closes the generator, the workers are stopped.
