@@ -204,12 +204,15 @@ def command(environment: Mapping[str, str], binds: Iterable[tuple[_Path, _Path, 
     if problem():
         raise NotIsolated(problem())
     roots = workspaces(environment)
-    options = _base(scratch_bytes)
+    around, inside = [], []
+    for source, target, writable in binds:
+        # A workspace may be in the folder that a home stands for, as in the container's /home/student.
+        is_around = any(root.startswith("%s/" % target) for root in roots)
+        (around if is_around else inside).extend(["--bind" if writable else "--ro-bind", str(source), str(target)])
+    options = _base(scratch_bytes) + around
     for root in roots:
         options += ["--ro-bind", root, root]
-    options += _hide(roots, hidden)
-    for source, target, writable in binds:
-        options += ["--bind" if writable else "--ro-bind", str(source), str(target)]
+    options += _hide(roots, hidden) + inside
     # Parent folders that bubblewrap makes are in memory, without a size limit.
     options += ["--remount-ro", "/dev", "--remount-ro", "/", "--chdir", HOME]
     return ["bwrap", *options, *(("--unshare-net",) if own_network else ()), *further, "--"]

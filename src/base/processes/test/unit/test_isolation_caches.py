@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Copies of compiled functions for sandboxes."""
+"""The files that a sandbox shows: a workspace inside of a home, copies of compiled functions."""
 import errno
 import os
 import shutil
+import subprocess
 
 import pytest
 
@@ -33,3 +34,17 @@ def test_a_full_disk_is_one_short_sentence(workspace, tmp_path, monkeypatch):
     with pytest.raises(OSError, match="cannot be copied to") as raised:
         isolation.caches({}, tmp_path / "copies")
     assert str(raised.value).endswith(os.strerror(errno.ENOSPC)) and len(str(raised.value)) < 400
+
+
+@pytest.mark.skipif(bool(isolation.problem()), reason=isolation.problem() or "no problem")
+def test_a_workspace_in_the_folder_that_a_home_stands_for_is_seen_and_so_is_the_home(tmp_path, monkeypatch):
+    seen, root = tmp_path / "home", tmp_path / "home/ws"
+    root.mkdir(parents=True)
+    (root / "file").write_text("workspace")
+    home = tmp_path / "kept"
+    home.mkdir()
+    (home / "own").write_text("home")
+    monkeypatch.setattr(isolation, "workspaces", lambda environment: [str(root)])
+    shown = subprocess.run([*isolation.command({}, [(home, seen, True)]), "cat", str(root / "file"), str(seen / "own")],
+                           capture_output=True, text=True, timeout=60.0)
+    assert (shown.stdout, shown.stderr) == ("workspacehome", "")
