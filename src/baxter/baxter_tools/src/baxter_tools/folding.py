@@ -99,7 +99,7 @@ class Folding:
         if text is None:
             raise ProgramFailed("the parameter %s is not set: only the robot's shape tells a safe way for its arms"
                                 % rospy.resolve_name("robot_description"))
-        self._clearance = SelfClearance(text, names, rospy.logwarn)
+        self._clearance = SelfClearance(str(text), names, rospy.logwarn)
 
     def way(self, angles: Mapping[str, float], pose: str) -> list[dict[str, float]]:
         """Return the path from `angles` (dict of name to rad) to the named pose as a list of such dicts.

@@ -54,26 +54,26 @@ class PathPlanner:
         self._margin_m = margin_m
         self._rng = rng
 
-    def plan(self, start: ArrayLike, goal: ArrayLike, via: Sequence[ArrayLike] = ()) -> list[ArrayLike]:
+    def plan(self, start: ArrayLike, goal: ArrayLike, via: Sequence[np.ndarray] = ()) -> list[np.ndarray]:
         """Return a path from `start` to `goal` as a list of postures, straight in between; `via`: postures to try
         first.
 
         A start in contact is left by a path that increases the clearance. Raises NoPath.
         """
-        start, goal = (np.asarray(end, dtype=float) for end in (start, goal))
-        at_goal_m = self._clearance(goal)
+        first, last = np.asarray(start, dtype=float), np.asarray(goal, dtype=float)
+        at_goal_m = self._clearance(last)
         if at_goal_m <= 0.0:
             raise NoPath("parts of the robot overlap by %.0f mm where it should go" % (-1000.0 * at_goal_m))
         # The folded arm is closer to its own body than the margin of a path.
         margin_m = min(self._margin_m, 0.9 * at_goal_m)
-        way = [start]
-        if self._clearance(start) < margin_m:
-            way.append(self._escape(start, margin_m))
+        way = [first]
+        if self._clearance(first) < margin_m:
+            way.append(self._escape(first, margin_m))
         for stops in itertools.chain([()], ([stop] for stop in via), [via] if len(via) > 1 else []):
-            legs = [way[-1], *stops, goal]
+            legs = [way[-1], *stops, last]
             if all(self._is_free(a, b, margin_m) for a, b in itertools.pairwise(legs)):
                 return self._shorten([*way, *legs[1:]], margin_m)
-        return self._shorten([*way, *self._connect(way[-1], goal, margin_m)[1:]], margin_m)
+        return self._shorten([*way, *self._connect(way[-1], last, margin_m)[1:]], margin_m)
 
     def _is_free(self, a: Any, b: Any, margin_m: float) -> bool:
         count = max(1, int(np.ceil(np.abs(b - a).max() / RESOLUTION_RAD)))
@@ -112,7 +112,7 @@ class PathPlanner:
         end = target if distance <= STRETCH_RAD else from_here + (target - from_here) * (STRETCH_RAD / distance)
         return tree.add(end, nearest) if self._is_free(from_here, end, margin_m) else None
 
-    def _shorten(self, way: list[ArrayLike], margin_m: float) -> list[ArrayLike]:
+    def _shorten(self, way: list[np.ndarray], margin_m: float) -> list[np.ndarray]:
         """Remove postures where the straight path is free. The first segment out of a contact stays."""
         first = 1 if len(way) > 1 and self._clearance(way[0]) < margin_m else 0
         for _ in range(SHORT_CUTS):
@@ -128,7 +128,7 @@ class PathPlanner:
 class _Tree:
     def __init__(self, root: np.ndarray) -> None:
         self.postures = [root]
-        self._parents = [None]
+        self._parents: list[int | None] = [None]
 
     def nearest(self, target: np.ndarray) -> int:
         return int(np.abs(np.array(self.postures) - target).max(axis=1).argmin())
@@ -140,10 +140,10 @@ class _Tree:
 
     def branch(self, node: int) -> list[np.ndarray]:
         """Postures from `node` back to the root."""
-        way = []
-        while node is not None:
-            way.append(self.postures[node])
-            node = self._parents[node]
+        way, here = [], node
+        while here is not None:
+            way.append(self.postures[here])
+            here = self._parents[here]
         return way
 
 

@@ -61,7 +61,8 @@ def test_messages(say: Callable[[str], object]) -> None:
         seen = []
         subscriber = rospy.Subscriber(topic, kind, seen.append, queue_size=1)
         try:
-            startup.wait_for_start([startup.message_arrives(subscriber.resolved_name, lambda seen=seen: bool(seen))],
+            name = str(subscriber.resolved_name)
+            startup.wait_for_start([startup.message_arrives(name, lambda seen=seen: bool(seen))],
                                    MESSAGE_TIMEOUT_S)
         finally:
             subscriber.unregister()

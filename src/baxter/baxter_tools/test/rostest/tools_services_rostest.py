@@ -80,7 +80,7 @@ class ArmProcedureTest(ToolsTest):
 
     def test_limb_is_required(self):
         self.expect(["tare.py"], 2, "--limb")
-        self.expect(["tare.py", "-l", "middle"], 2, "'left', 'right'")
+        self.expect(["tare.py", "-l", "middle"], 2, "middle", "left", "right")
 
 
 class UpdateRobotTest(ToolsTest):
