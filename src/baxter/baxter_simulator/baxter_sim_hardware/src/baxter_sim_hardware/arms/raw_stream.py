@@ -23,9 +23,10 @@ _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 @_compiled
 def _take(numbers: np.ndarray, points: np.ndarray, bounds: np.ndarray, mode: np.ndarray, index: np.ndarray,
-          values: np.ndarray, time_s: float, dt: float) -> None:
+          values: np.ndarray, time: tuple[float, float]) -> None:
     """`RawStream.take`. numbers: of the stream, (4, n); points: of `SetPoints`; bounds: (3, n) lower, upper, speed;
-    values: (k,) of the joints `index`."""
+    values: (k,) of the joints `index`; time: now and length of a tick [s]."""
+    time_s, dt = time
     stamp, earlier, velocity, velocity_stamp = numbers[0], numbers[1], numbers[2], numbers[3]
     target, goal, pace = points[2], points[6], points[7]
     for i, joint in enumerate(index):
@@ -76,4 +77,5 @@ class RawStream:
     def take(self, points: SetPoints, mode: np.ndarray, command: JointCommand, time_s: float) -> None:
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
         stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
-        _take(self._numbers, points.numbers, self._bounds, mode, command.index, command.values, time_s, self._dt)
+        _take(self._numbers, points.numbers, self._bounds, mode, command.index, command.values,
+              (time_s, self._dt))
