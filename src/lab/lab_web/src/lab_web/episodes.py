@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Demonstrations that pages record: a LeRobot data set of this lab, its recorder, and its list of episodes. No ROS: the
-recorder is a process of its own.
+recorder is a separate process.
 """
 from __future__ import annotations
 
