@@ -29,8 +29,9 @@ from .frames import (
 )
 
 #: Disturbances of actions: their size at most, as shares of a full shift or joint, and of a full turn; how much of it
-#: is left in the next; for so many actions they come or stay away.
-_NOISE, _TURN_NOISE, _LASTING, _STRETCH = 0.08, 0.02, 0.9, 10
+#: is left in the next; for so many actions they come or stay away; how much of the rest they come or go in one action,
+#: for drives do not follow what comes at once.
+_NOISE, _TURN_NOISE, _LASTING, _STRETCH, _COMING = 0.08, 0.02, 0.9, 10, 0.3
 #: Experts need much less; more is a try that failed.
 MAX_STEPS = 200
 #: A student acts for so many actions of an episode at most; then the expert ends it.
@@ -92,7 +93,7 @@ class Disturbance:
         sizes = [_TURN_NOISE if name[-2:] in ("rx", "ry", "rz") else _NOISE for name in names]
         moved = [name.startswith(sides) and "gripper" not in name for name in names]
         self._sizes = level * self._random.uniform() * np.array(sizes) * moved
-        self._now, self._count, self._is_on = np.zeros(len(names)), 0, False
+        self._now, self._count, self._is_on, self._share = np.zeros(len(names)), 0, False, 0.0
 
     def on(self, action: np.ndarray) -> np.ndarray:
         """The disturbed action."""
@@ -101,7 +102,8 @@ class Disturbance:
         self._count += 1
         fresh = self._random.standard_normal(len(self._now)) * self._sizes * np.sqrt(1.0 - _LASTING**2)
         self._now = _LASTING * self._now + fresh
-        return action + self._now if self._is_on else action
+        self._share += _COMING * (self._is_on - self._share)
+        return action + self._share * self._now
 
 
 def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any = None,

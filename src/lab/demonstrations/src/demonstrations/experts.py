@@ -21,15 +21,18 @@ CONTROL = "osc_pose"
 OPEN, CLOSED = -1.0, 1.0
 _STAYS = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, OPEN))
 #: Share of the remaining way of one action; drives follow with some lag, and more overshoots.
-_GAIN = 0.35
+_GAIN = 0.25
 #: Most of one action [m], [rad].
-_SPEED_M, _SPEED_RAD = 0.018, 0.08
+_SPEED_M, _SPEED_RAD = 0.016, 0.06
+#: So far from where it begins, a hand has the full speed [m]; there it has the least [m]. Without this its shoulder,
+#: which gains 0.5 rad/s in an action, would fall behind and then overshoot, and what is observed does not say which.
+_EASY_M, _MIN_M = 0.06, 0.004
 #: A hand is at its place when it is so near [m], [rad].
 _NEAR_M, _NEAR_RAD = 0.008, 0.06
 #: Hands come down, and carry, at this height above the place [m], and from this distance beside it they sink.
-_ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 3.0
-#: Above this height over its place a thing is carried freely [m].
-_FREE_M = 0.05
+_ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 2.0
+#: A thing is carried the more freely the higher it is, from the first to the second height over its place [m].
+_FREE_M = (0.01, 0.06)
 
 
 class Hand(NamedTuple):
@@ -74,6 +77,17 @@ def _funnel(beside):
     return min(max(_SLOPE * (beside - _BESIDE_M), 0.0), _ABOVE_M)
 
 
+def _risen(height):
+    """How freely a thing is carried at a height [m], 0 to 1."""
+    low, high = _FREE_M
+    return min(max((height - low) / (high - low), 0.0), 1.0)
+
+
+def _eased(way):
+    """Most of one action [m] of a hand that is `way` [m] from where it began."""
+    return min(_MIN_M + (_SPEED_M - _MIN_M) * way / _EASY_M, _SPEED_M)
+
+
 def _nearest(yaw, to, period):
     """The angle nearest to `to` that differs from `yaw` by multiples of `period`."""
     return yaw - period * round((yaw - to) / period)
@@ -108,10 +122,10 @@ class Expert:
         """{side: where it should go now} of the arms in MOVED."""
         raise NotImplementedError
 
-    @staticmethod
-    def _action(arm: Arm, hand: Hand):
+    def _action(self, arm: Arm, hand: Hand):
         pose = arm.pose
-        shift = _clipped(_GAIN * (hand.place - pose[:3, 3]), hand.speed * _SPEED_M)
+        most = _eased(float(np.linalg.norm(pose[:3, 3] - self._rest[arm.side][:3, 3])))
+        shift = _clipped(_GAIN * (hand.place - pose[:3, 3]), hand.speed * most)
         turn = _clipped(_GAIN * rotation_vector(hand.rotation @ pose[:3, :3].T), hand.speed * _SPEED_RAD)
         return np.array([*(shift / OSC_POSITION_M), *(turn / OSC_ROTATION_RAD), hand.grip])
 
@@ -158,9 +172,9 @@ class PickPlaceExpert(Expert):
         # What it holds hangs as it was taken.
         height, wanted = place[2] - goal[2], _funnel(left)
         to = hand + (goal - place) + (0.0, 0.0, wanted)
-        if height < min(_FREE_M, 0.8 * wanted):
-            to[:2] = hand[:2]  # first up
-        return {"left": Hand(to, rotation, CLOSED)}
+        if height < wanted:  # first up
+            to[:2] = hand[:2] + _risen(height) * (to[:2] - hand[:2])
+        return {"left": Hand(to, rotation, CLOSED, _eased(height) / _SPEED_M)}
 
 
 class TwoArmLiftExpert(Expert):
