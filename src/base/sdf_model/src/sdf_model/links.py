@@ -41,17 +41,16 @@ def read_link(document: Document, element: etree._Element, name: str, materials:
         link.decay = tuple(min(max(part, 0.0), 1.0) for part in said)
         if link.decay != said:
             document.mend(decay, "<velocity_decay> of %g and %g, of which parts from 0 to 1 are used" % said)
-    surfaces = []
     for child in element.iterchildren("collision"):
         shape = _shape(document, child, name)
         if shape is not None:
+            shape.surface = _surface(document, child)
             link.collisions.append(shape)
-            surfaces.append(_surface(document, child))
-    said = [surface for surface in surfaces if surface is not None]
+    said = [shape.surface for shape in link.collisions if shape.surface is not None]
     if said:
         link.surface = said[0]
-        if any(surface != said[0] for surface in said):
-            document.note(element, "surfaces of link '%s' that differ from its first" % name)
+        for shape in link.collisions:
+            shape.surface = None if shape.surface == said[0] else shape.surface or Surface()
     for child in element.iterchildren("visual"):
         shape = _shape(document, child, name)
         if shape is not None:

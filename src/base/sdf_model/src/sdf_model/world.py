@@ -10,6 +10,7 @@ import numpy as np
 from lxml import etree
 
 from urdf_model import Box, Link, OutOfBounds, Robot, Shape, bounds, read_file
+from urdf_model.model import is_true
 from urdf_model.transforms import pose_matrix
 
 from .document import Document, Notes, SdfError
@@ -74,7 +75,8 @@ class _WorldReader:
             document.note(child, "%s '%s'" % (child.tag, child.get("filename") or child.get("name", "")))
         if element.find("gravity") is not None:
             self._world.gravity = self._gravity(element)
-        for child in element.iterchildren("physics"):
+        profiles = list(element.iterchildren("physics"))
+        for child in [one for one in profiles if is_true(one.get("default"))][:1] or profiles[:1]:
             self._physics(child)
         for child in element.iterchildren("scene"):
             self._world.scene = read_scene(document, child)

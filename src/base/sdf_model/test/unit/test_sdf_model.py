@@ -442,6 +442,23 @@ def test_names_may_have_the_models_own_in_front():
     assert where(model.robot)["b"][:3, 3].tolist() == [1, 2, 0] and model.robot.joints["j"].parent == "a"
 
 
+def test_collisions_of_a_link_keep_their_surfaces():
+    shape = '<collision name="%s"><geometry><box><size>1 1 1</size></box></geometry>%s</collision>'
+    surface = "<surface><friction><ode><mu>%s</mu></ode></friction></surface>"
+    model = read('<link name="l">%s%s%s</link>' % (
+        shape % ("a", surface % 0.2), shape % ("b", ""), shape % ("c", surface % 0.2)))
+    body = merge_fixed(model.robot).links["l"]
+    assert body.surface.friction == 0.2 and [shape.name for shape in body.own_collisions()] == ["a", "c"]
+    (patch,) = body.patches
+    assert patch.surface.friction is None and [shape.name for shape in patch.collisions] == ["b"]
+
+
+@pytest.mark.parametrize("second, expected", [("", 0.004), (' default="true"', 0.002)])
+def test_of_several_physics_the_first_or_the_default_counts(tmp_path, second, expected):
+    profile = "<physics%s><max_step_size>%s</max_step_size></physics>"
+    assert world(tmp_path, profile % ("", 0.004) + profile % (second, 0.002)).time_step_s == expected
+
+
 def test_numbers_beyond_their_bounds_are_bounded(tmp_path):
     found = world(tmp_path, """<physics><max_step_size>0.1</max_step_size></physics>
 <model name="m"><link name="a"><collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry><surface>

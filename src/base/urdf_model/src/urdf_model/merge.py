@@ -24,13 +24,20 @@ class MergedFrame(NamedTuple):
     offset: np.ndarray
 
 
+class Patch(NamedTuple):
+    """Some of a body's collisions, with a surface of their own."""
+
+    surface: Surface
+    collisions: list[Shape]
+
+
 @dataclass
 class MergedLink:
     """A body: named after the link that its movable joint moves (or the root), with everything fixed to it.
 
     Its frame is that of its joint; the bodies of roots have the model's frame. In a URDF that is the frame of the link
-    that it is named after, but for loose ones. If its members have different surfaces, the first one counts.
-    ``weightless``: mass and centre of the members without weight, where others have it.
+    that it is named after, but for loose ones. ``surface`` is the first one that a member has, ``patches`` are the
+    collisions that have another. ``weightless``: mass and centre of the members without weight, where others have it.
     """
 
     name: str
@@ -43,6 +50,12 @@ class MergedLink:
     self_collide: bool = False
     decay: tuple[float, float] = (0.0, 0.0)
     weightless: Inertial | None = None
+    patches: list[Patch] = field(default_factory=list)
+
+    def own_collisions(self) -> list[Shape]:
+        """The collisions that have ``surface``."""
+        elsewhere = {id(shape) for patch in self.patches for shape in patch.collisions}
+        return [shape for shape in self.collisions if id(shape) not in elsewhere]
 
 
 @dataclass
@@ -127,12 +140,19 @@ def _merge_group(robot, body, members, frames, wholes):
             centre = rotation @ link.inertial.centre + offset[:3, 3]
             parts[name] = link.inertial.mass, centre, rotation @ link.inertial.inertia @ rotation.T
     merged.inertial = combine([*parts.values()])
-    said = next((name for name in members if robot.links[name].surface is not None), None)
-    if said is not None:
-        merged.surface = surface = robot.links[said].surface
-        if surface.direction is not None:
-            turned = frames[said].offset[:3, :3] @ surface.direction
-            merged.surface = replace(surface, direction=tuple(turned.tolist()))
+    said = [name for name in members if robot.links[name].surface is not None]
+    said.sort(key=lambda name: not robot.links[name].collisions)  # the first with shapes, if one has any
+    if said:
+        merged.surface = _turned(robot.links[said[0]].surface, frames[said[0]].offset)
+    for shape in merged.collisions:
+        surface = shape.surface or robot.links[shape.link].surface or Surface()
+        surface = _turned(surface, frames[shape.link].offset)
+        if not _alike(surface, merged.surface or Surface()):
+            same = next((patch for patch in merged.patches if _alike(patch.surface, surface)), None)
+            if same is None:
+                merged.patches.append(Patch(surface, [shape]))
+            else:
+                same.collisions.append(shape)
     # What holds for a whole link of Gazebo's, of which a body can have several.
     whole = {name: robot.links[wholes.get(name, name)] for name in members}
     floats = [name for name in members if not whole[name].gravity]
@@ -145,6 +165,20 @@ def _merge_group(robot, body, members, frames, wholes):
                                         weights=shares if sum(shares) > 0.0 else None).tolist())
     merged.self_collide = any(link.self_collide for link in whole.values())
     return merged
+
+
+def _turned(surface, offset):
+    """A Surface of a member at ``offset`` (4, 4) in its body, in the axes of that."""
+    if surface.direction is None:
+        return surface
+    return replace(surface, direction=tuple((offset[:3, :3] @ surface.direction).tolist()))
+
+
+def _alike(one, other):
+    """Whether two Surfaces are the same, with what Gazebo has where nothing is said."""
+    one, other = (replace(surface, friction=1.0 if surface.friction is None else surface.friction)
+                  for surface in (one, other))
+    return one == other
 
 
 def combine(parts: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Inertial:

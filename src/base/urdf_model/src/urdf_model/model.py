@@ -76,6 +76,7 @@ class Shape:
     colour: tuple[float, float, float, float] | None = None  # rgba, visuals only
     link: str = ""  # the link it was written in
     finish: Finish | None = None  # visuals only
+    surface: Surface | None = None  # collisions only, where it is another than the link's
 
 
 @dataclass

@@ -374,7 +374,7 @@ class _Reader:
         if element is None:
             return None
         try:
-            rgba = self.vector(element, "rgba", None, default=(0.5, 0.5, 0.5, 1.0))
+            rgba = self.vector(element, "rgba", None)
         except UrdfError as error:
             self.warnings.append("%s; the colour of material '%s' is left out" % (error, material))
             return None
@@ -399,6 +399,8 @@ class _Reader:
     def finish(self, element: etree._Element) -> Finish | None:
         """Return the Finish of a <material>, None where it has none."""
         texture, emission, gloss = (element.find(tag) for tag in ("texture", "emission", "gloss"))
+        if texture is not None and texture.get("filename") is None:
+            self.warn(texture, "<texture> of material '%s' has no filename" % element.get("name", ""))
         if texture is None and emission is None and gloss is None:
             return None
         none = Finish()
@@ -468,7 +470,7 @@ class _Reader:
 
     def parse_float(self, text: str, element: etree._Element, key: str) -> float:
         try:
-            value = float(text)
+            value = float(text.replace("_", "?"))  # 1_000 is a number for Python alone
         except ValueError:
             raise self.error(element, "%s='%s' is not a number" % (key, text)) from None
         if not math.isfinite(value):

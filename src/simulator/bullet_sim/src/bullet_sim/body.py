@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urdf_model import Inertial, bounds, gazebo_links
+from urdf_model import Inertial, Surface, bounds, gazebo_links
 from urdf_model.transforms import inverse
 
 from .builder import directed_bodies, inertial_frame, set_collision_filter
@@ -264,23 +265,25 @@ class Body:
         """
         total = np.zeros(3)
         index = self._link_index[self._frame(link).link]
-        body, local = self.parts.places[index]
-        points = pybullet.getContactPoints(bodyA=body, linkIndexA=local, physicsClientId=self._client)
-        for point in points or ():
-            total += point[9] * np.array(point[7])
+        for body, local in self.parts.all_places(index):
+            points = pybullet.getContactPoints(bodyA=body, linkIndexA=local, physicsClientId=self._client)
+            for point in points or ():
+                total += point[9] * np.array(point[7])
         return total
 
     def grip_firmly(self, link: str) -> None:
         """Make friction at a link's body hold without creeping: by default it creeps by 0.3 mm/s under load."""
         index = self._link_index[self._frame(link).link]
-        pybullet.changeDynamics(*self.parts.places[index], frictionAnchor=1, physicsClientId=self._client)
+        for place in self.parts.all_places(index):
+            pybullet.changeDynamics(*place, frictionAnchor=1, physicsClientId=self._client)
         self._firm.add(index)
 
     def soften(self, link: str, stiffness: float, damping: float) -> None:
         """Make the surface of a link's body yield in contacts: stiffness [N/m], damping [N s/m]."""
         index = self._link_index[self._frame(link).link]
-        pybullet.changeDynamics(*self.parts.places[index], contactStiffness=stiffness, contactDamping=damping,
-                                physicsClientId=self._client)
+        for place in self.parts.all_places(index):
+            pybullet.changeDynamics(*place, contactStiffness=stiffness, contactDamping=damping,
+                                    physicsClientId=self._client)
 
     def renew_contacts(self, link: str) -> None:
         """Forget the contacts of a link's body; the next step detects them again.
@@ -288,9 +291,10 @@ class Body:
         Bullet keeps contacts from step to step, and sometimes a false one: its normal comes from two nearly parallel
         edges, and it can hold a body that should come free.
         """
-        body = self._frame(link).link
-        set_collision_filter(self._client, self.parts.places[self._link_index[body]], self.merged.links[body].surface,
-                             renew=True)
+        link = self.merged.links[self._frame(link).link]
+        surfaces = link.surface, *(patch.surface for patch in link.patches)
+        for place, surface in zip(self.parts.all_places(self._link_index[link.name]), surfaces, strict=True):
+            set_collision_filter(self._client, place, surface, renew=True)
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
 
@@ -433,19 +437,28 @@ class Body:
             return
         if not self.blueprint.self_collision and len(self.parts.bodies) == 1:
             return
-        places = self.parts.places
         links = sorted(self._link_names)
         for i, a in enumerate(links):
             for b in links[i + 1 :]:
-                pybullet.setCollisionFilterPair(
-                    places[a].body, places[b].body, places[a].index, places[b].index, int((a, b) in wanted),
-                    physicsClientId=self._client
-                )
+                for one, other in itertools.product(self.parts.all_places(a), self.parts.all_places(b)):
+                    pybullet.setCollisionFilterPair(one.body, other.body, one.index, other.index, int((a, b) in wanted),
+                                                    physicsClientId=self._client)
+            own = self.parts.all_places(a)
+            for one, other in itertools.combinations(own, 2):
+                pybullet.setCollisionFilterPair(one.body, other.body, one.index, other.index, 0,
+                                                physicsClientId=self._client)
 
     def link_name(self, body: int, index: int) -> str:
         """Return the merged name of the link that PyBullet numbers ``index`` (-1 is the root) in the multibody
         ``body``."""
         return self._link_names[self.parts.index(body, index)]
+
+    def surface(self, body: int, index: int) -> Surface:
+        """The urdf_model.Surface of the link that PyBullet numbers ``index`` in the multibody ``body``."""
+        number = self.parts.index(body, index)
+        link = self.merged.links[self._link_names[number]]
+        place = self.parts.all_places(number).index((body, index)) if index >= 0 else 0
+        return (link.patches[place - 1].surface if place else link.surface) or Surface()
 
     def frame_of(self, motion: Motion) -> Pose:
         """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
@@ -455,8 +468,8 @@ class Body:
         """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
         pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
         self.set_self_collision_pairs([tuple(pair) for pair in pairs])
-        for index in self._firm:
-            pybullet.changeDynamics(*self.parts.places[index], frictionAnchor=1, physicsClientId=self._client)
+        for place in (place for index in self._firm for place in self.parts.all_places(index)):
+            pybullet.changeDynamics(*place, frictionAnchor=1, physicsClientId=self._client)
 
     # -- inside -------------------------------------------------------------------------------------------------
 

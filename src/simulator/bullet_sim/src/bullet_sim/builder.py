@@ -17,7 +17,7 @@ from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .directions import directed, is_off, scales, turned
 from .mass_matrix import moving_inertial
-from .parts import Parts, Place, limbs
+from .parts import Parts, Place, limbs, patches
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE
@@ -25,7 +25,7 @@ from .shapes import NO_SHAPE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from urdf_model import Joint, MergedLink, Shape
+    from urdf_model import Joint, MergedLink, Patch, Shape
 
     from .parts import Limb
     from .shapes import ShapeStore
@@ -50,6 +50,8 @@ _TREAD_PART, _ALONG = 0.05, 0.9999
 # A body that is slower than this for 2 s falls asleep: the square of its speed [m/s] plus that of its turn rate
 # [rad/s], here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
 _ASLEEP_M2_PER_S2 = 1e-6
+# Mass of a link that only has a patch's shapes.
+_PATCH_KG = 1e-9
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8
 # An overlap of up to this is corrected no faster than the surfaces' max_vel [m]; below the lowest speed [m/s] nothing
@@ -117,7 +119,8 @@ def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose,
     # The first has the root's shape.
     root_shape = shapes.compound(link_collisions(merged, root.name, static), static, blueprint.mesh_cuts)
     root_shapes = [root_shape] + [NO_SHAPE] * (len(own) - 1)
-    bodies = [_build_limb(client, blueprint, limb, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
+    bodies = [_build_limb(client, blueprint, limb, {**base, "baseCollisionShapeIndex": shape},
+                          patches(merged, limb, limb is own[0]), shapes, warn)
               for limb, shape in zip(own, root_shapes, strict=True)]
     if not static:
         pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
@@ -127,9 +130,9 @@ def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose,
     return bodies, root_offset
 
 
-def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, Any], shapes: ShapeStore,
-                warn: Callable[[str], None]) -> int:
-    """Create the multibody of a Limb; ``base``: createMultiBody's arguments for the root.
+def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, Any],
+                further: list[tuple[str, Patch]], shapes: ShapeStore, warn: Callable[[str], None]) -> int:
+    """Create the multibody of a Limb; ``base``: createMultiBody's arguments for the root, ``further``: its patches.
 
     Returns PyBullet's number of it.
     """
@@ -156,6 +159,8 @@ def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, A
         columns["linkJointTypes"].append(_JOINT_TYPES[joint.type])
         columns["linkJointAxis"].append(joint.axis.tolist())
     columns["linkParentIndices"] = [order[parent] for parent in columns["linkParentIndices"]]
+    by_child = {joint.child: joint for joint in joints}
+    axes_of = [_add_patch(columns, order[name], patch, shapes, blueprint, name) for name, patch in further]
 
     body = pybullet.createMultiBody(**base, **columns, physicsClientId=client)
     # PyBullet has air drag by default; a URDF has none. The inertia goes in a separate call: given
@@ -178,14 +183,38 @@ def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, A
         pybullet.changeDynamics(body, local, **_contact(surface, most_friction(joint), turns[local]),
                                 physicsClientId=client)
         set_collision_filter(client, Place(body, local), surface)
+    for local, ((name, patch), axes) in enumerate(zip(further, axes_of, strict=True), len(limb.joints)):
+        pybullet.changeDynamics(body, local, **calm)
+        pybullet.changeDynamics(body, local, **_contact(patch.surface, most_friction(by_child.get(name)), axes),
+                                physicsClientId=client)
+        set_collision_filter(client, Place(body, local), patch.surface)
     return body
 
 
-def link_collisions(merged: MergedRobot, name: str, static: bool) -> list[Shape]:
+def _add_patch(columns: dict[str, list], parent: int, patch: Patch, shapes: ShapeStore, blueprint: Blueprint,
+               name: str) -> np.ndarray:
+    """Add a Patch of body ``name`` to createMultiBody's ``columns``. Returns the axes (3, 3) of its inertial frame,
+    which are those of its friction."""
+    merged = blueprint.merged
+    static = blueprint.static and name == merged.root
+    axes = np.eye(3)
+    if patch.surface.direction is not None:
+        axes = turned(np.ones(3), axes, patch.surface.direction)[1]
+    shape = shapes.compound(link_collisions(merged, name, static, patch.collisions), static, blueprint.mesh_cuts,
+                            exact=any(joint.child == name and is_wheel(joint) for joint in merged.joints.values()))
+    row = (_PATCH_KG, shape, NO_SHAPE, [0.0] * 3, [0.0, 0.0, 0.0, 1.0], [0.0] * 3,
+           quaternion_from_matrix(rigid(axes, (0.0, 0.0, 0.0))).tolist(), parent, pybullet.JOINT_FIXED, [0.0, 0.0, 1.0])
+    for key, value in zip(_COLUMNS, row, strict=True):
+        columns[key].append(value)
+    return axes
+
+
+def link_collisions(merged: MergedRobot, name: str, static: bool, shapes: list[Shape] | None = None) -> list[Shape]:
     """Return the collision shapes (urdf_model.Shape) of a link of ``merged`` as they are built: the places where
-    wheels and casters touch the floor are determined. ``static``: whether the root is fixed.
+    wheels and casters touch the floor are determined. ``static``: whether the root is fixed; ``shapes``: those of one
+    of its patches, by default all others.
     """
-    shapes = merged.links[name].collisions
+    shapes = merged.links[name].own_collisions() if shapes is None else shapes
     if name in merged.roots:
         wheels = [joint for joint in merged.joints.values() if joint.parent == name and is_wheel(joint)]
         return shapes if static or len(wheels) < 2 else [_as_caster(shape) for shape in shapes]
@@ -235,7 +264,8 @@ def directed_bodies(merged: MergedRobot) -> frozenset[str]:
     """The bodies of a urdf_model.MergedRobot whose friction depends on the direction."""
     by_child = {joint.child: joint for joint in merged.joints.values()}
     return frozenset(link.name for link in merged.links.values()
-                     if directed(link.surface, most_friction(by_child.get(link.name))) is not None)
+                     if any(directed(surface, most_friction(by_child.get(link.name))) is not None
+                            for surface in (link.surface, *(patch.surface for patch in link.patches))))
 
 
 def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def _deepest(client: int, model: Model, body: int, others: Iterable[Model], weig
     depth, way = 0.0, None
     for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
         for point in pybullet.getClosestPoints(body, obstacle, -_MIN_M, physicsClientId=client) or ():
-            surfaces = _surface(model, body, point[3]), _surface(owner, obstacle, point[4])
+            surfaces = model.surface(body, point[3]), owner.surface(obstacle, point[4])
             if -point[8] > max(depth, _allowed(weight, surfaces)) and _bits(surfaces[0]) & _bits(surfaces[1]):
                 # The normal points to the first body.
                 depth = -point[8]
@@ -74,11 +74,6 @@ def _allowed(weight: float, surfaces: Iterable[Surface]) -> float:
     if softest is None:
         return _ALLOWED_M
     return min(max(weight / softest, _MIN_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
-
-
-def _surface(model: Model, body: int, index: int) -> Surface:
-    """The Surface of the link that PyBullet numbers ``index`` in the multibody ``body`` of ``model``."""
-    return model.merged.links[model.link_name(body, index)].surface or Surface()
 
 
 def _bits(surface: Surface) -> int:

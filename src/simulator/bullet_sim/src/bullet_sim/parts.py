@@ -16,7 +16,7 @@ from .quiet_pybullet import pybullet
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from urdf_model import MergedRobot
+    from urdf_model import MergedRobot, Patch
 
 # A limb with fewer joints joins another one: a multibody costs something, too.
 _MIN_JOINTS = 4
@@ -86,6 +86,14 @@ def _limbs_on_root(merged: MergedRobot, tree: list[int]) -> list[list[int]]:
     return [sorted(limb + small) if limb is least else limb for limb in large]
 
 
+def patches(merged: MergedRobot, limb: Limb, with_root: bool) -> list[tuple[str, Patch]]:
+    """[(body, its urdf_model Patch)] of a Limb: further links of its multibody, fixed to those of the joints and behind
+    them. ``with_root``: with those of the root."""
+    joints = list(merged.joints.values())
+    bodies = [limb.root] * with_root + [joints[number].child for number in limb.joints]
+    return [(body, patch) for body in bodies for patch in merged.links[body].patches]
+
+
 class Parts:
     """Reads and commands the joints of several multibodies as those of one."""
 
@@ -109,11 +117,23 @@ class Parts:
         if in_turn != sorted(in_turn):
             self._order = sorted(range(len(in_turn)), key=in_turn.__getitem__)
         self._indices = {place: index for index, place in self.places.items()}
+        #: {index: the Places of its patches, in their order}
+        self.patches = {}
+        seen = set()
+        for body, limb in zip(self.bodies, found, strict=True):
+            for further, (name, _) in enumerate(patches(merged, limb, limb.root not in seen), len(limb.joints)):
+                self.patches.setdefault(indices[name], []).append(Place(body, further))
+                self._indices[body, further] = indices[name]
+            seen.add(limb.root)
         self._shares = {}
 
     def index(self, body: int, local: int) -> int:
         """The model's index of the link that PyBullet has as ``local`` of ``body``."""
         return self._roots[body] if local == -1 else self._indices[body, local]
+
+    def all_places(self, index: int) -> tuple[Place, ...]:
+        """The Place of a link and those of its patches."""
+        return (self.places[index], *self.patches.get(index, ()))
 
     def joint_states(self) -> Sequence[tuple]:
         """PyBullet's states of all joints, in the order of the model."""

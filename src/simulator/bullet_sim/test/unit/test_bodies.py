@@ -143,7 +143,7 @@ def test_a_part_of_a_body_without_weight_is_not_pulled(world):
     assert body.has_weight("a")
     step(world, 50)
     time_s = 50 * world.time_step_s
-    linear, angular = (0.5 * (one + other) for one, other in zip(body.link_twist("a"), body.link_twist("b"), strict=True))
+    linear, angular = np.mean([body.link_twist(link) for link in "ab"], axis=0)
     assert linear[2] == pytest.approx(world.gravity[2] / 2.0 * time_s, rel=0.01)
     assert angular[1] == pytest.approx(world.gravity[2] * 0.5 / 0.52 * time_s, rel=0.02)
 
@@ -330,3 +330,29 @@ def test_links_collide_where_they_share_a_bit(world, upper, lower, lands):
     falling.renew_contacts("box")
     step(world, 200)
     assert (falling.base_pose().position[2] > 0.09) is lands
+
+
+# Two feet at the ends of a plank, fixed to it, of which each may have a block: friction of the whole, in weights.
+@pytest.mark.parametrize("first, second, expected", [
+    ("<mu1>0.6</mu1>", "<mu1>0</mu1>", 0.3), ("<mu1>0</mu1>", "<mu1>0.6</mu1>", 0.3), ("", "<mu1>0.2</mu1>", 0.6),
+    ("<mu1>0.4</mu1>", "<mu1>0.4</mu1>", 0.4),
+    ("<mu1>0.2</mu1>", "<mu1>0.8</mu1><mu2>0.5</mu2><fdir1>0 1 0</fdir1>", 0.5)])
+@pytest.mark.parametrize("jointed", [False, True])
+def test_links_that_are_fixed_to_each_other_keep_their_surfaces(world, first, second, expected, jointed):
+    world.add_ground_plane()
+    inertial = '<inertial><mass value="%g"/><inertia ixx="%g" iyy="%g" izz="%g"/></inertial>'
+    feet = "".join(
+        '<link name="{0}"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
+        '<joint name="to_{0}" type="fixed"><parent link="plank"/><child link="{0}"/><origin xyz="{1} 0 0"/></joint>'
+        '<gazebo reference="{0}">{2}</gazebo>'.format(*foot) for foot in (("a", -1, first), ("b", 1, second)))
+    mast = ('<link name="mast">%s</link><joint name="turn" type="continuous"><parent link="plank"/><child link="mast"/>'
+            '<axis xyz="0 0 1"/></joint>' % (inertial % (0.01, 1e-4, 1e-4, 1e-4)) if jointed else "")
+    plank = world.spawn(parse_urdf('<robot name="r"><link name="plank">%s</link>%s%s</robot>' % (
+        inertial % (4.0, 1.0, 1.0, 99.0), feet, mast)), "plank", Pose((0, 0, 0.05)))
+    step(world, 200)
+    plank.set_base_twist((0, 2, 0), (0, 0, 0))
+    step(world, 100)
+    lost = 2.0 - np.mean([plank.link_twist(link)[0][1] for link in "ab"])
+    assert lost == pytest.approx(-expected * world.gravity[2] * 100 * world.time_step_s, rel=0.1)
+    contacts = world.contacts()
+    assert {touch.link_a if touch.model_a == "plank" else touch.link_b for touch in contacts} == {"plank"}
