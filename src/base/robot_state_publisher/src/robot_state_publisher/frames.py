@@ -108,7 +108,7 @@ class _Group:
         turn *= np.copysign(1.0, turn[self._each, leading])[:, None]
         poses = np.hstack([self._start + self._along * values[:, None], turn]).tolist()
         stamp = (0, *divmod(time_ns, 10**9))
-        fields = [len(poses)]
+        fields: list[int | float | bytes] = [len(poses)]
         for texts, pose in zip(self._texts, poses, strict=True):
             fields += stamp
             fields += texts

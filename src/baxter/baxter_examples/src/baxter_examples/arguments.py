@@ -39,7 +39,7 @@ def add_component(parser: argparse.ArgumentParser, default: str) -> None:
 
 def component(arguments: argparse.Namespace) -> str:
     """Return the channel that -c or the parameter ~component_id names; call it as an initialised node."""
-    return rospy.get_param("~component_id", arguments.component)
+    return str(rospy.get_param("~component_id", arguments.component))
 
 
 def parse(parser: argparse.ArgumentParser) -> argparse.Namespace:

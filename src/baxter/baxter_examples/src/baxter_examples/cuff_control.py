@@ -55,8 +55,10 @@ class CuffControl:
 
     def _on_cuff(self, squeezed) -> None:
         self._say("%s cuff: %s" % (self._side, "squeezed" if squeezed else "let go"))
-        if self._navigator:
-            self._asked.put(lambda: self._light(squeezed))
+        navigator = self._navigator
+        if navigator:
+            self._asked.put(lambda: _light(navigator, squeezed))
 
-    def _light(self, on) -> None:
-        self._navigator.inner_led = self._navigator.outer_led = on
+
+def _light(navigator: Navigator, on: bool) -> None:
+    navigator.inner_led = navigator.outer_led = on

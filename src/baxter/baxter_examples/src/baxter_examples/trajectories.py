@@ -29,6 +29,8 @@ class TrajectoryClient(ActionClient):
         """Begin a new trajectory."""
         self._goal = FollowJointTrajectoryGoal()
         self._goal.trajectory.joint_names = limb_joint_names(self._side)
+        self._points: list[JointTrajectoryPoint] = []
+        self._goal.trajectory.points = self._points
 
     def set_goal_time(self, goal_time_s: float) -> None:
         """Set the time that the arm may take to arrive after the last point [s]."""
@@ -36,7 +38,7 @@ class TrajectoryClient(ActionClient):
 
     def add(self, time_s: float, angles: Sequence[float]) -> None:
         """Add a point `time_s` after the start: angles [rad] from shoulder to wrist."""
-        self._goal.trajectory.points.append(JointTrajectoryPoint(
+        self._points.append(JointTrajectoryPoint(
             positions=list(angles), time_from_start=rospy.Duration.from_sec(time_s)))
 
     def send(self) -> None:

@@ -6,6 +6,7 @@ Linux drivers number them. For sticks, left and up are positive.
 """
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -45,8 +46,8 @@ class Stick:
 class Controller:
     """Controls by their names."""
 
-    buttons: dict[str, Button | AxisButton]
-    sticks: dict[str, Stick]
+    buttons: Mapping[str, Button | AxisButton]
+    sticks: Mapping[str, Stick]
 
 
 def _buttons(**indices: int) -> dict[str, Button]:

@@ -10,7 +10,7 @@ from sensor_msgs.msg import Joy
 
 from command_line.options import counted
 
-from .controls import CONTROLLERS, ButtonEvents, StickEvents
+from .controls import CONTROLLERS, ButtonEvents, Controller, StickEvents
 
 
 class Joystick:
@@ -22,10 +22,10 @@ class Joystick:
     rightStickVert; left and up are positive. Other names raise KeyError.
     """
 
-    CONTROLLER = None
+    CONTROLLER: Controller
 
     def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.1) -> None:
-        if self.CONTROLLER is None:
+        if not hasattr(self, "CONTROLLER"):
             raise TypeError("a Joystick is one of XboxController, LogitechController and PS3Controller")
         self._lock = threading.Lock()
         self._buttons = {name: ButtonEvents() for name in self.CONTROLLER.buttons}
@@ -66,10 +66,10 @@ class Joystick:
     def _on_joy(self, message: Any) -> None:
         with self._lock:
             try:
-                for controls, events in ((self.CONTROLLER.buttons, self._buttons),
-                                         (self.CONTROLLER.sticks, self._sticks)):
-                    for name, control in controls.items():
-                        events[name].update(control.read(message.axes, message.buttons))
+                for name, button in self.CONTROLLER.buttons.items():
+                    self._buttons[name].update(button.read(message.axes, message.buttons))
+                for name, stick in self.CONTROLLER.sticks.items():
+                    self._sticks[name].update(stick.read(message.axes, message.buttons))
             except IndexError:
                 rospy.logwarn_throttle(5.0, "/joy has %s and %s, which does not fit %s: is another "
                                             "controller plugged in?"

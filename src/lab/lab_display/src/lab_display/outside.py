@@ -66,7 +66,7 @@ class Outside(WorldFollower):
         if target is None or eye is None:
             outside, target = overview(*extent(self.mirror), width / height, FIELD_OF_VIEW_RAD, target)
             eye = outside if eye is None else eye
-        pose = looking_at(eye, target)
+        pose = looking_at(np.asarray(eye, dtype=float), np.asarray(target, dtype=float))
         pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, 0.05, 100.0)
         if self._renderer is None:
             self._renderer, _ = best_renderer(still=True)

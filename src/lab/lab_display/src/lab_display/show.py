@@ -65,7 +65,7 @@ def picture(eye: Sequence[float] | None = None, target: Sequence[float] | None =
         if root_pose is None:
             raise ShowError("the world has no model whose root is '%s'" % root)
         with _transforms() as buffer:
-            placed = {name: root_pose @ _look_up(buffer, root, name) for name in frames}
+            placed = {name: root_pose @ _transform(buffer, root, name) for name in frames}
     return Picture.of_array(view.look(*size, eye, target, placed, length))
 
 
@@ -135,7 +135,8 @@ def robot(parameter: str = "robot_description") -> Robot:
     """The `urdf_model.Robot` on the parameter server."""
     try:
         # rospy.get_param uses a cache, which would be stale after a new simulator.
-        return parse_urdf(rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(parameter)), source=parameter)
+        text = rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(parameter))
+        return parse_urdf(str(text), source=parameter)
     except rosgraph.MasterError as error:
         raise ShowError("the parameter %s is not set: is a robot running?" % parameter) from error
 
@@ -163,7 +164,7 @@ def tf_tree(below: str | None = None) -> Tree:
 def matrix(target: str, source: str) -> FrameMatrix:
     """The pose of frame `source` in frame `target`, as a FrameMatrix: print it, or use it as a (4, 4) array."""
     with _transforms() as buffer:
-        return FrameMatrix(target, source, _look_up(buffer, target, source))
+        return FrameMatrix(target, source, _transform(buffer, target, source))
 
 
 @contextlib.contextmanager
@@ -182,7 +183,7 @@ def _frames(buffer: tf2_ros.Buffer) -> dict[str, str]:
     return {line[1]: line[5] for line in words if len(line) == 6 and line[5] != "NO_PARENT"}
 
 
-def _look_up(buffer: tf2_ros.Buffer, target: str, source: str) -> np.ndarray:
+def _transform(buffer: tf2_ros.Buffer, target: str, source: str) -> np.ndarray:
     def known() -> bool:
         return bool(buffer.can_transform_core(target, source, rospy.Time())[0])
 

@@ -132,7 +132,8 @@ def show_window(options: argparse.Namespace) -> None:
     for argument in options.topics:
         window.add(argument)
     window.show()
-    end_timer = QtCore.QTimer(interval=END_POLL_MS)
+    end_timer = QtCore.QTimer()
+    end_timer.setInterval(END_POLL_MS)
     end_timer.timeout.connect(lambda: application.quit() if is_over else None)
     end_timer.start()
     application.exec_()

@@ -87,7 +87,8 @@ def curves(topic: str, tokens: Sequence[str], type_name: str, fields_of: Callabl
         fields = _fields(here, fields_of)
         if not fields:
             raise PlotError("%s is one %s and has no field '%s'" % (label, here, token))
-        name, index = _TOKEN.fullmatch(token).groups()
+        match = _TOKEN.fullmatch(token)
+        name, index = match.groups() if match else (token, None)
         if name not in fields:
             raise PlotError("%s (%s) has no field '%s'; it has %s" % (label, here, name, _listing(fields)))
         label += "/" + token

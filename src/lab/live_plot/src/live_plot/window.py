@@ -25,7 +25,8 @@ class PlotWindow(QtWidgets.QWidget):
     A path whose topic does not exist yet is tried again every second.
     """
 
-    problem = QtCore.Signal(str)  # may be emitted from any thread
+    # May be emitted from any thread.
+    problem = QtCore.Signal(str)  # pyright: ignore[reportAttributeAccessIssue]  (pyqtgraph's name for it)
 
     def __init__(self, recording: Recording, subscribe: Callable[[str], list[str]], unsubscribe: Callable[[str], None],
                  span_s: float) -> None:
@@ -36,18 +37,23 @@ class PlotWindow(QtWidgets.QWidget):
         self.setWindowTitle("plot")
         self.resize(900, 600)
 
-        self._entry = QtWidgets.QLineEdit(placeholderText="/topic/field[0]")
-        self._autoscroll = QtWidgets.QCheckBox("autoscroll", checked=True)
+        self._entry = QtWidgets.QLineEdit()
+        self._entry.setPlaceholderText("/topic/field[0]")
+        self._autoscroll = QtWidgets.QCheckBox("autoscroll")
+        self._autoscroll.setChecked(True)
         self.pause = QtWidgets.QCheckBox("pause")
         self._remove_menu = QtWidgets.QMenu(self)
-        add, remove, clear = (QtWidgets.QToolButton(text=text) for text in ("+", "−", "clear"))
+        add, remove, clear = (QtWidgets.QToolButton() for _ in range(3))
+        for button, text in ((add, "+"), (remove, "−"), (clear, "clear")):
+            button.setText(text)
         remove.setMenu(self._remove_menu)
         remove.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
         row = QtWidgets.QHBoxLayout()
         for item in (QtWidgets.QLabel("Topic"), self._entry, add, remove, self._autoscroll, self.pause, clear):
             row.addWidget(item)
         self._graph = Graph()
-        self._status = QtWidgets.QLabel(wordWrap=True)
+        self._status = QtWidgets.QLabel()
+        self._status.setWordWrap(True)
         layout = QtWidgets.QVBoxLayout(self)
         layout.addLayout(row)
         layout.addWidget(self._graph, stretch=1)
@@ -59,12 +65,11 @@ class PlotWindow(QtWidgets.QWidget):
         clear.clicked.connect(recording.clear)
         self._autoscroll.toggled.connect(lambda on: on or self._graph.enableAutoRange())
         self.problem.connect(self._status.setText)
-        self._redraw_timer = QtCore.QTimer(self, interval=REDRAW_MS)
+        self._redraw_timer, self._retry_timer = QtCore.QTimer(self), QtCore.QTimer(self)
         self._redraw_timer.timeout.connect(self._redraw)
-        self._retry_timer = QtCore.QTimer(self, interval=RETRY_MS)
-        self._retry_timer.timeout.connect(self._retry)
-        for timer in (self._redraw_timer, self._retry_timer):
-            timer.start()
+        self._retry_timer.timeout.connect(self._retry_all)
+        self._redraw_timer.start(REDRAW_MS)
+        self._retry_timer.start(RETRY_MS)
 
     def add(self, argument: str) -> bool:
         """Add the curves of a command line argument. Return whether it succeeded; if not, the window shows why."""
@@ -78,6 +83,9 @@ class PlotWindow(QtWidgets.QWidget):
     def _add_entry(self) -> None:
         if self._entry.text() and self.add(self._entry.text()):
             self._entry.clear()
+
+    def _retry_all(self) -> None:
+        self._retry()
 
     def _retry(self) -> bool:
         if not self._waiting:
@@ -103,7 +111,11 @@ class PlotWindow(QtWidgets.QWidget):
         if self._waiting:
             self._remove_menu.addAction("the topics that are waited for", self._waiting.clear)
         if len(labels) > 1:
-            self._remove_menu.addAction("all", lambda: [self._unsubscribe(label) for label in labels])
+            self._remove_menu.addAction("all", self._remove_all)
+
+    def _remove_all(self) -> None:
+        for label in self._recording.labels:
+            self._unsubscribe(label)
 
     def _redraw(self) -> None:
         if self.pause.isChecked():

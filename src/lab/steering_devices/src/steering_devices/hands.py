@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -24,6 +24,15 @@ MARK_TOPIC = "/steering/mark"
 _MAX_STOPS = 5
 
 
+def _param(name: str, default: Any) -> Any:
+    """A parameter; rospy has no types."""
+    return rospy.get_param(name, default)
+
+
+def _cached(name: str, default: Any) -> Any:
+    return rospy.get_param_cached(name, default)
+
+
 class Hand:
     """One servo and its gripper. name: of the servo's node; reason: why it holds back, "" if it does not."""
 
@@ -31,7 +40,7 @@ class Hand:
         self.name, self.reason, self.status = name, "", 0
         # A device may be started before the servo whose parameters these are.
         #: What 1 means, of a twist's two halves [m/s, rad/s].
-        self.speeds = float(rospy.get_param("~linear_speed", 0.2)), float(rospy.get_param("~angular_speed", 0.6))
+        self.speeds = float(_param("~linear_speed", 0.2)), float(_param("~angular_speed", 0.6))
         self._stops, self._gripper_name, self._gripper, self._gripping = _MAX_STOPS, gripper, None, threading.Lock()
         self._twists = rospy.Publisher(name + "/delta_twist_cmds", TwistStamped, queue_size=1, tcp_nodelay=True)
         self._jogs = rospy.Publisher(name + "/delta_joint_cmds", JointJog, queue_size=1, tcp_nodelay=True)
@@ -62,10 +71,10 @@ class Hand:
             return
         else:
             self._stops += 1
-        speeds = (1.0, 1.0) if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS else self.speeds
+        speeds = (1.0, 1.0) if _cached(self.name + "/command_in_type", "") == UNITLESS else self.speeds
         message = TwistStamped()
         message.header.stamp = rospy.Time.now()
-        message.header.frame_id = rospy.get_param_cached(self.name + "/ee_frame_name", "") if in_tool else ""
+        message.header.frame_id = _cached(self.name + "/ee_frame_name", "") if in_tool else ""
         values = (twist * np.repeat(speeds, 3)).tolist()
         (message.twist.linear.x, message.twist.linear.y, message.twist.linear.z, message.twist.angular.x,
          message.twist.angular.y, message.twist.angular.z) = values
@@ -74,8 +83,8 @@ class Hand:
     def jog(self, velocities: dict[str, float]) -> None:
         """Send {joint: velocity [rad/s]}; all zero: the joints come to rest."""
         scale = 1.0
-        if rospy.get_param_cached(self.name + "/command_in_type", "") == UNITLESS:
-            scale = rospy.get_param_cached(self.name + "/scale/joint", 1.0)
+        if _cached(self.name + "/command_in_type", "") == UNITLESS:
+            scale = float(_cached(self.name + "/scale/joint", 1.0))
         message = JointJog(joint_names=list(velocities), velocities=[value / scale for value in velocities.values()])
         message.header.stamp = rospy.Time.now()
         self._jogs.publish(message)
@@ -101,9 +110,9 @@ class Hands:
     """All hands of a device. Parameters: ~servos, names of servos' nodes; ~grippers, of each Baxter's side or ""."""
 
     def __init__(self) -> None:
-        names = rospy.get_param("~servos", ["servo_server"])
+        names = _param("~servos", ["servo_server"])
         names = names.split() if isinstance(names, str) else list(names)
-        grippers = rospy.get_param("~grippers", [])
+        grippers = _param("~grippers", [])
         grippers = grippers.split() if isinstance(grippers, str) else list(grippers)
         grippers += [""] * (len(names) - len(grippers))
         self.hands = [Hand(rospy.resolve_name(name), gripper) for name, gripper in zip(names, grippers, strict=False)]

@@ -35,7 +35,7 @@ class Leader:
     def __init__(self) -> None:
         self.position: dict[str, float] = {}
         self._heard = -np.inf
-        self._down: dict[str, Any] = {}
+        self._down: dict[tuple[str, str], bool] = {}
         self._presses: list[tuple[str, str]] = []
 
     def take(self, topic: str, message: Mapping[str, Any], now: float) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What hands on a keyboard or a gamepad mean: a twist while something is held, the gripper, marks. Free of ROS."""
+"""The meaning of hands on a keyboard or a gamepad: a twist while something is held, the gripper, marks. Free of ROS."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -32,8 +32,8 @@ class LayoutError(ValueError):
 
 @dataclass
 class Steering:
-    """What is wanted now: twist (6,), -1 to 1; in the tool's axes or the base's; of which hand. gripper, mark: "" or
-    what was pressed since the last look."""
+    """The motion that is wanted now: twist (6,), -1 to 1; in the tool's axes or the base's; of which hand. gripper,
+    mark: "" or what was pressed since the last look."""
 
     twist: np.ndarray = field(default_factory=lambda: np.zeros(6))
     hand: int = 0
@@ -100,7 +100,7 @@ class Gamepad:
     hold: button, open, close, hand, tool, success, failure, again: buttons, dead_zone: of the axes}. Nothing moves
     unless ``hold`` is held; where it is "none", as of a cap that returns to its middle, what is let go is at rest."""
 
-    def __init__(self, layout: dict[str, Any], hands: int = 1) -> None:
+    def __init__(self, layout: object, hands: int = 1) -> None:
         """Raises LayoutError."""
         self.hands = hands
         self._motions, self._buttons = {}, {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What this process's ports have met: the amendments of all kinds of ports count here."""
+"""Counts of what this process's ports have met: the amendments of all kinds of ports count here."""
 import rospy
 
 from rospy_fixes.ports.event_log import EventLog

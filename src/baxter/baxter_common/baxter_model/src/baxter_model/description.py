@@ -44,8 +44,9 @@ def finger_openings(robot: Robot) -> dict[str, float]:
     """{finger joint: position [m] at which the gripper is open}: the limit that is away from zero."""
     openings = {}
     for joint in robot.movable_joints():
-        if joint.name.endswith("_finger_joint") and joint.type == "prismatic":
-            lower, upper = joint.limit.lower, joint.limit.upper
+        lower, upper = joint.limit.lower, joint.limit.upper
+        if (joint.name.endswith("_finger_joint") and joint.type == "prismatic"
+                and lower is not None and upper is not None):
             openings[joint.name] = upper if abs(upper) > abs(lower) else lower
     return openings
 

@@ -50,5 +50,7 @@ def physical_robot() -> Interface:
 
     with open(pathlib.Path(__file__).with_name("interface.yaml"), encoding="utf-8") as stream:
         table = yaml.safe_load(stream)
-    return Interface(*(both_sides(table[kind]) for kind in ("published", "listened", "services", "parameters")),
-                     tuple(table["frames"]), tuple(table["types_not_public"]))
+    published, listened, services, parameters = (
+        both_sides(table[kind]) for kind in ("published", "listened", "services", "parameters"))
+    return Interface(published, listened, services, parameters, tuple(table["frames"]),
+                     tuple(table["types_not_public"]))

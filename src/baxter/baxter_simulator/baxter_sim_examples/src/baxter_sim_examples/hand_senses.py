@@ -51,7 +51,7 @@ class Eyes:
 
     def pose(self, frame: str, stamp: rospy.Time) -> np.ndarray:
         """The pose (4, 4) of a frame in `base` at a time (rospy.Time)."""
-        transform = self._buffer.lookup_transform(BASE, frame, stamp, rospy.Duration(TIMEOUT_S)).transform
+        transform = self._buffer.lookup_transform(BASE, frame, stamp, rospy.Duration.from_sec(TIMEOUT_S)).transform
         turn, place = transform.rotation, transform.translation
         return rigid(matrix_from_quaternion((turn.x, turn.y, turn.z, turn.w)), (place.x, place.y, place.z))
 

@@ -57,7 +57,7 @@ def tagged_urdf(name: str, size: tuple[float, float, float], number: int, mass_k
 
 def tagged_block_urdf(mass_kg: float, friction: float) -> str:
     """URDF text of the block to pick, with tag :data:`BLOCK_TAG` on its upper face."""
-    return tagged_urdf("block", (BLOCK_SIZE_M,) * 3, BLOCK_TAG, mass_kg, friction)
+    return tagged_urdf("block", (BLOCK_SIZE_M, BLOCK_SIZE_M, BLOCK_SIZE_M), BLOCK_TAG, mass_kg, friction)
 
 
 def _rectangles(cells):

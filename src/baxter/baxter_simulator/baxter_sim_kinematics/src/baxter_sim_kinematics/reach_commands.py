@@ -205,8 +205,11 @@ def reach_place() -> int:
 
 def _place(options: argparse.Namespace) -> int:
     found = ReachMap.read(options.map)
-    poses = (_task_poses(options.poses) if options.poses
-             else table_poses(*options.table, options.step, found.rotations))
+    if options.poses:
+        poses = _task_poses(options.poses)
+    else:
+        width_m, depth_m = options.table
+        poses = table_poses(width_m, depth_m, options.step, found.rotations)
     region = Region(tuple(options.region[0::2]), tuple(options.region[1::2]), options.step,
                     tuple(np.radians(options.yaws)))
     places = best_places(found, poses, region, options.most)

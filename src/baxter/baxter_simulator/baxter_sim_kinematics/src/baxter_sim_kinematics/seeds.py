@@ -70,7 +70,7 @@ class SeedPolicy:
         other diagnosis concerns the pose and holds for every seed. Appends remarks for the caller to ``remarks``.
         Raises NoSolution of the last search, InvalidSeed.
         """
-        failure = None
+        failure: NoSolution | None = None
         for mode in _TRIED[request.mode]:
             seed = self._seed(mode, request, index, target, remarks)
             if seed is None:
@@ -81,6 +81,8 @@ class SeedPolicy:
                 if error.reason is not Reason.NOT_CONVERGED:
                     raise
                 failure = error
+        if failure is None:
+            raise InvalidSeed("no posture to start from for the mode %s" % request.mode.name)
         raise failure
 
     def _seed(self, mode: SeedMode, request: SeedRequest, index: int, target: np.ndarray,

@@ -139,7 +139,7 @@ def approach_rates(index: np.ndarray, target: np.ndarray, position: np.ndarray, 
 
 
 class Speeds:
-    """What the speeds of n set-points follow from, (n,) each, all views of the array `numbers`.
+    """The numbers that the speeds of n set-points follow from, (n,) each, all views of the array `numbers`.
 
     limit: of the joints [rad/s]; share, ratio: of it, in position mode, which a joint needs to move in step with
     others, and which its limb may use; slowing: of its speed that collision avoidance leaves to its limb; nominal: its
