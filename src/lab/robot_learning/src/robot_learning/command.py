@@ -6,6 +6,7 @@ import argparse
 import datetime
 import os
 import platform
+import secrets
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,6 +35,8 @@ DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 0, 50, 100, 1.0
 POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
 #: How much differs with --randomised.
 RANDOMISED = Randomised(mass=0.5, friction=0.5)
+#: Hidden seeds of the judge lie between these; a policy passes with this share of its episodes.
+HIDDEN, PASSING = (1_000_000_000, 2_000_000_000), 0.8
 #: The policy that is corrected.
 STUDENT = "student.npz"
 
@@ -43,9 +46,13 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = Parser(
         prog="./baxter.sh learn", description=__doc__,
         epilog="Without --data the expert shows the task first. Exit status: 0 done, 1 something is missing or broken, "
-               "2 wrong options, 130 after Ctrl-C. `python3 -m robot_learning` is the same without ROS.")
+               "2 wrong options, 3 the judged policy has not passed, 130 after Ctrl-C. "
+               "`python3 -m robot_learning` is the same without ROS.")
     parser.add_argument("task", metavar="TASK", nargs="?", help="one of %s" % ", ".join(EXPERTS))
     parser.add_argument("--evaluate", type=Path, metavar="POLICY", help="only measure this policy file, npz or ONNX")
+    parser.add_argument("--judge", type=Path, metavar="POLICY",
+                        help="the exercise: measure this policy file, of TASK where that is given, by seeds that "
+                             "nobody knows beforehand; %d %%%% must succeed" % round(100 * PASSING))
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="of the results (default: .baxter/learned/TASK)")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
     parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
@@ -71,6 +78,9 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                         help="in the evaluation, things have other weights and frictions in each episode")
     parser.add_argument("--no-film", action="store_true", help="do not film good and bad episodes")
     options = parser.parse_args(argv)
+    if options.judge and (options.evaluate or not options.episodes):
+        parser.error("--judge needs some episodes, and no --evaluate")
+    options.evaluate = options.judge or options.evaluate
     if options.evaluate is None and options.task not in EXPERTS:
         parser.error("TASK is one of %s; found %s%s" % (
             ", ".join(EXPERTS), options.task or "none", did_you_mean(options.task or "", EXPERTS)))
@@ -142,7 +152,9 @@ def learn(options: argparse.Namespace, folder: Path) -> Path:
 
 def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
     """Evaluation and film. Raises PolicyError, JobError, OSError."""
-    score = evaluate(path, range(options.episodes), options.workers, lambda done, good: _say(
+    low, high = HIDDEN
+    first = low + secrets.randbelow(high - low) if options.judge else 0
+    score = evaluate(path, range(first, first + options.episodes), options.workers, lambda done, good: _say(
         "%d of %d episodes, %d succeeded" % (done, options.episodes, good)), profile=options.profile,
         randomised=RANDOMISED._asdict() if options.randomised else {})
     _say("", sys.stderr.isatty())
@@ -161,22 +173,32 @@ def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
     return score
 
 
-def run(options: argparse.Namespace) -> None:
-    """Raises DemonstrationError, PolicyError, JobError, OSError."""
+def run(options: argparse.Namespace) -> int:
+    """The exit status. Raises DemonstrationError, PolicyError, JobError, OSError."""
     root = Path(os.environ.get("LAB_ROOT", Path.cwd()))
     name = options.task or (load(options.evaluate).contract.task if options.evaluate else "")
     folder = options.out or root / ".baxter" / "learned" / name
     folder.mkdir(parents=True, exist_ok=True)
     path = options.evaluate or learn(options, folder)
-    if options.episodes:
-        measure(options, path, folder)
+    if options.judge and options.task:
+        load(path).contract.require(task=options.task)
+    score = measure(options, path, folder) if options.episodes else None
+    return judged(score) if options.judge and score else 0
+
+
+def judged(score: Score) -> int:
+    """Print the exercise's points; returns the exit status."""
+    passed = score.successes >= PASSING * score.count
+    print("%s: %d of 100 points (%d are due)" % (
+        "passed" if passed else "not passed", 100 * score.successes // score.count, round(100 * PASSING)))
+    return 0 if passed else 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The program."""
     options = parse(argv)
     try:
-        run(options)
+        return run(options)
     except (DemonstrationError, PolicyError, JobError, OSError) as error:
         _say("", sys.stderr.isatty())
         print("learn: %s" % error, file=sys.stderr)
@@ -185,6 +207,5 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("learn: stopped; demonstrations that were complete are kept, and the same command goes on with them",
               file=sys.stderr)
         return 130
-    return 0
 
 

@@ -8,6 +8,7 @@ import pytest
 from demonstrations.frames import ACTION, ENVIRONMENT, STATE, DemonstrationError, Episode, Schema, numbers
 from demonstrations.reading import DataSet
 from demonstrations.writing import SetWriter
+from robot_learning import command
 from robot_learning.evaluation import Score, wilson
 from robot_learning.inputs import Inputs
 from robot_learning.network import Network
@@ -156,6 +157,24 @@ def test_a_score_counts_episodes_that_did_not_run_as_failures():
     score = Score({0: {"success": True}, 1: {"success": False}, 2: {"success": True}}, {3: "no"})
     assert (score.successes, score.count) == (2, 4) and "2 of 4" in str(score)
     assert choose(score) == [0, 2, 1]
+
+
+@pytest.mark.parametrize(("good", "status", "text"), [(8, 0, "passed: 80 of 100 points"), (7, 3, "not passed: 70")])
+def test_the_judge_plays_hidden_seeds(tmp_path, monkeypatch, capsys, learned, good, status, text):
+    played = []
+
+    def evaluated(path, seeds, *_, **__):
+        played.append(list(seeds))
+        return Score({seed: {"success": row < good, "steps": 1} for row, seed in enumerate(played[-1])}, {})
+
+    monkeypatch.setattr(command, "evaluate", evaluated)
+    learned[0].save(tmp_path / "policy.npz")
+    words = ["Reach", "--judge", str(tmp_path / "policy.npz"), "--out", str(tmp_path), "--episodes", "10", "--no-film"]
+    assert [command.main(words) for _ in range(2)] == [status, status] and text in capsys.readouterr().out
+    assert played[0] != played[1] and len(played[0]) == 10 and min(min(played)) >= command.HIDDEN[0]
+    assert command.main(["PickPlace", *words[1:]]) == 1 and "'Reach'" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        command.parse([*words, "--evaluate", "p"])
 
 
 def test_a_curve_becomes_a_picture(learned, tmp_path):
