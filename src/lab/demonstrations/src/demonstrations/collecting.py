@@ -11,6 +11,7 @@ import numpy as np
 from lab_batch import Job, Spec
 from lab_batch.processes import Limits, map_seeds
 
+from .card import write_card
 from .environment import core_of, expert_of, record, schema_of
 from .frames import DemonstrationError, Episode
 from .writing import SetWriter
@@ -90,6 +91,7 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
                 following = next(order, None)
     if not writer.episodes:
         raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
+    write_card(folder)
     return Collected(kept, failed, frames)
 
 
@@ -114,6 +116,7 @@ def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...]
         core.close()
     if not writer.episodes:
         raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
+    write_card(folder)
     return Collected(kept, len(seeds) - kept, frames)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sets of demonstrations: record an expert's, replay, check, repair, convert."""
+"""Sets of demonstrations: record an expert's, replay, check, repair, describe, convert."""
 from __future__ import annotations
 
 import argparse
@@ -13,6 +13,7 @@ from gym_baxter.core import CAMERAS
 from lab_batch import JobError
 
 from . import robomimic
+from .card import write_card
 from .collecting import collect, film
 from .environment import core_for, replay
 from .experts import EXPERTS
@@ -41,6 +42,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     for name, text in (("replay", "do the recorded actions again, and compare what is observed to the last bit"),
                        ("check", "read a whole set, and name what is broken"),
                        ("repair", "copy the whole episodes of a broken set into a new one"),
+                       ("card", "write README.md into a set's folder: what the set is"),
                        ("robomimic", "write a set as robomimic's HDF5")):
         one = commands.add_parser(name, help=text)
         one.add_argument("folder", type=Path, metavar="FOLDER")
@@ -104,10 +106,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             _told(repair(options.folder, options.into))
             print("the whole ones are in %s" % options.into)
             return 0
+        if options.command == "card":
+            print(write_card(options.folder))
+            return 0
         count = robomimic.write(DataSet(options.folder), options.into)
         print("%s in %s" % (counted(count, "episode"), options.into))
         return 0
-    except (DemonstrationError, JobError) as error:
+    except (DemonstrationError, JobError, OSError) as error:
         print("demonstrations: %s" % error, file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -10,6 +10,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from . import layout
+from .card import write_card
 from .frames import DemonstrationError
 from .reading import DataSet
 from .writing import SetWriter
@@ -94,7 +95,9 @@ def _exchange(folder: Path, rest: Path, is_empty: bool) -> None:
 
 
 def write_zip(folder: Path, file: BinaryIO) -> None:
-    """A set as one file: its own name, and its files below. Films are compressed already, and stay as they are."""
+    """A set with its card as one file: its own name, and its files below. Films are compressed already, and stay
+    as they are. Raises DemonstrationError, OSError."""
+    write_card(folder)
     with zipfile.ZipFile(file, "w") as archive:
         for path in sorted(Path(folder).rglob("*")):
             if path.is_file() and layout.DRAFTS not in path.parts and path.suffix != layout.PART:

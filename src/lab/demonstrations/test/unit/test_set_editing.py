@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sets without one of their episodes, strips of films, and sets as one file."""
+"""Sets without one of their episodes, strips of films, and sets as one file with a card."""
 import io
 import zipfile
 
@@ -94,4 +94,8 @@ def test_a_set_as_one_file_is_a_set(tmp_path):
     folder, packed = write(tmp_path / "blocks", (20, 61)), io.BytesIO()
     editing.write_zip(folder, packed)
     zipfile.ZipFile(packed).extractall(tmp_path / "there")
-    assert survey(tmp_path / "there" / "blocks").good == [0, 1]
+    assert survey(tmp_path / "there" / "blocks").good == [0, 1] and not survey(folder).strays
+    text = (tmp_path / "there" / "blocks" / "README.md").read_text()
+    assert text.startswith("---\n") and "| episodes | 2, of which 1 are successes |" in text
+    assert "| shown | Task 0.; Task 1. |" in text and "| frames | 9 at 10 Hz; an episode has 4 to 5" in text
+    assert "| `observation.images.head` | 64 x 96 x 3 | - |" in text

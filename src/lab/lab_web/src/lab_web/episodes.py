@@ -121,7 +121,7 @@ class Episodes:
         return file.getvalue()
 
     def write_zip(self, file: BinaryIO) -> None:
-        """The set as one file. Raises OSError."""
+        """The set as one file. Raises DemonstrationError, OSError."""
         editing.write_zip(self.folder, file)
 
     def _begin(self, task: str, camera: str) -> None:

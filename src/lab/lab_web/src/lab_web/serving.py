@@ -286,7 +286,7 @@ class EpisodePicture(_WithToken):
 
 
 class EpisodesFile(_WithToken):
-    """All episodes as one file; ``write(file)``, raises OSError."""
+    """All episodes as one file; ``write(file)``, raises DemonstrationError, OSError."""
 
     def initialize(self, pages: Pages, write: Callable[[BinaryIO], None]) -> None:
         super().initialize(pages)
@@ -297,7 +297,7 @@ class EpisodesFile(_WithToken):
         with tempfile.TemporaryFile() as file:
             try:
                 await loop.run_in_executor(None, self._write, file)
-            except OSError as error:
+            except (DemonstrationError, OSError) as error:
                 self.set_status(500)
                 self.finish("%s\n" % error)
                 return
