@@ -71,31 +71,29 @@ def _place_cluster(robot, frames, c, placed, spheres):
 
 
 @compiled
-def _from_box(p, half, normal):
-    """Distance of ``p`` (3,) to a box about the origin, less than 0 inside; writes the direction (3,) away from it."""
-    square, inside, axis = 0.0, -1e9, 0
-    for a in range(3):
-        beyond = abs(p[a]) - half[a]
-        normal[a] = math.copysign(max(beyond, 0.0), p[a])
-        square += normal[a] * normal[a]
-        if beyond > inside:
-            inside, axis = beyond, a
-    if square > 1e-18:
-        distance = math.sqrt(square)
-        for a in range(3):
-            normal[a] /= distance
-        return distance
-    normal[0] = normal[1] = normal[2] = 0.0
-    normal[axis] = math.copysign(1.0, p[axis])
-    return inside
+def _from_box(x, y, z, half):
+    """(distance, normal (3,)) of a point to a box about the origin, of half its sizes: less than 0 inside; the normal
+    leads away from it."""
+    beyond_x, beyond_y, beyond_z = abs(x) - half[0], abs(y) - half[1], abs(z) - half[2]
+    u, v, w = max(beyond_x, 0.0), max(beyond_y, 0.0), max(beyond_z, 0.0)
+    distance = math.sqrt(u * u + v * v + w * w)
+    if distance > 1e-9:
+        u, v, w = u / distance, v / distance, w / distance
+    elif beyond_x >= beyond_y and beyond_x >= beyond_z:
+        distance, u, v, w = beyond_x, 1.0, 0.0, 0.0
+    elif beyond_y >= beyond_z:
+        distance, u, v, w = beyond_y, 0.0, 1.0, 0.0
+    else:
+        distance, u, v, w = beyond_z, 0.0, 0.0, 1.0
+    return distance, (math.copysign(u, x), math.copysign(v, y), math.copysign(w, z))
 
 
 @compiled
-def _from_cylinder(p, radius, half, normal):
-    """As ``_from_box``, for an upright cylinder."""
-    across = math.sqrt(p[0] * p[0] + p[1] * p[1])
-    x, y = (p[0] / across, p[1] / across) if across > 1e-9 else (1.0, 0.0)
-    side, end = across - radius, abs(p[2]) - half
+def _from_cylinder(x, y, z, half):
+    """As ``_from_box``, for an upright cylinder; half: radius, radius, half of its height."""
+    across = math.sqrt(x * x + y * y)
+    x, y = (x / across, y / across) if across > 1e-9 else (1.0, 0.0)
+    side, end = across - half[0], abs(z) - half[2]
     u, v = max(side, 0.0), max(end, 0.0)
     distance = math.sqrt(u * u + v * v)
     if distance < 1e-9:
@@ -103,43 +101,37 @@ def _from_cylinder(p, radius, half, normal):
         u, v = (1.0, 0.0) if side > end else (0.0, 1.0)
     else:
         u, v = u / distance, v / distance
-    normal[0], normal[1], normal[2] = u * x, u * y, math.copysign(v, p[2])
-    return distance
+    return distance, (u * x, u * y, math.copysign(v, z))
 
 
 @compiled
-def object_distance(kind, objects, n, centre, normal):
-    """Distance [m] of ``centre`` (3,) to the surface of an object, less than 0 inside of it; writes ``normal`` (3,)."""
+def object_distance(kind, objects, n, centre):
+    """(distance, normal (3,)) of ``centre``, a sequence of x, y, z ..., to the surface of an object: less than 0 inside
+    of it [m]; the normal leads away from the object. Without arrays, whose making takes longer than all else here."""
     dx, dy, dz = centre[0] - objects[n], centre[1] - objects[n + 1], centre[2] - objects[n + 2]
-    turned = kind != _SPHERE and kind != _AXIS_BOX and kind != kernel.UPRIGHT_CYLINDER
-    p = np.empty(3)
-    for a in range(3):
-        if turned:
-            r = n + 3 + 3 * a
-            p[a] = objects[r] * dx + objects[r + 1] * dy + objects[r + 2] * dz
-        else:
-            p[a] = dx if a == 0 else (dy if a == 1 else dz)
-    half = np.empty(3)
-    for a in range(3):
-        half[a] = objects[n + 12 + a]
+    half = (float(objects[n + 12]), float(objects[n + 13]), float(objects[n + 14]))
     if kind == _SPHERE:
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        for a in range(3):
-            normal[a] = p[a] / length if length > 1e-9 else (1.0 if a == 2 else 0.0)
-        return length - half[0]
+        if length > 1e-9:
+            return length - half[0], (dx / length, dy / length, dz / length)
+        return length - half[0], (0.0, 0.0, 1.0)
+    if kind == _AXIS_BOX:
+        return _from_box(dx, dy, dz, half)
+    if kind == kernel.UPRIGHT_CYLINDER:
+        return _from_cylinder(dx, dy, dz, half)
+    r = n + 3
+    x = objects[r] * dx + objects[r + 1] * dy + objects[r + 2] * dz
+    y = objects[r + 3] * dx + objects[r + 4] * dy + objects[r + 5] * dz
+    z = objects[r + 6] * dx + objects[r + 7] * dy + objects[r + 8] * dz
     if kind == _PLANE:
-        normal[0], normal[1], normal[2] = 0.0, 0.0, math.copysign(1.0, p[2])
-        distance = abs(p[2]) - half[2]
-    elif kind == _AXIS_BOX or kind == _BOX:
-        distance = _from_box(p, half, normal)
+        distance, (u, v, w) = abs(z) - half[2], (0.0, 0.0, math.copysign(1.0, z))
+    elif kind == _BOX:
+        distance, (u, v, w) = _from_box(x, y, z, half)
     else:
-        distance = _from_cylinder(p, half[0], half[2], normal)
-    if turned:
-        u, v, w = normal[0], normal[1], normal[2]
-        r = n + 3
-        for a in range(3):
-            normal[a] = objects[r + a] * u + objects[r + 3 + a] * v + objects[r + 6 + a] * w
-    return distance
+        distance, (u, v, w) = _from_cylinder(x, y, z, half)
+    return distance, (objects[r] * u + objects[r + 3] * v + objects[r + 6] * w,
+                      objects[r + 1] * u + objects[r + 4] * v + objects[r + 7] * w,
+                      objects[r + 2] * u + objects[r + 5] * v + objects[r + 8] * w)
 
 
 @compiled
@@ -172,30 +164,30 @@ def _fill(new, distance, normal, centre, radius):
 
 
 @compiled
-def _nearest_object(world, node, end, ball, reach, any_will_do, normal):
-    """Return the distance [m] of a ``ball`` (4,), centre and radius, from the nearest object of the nodes ``node`` ...
-    ``end`` - 1, or ``reach`` if all are farther; writes ``normal`` (3,). any_will_do: the first within reach will."""
+def _nearest_object(world, node, end, ball, reach, any_will_do):
+    """(distance, normal (3,)) of a ``ball``, (x, y, z, radius), from the nearest object of the nodes ``node`` ...
+    ``end`` - 1, or ``reach`` [m] if all are farther. any_will_do: the first within reach will."""
     links, nodes, kinds, objects = world
-    direction, radius = np.empty(3), ball[3]
+    x, y, z, radius = ball
+    normal = (0.0, 0.0, 1.0)
     while node < end:
-        square, far = 0.0, reach + radius
-        for a in range(3):
-            out = max(nodes[6 * node + a] - ball[a], ball[a] - nodes[6 * node + 3 + a], 0.0)
-            square += out * out
-        if far <= 0.0 or square > far * far:
+        n = 6 * node
+        u = max(nodes[n] - x, x - nodes[n + 3], 0.0)
+        v = max(nodes[n + 1] - y, y - nodes[n + 4], 0.0)
+        w = max(nodes[n + 2] - z, z - nodes[n + 5], 0.0)
+        far = reach + radius
+        if far <= 0.0 or u * u + v * v + w * w > far * far:
             node = links[2 * node]
             continue
         k = links[2 * node + 1]
         node += 1
         if k >= 0:
-            distance = object_distance(kinds[k], objects, _OBJECT * k, ball, direction) - radius
-            if distance < reach:
-                reach = distance
-                for a in range(3):
-                    normal[a] = direction[a]
+            distance, direction = object_distance(kinds[k], objects, _OBJECT * k, ball)
+            if distance - radius < reach:
+                reach, normal = distance - radius, direction
                 if any_will_do:
-                    return reach
-    return reach
+                    break
+    return reach, normal
 
 
 @compiled
@@ -207,18 +199,17 @@ def _object_gaps(tables, test, reach, places, found):
     clusters, spheres, skips = robot[2], robot[4], robot[8]
     c = test[0]
     joint, s, last = clusters[_CLUSTER * c], clusters[_CLUSTER * c + 1], clusters[_CLUSTER * c + 2]
-    normal, new, ball = np.empty(3), np.empty(COLUMNS), np.empty(4)
+    new = np.empty(COLUMNS)
     new[7], new[8], new[9] = joint, -1.0, c
     while s < last:
-        for a in range(3):
-            ball[a] = places[s, a]
-        ball[3] = spheres[4 * s + 3]
-        distance = _nearest_object(world, test[1], test[2], ball, reach, skips[s] > 0, normal)
+        radius = float(spheres[4 * s + 3])
+        ball = (places[s, 0], places[s, 1], places[s, 2], radius)
+        distance, normal = _nearest_object(world, test[1], test[2], ball, reach, skips[s] > 0)
         if distance >= reach:
             s = skips[s] if skips[s] else s + 1
             continue
         if not skips[s]:
-            _fill(new, distance + ball[3], normal, places[s], ball[3])
+            _fill(new, distance + radius, normal, places[s], radius)
             _keep(rows, counts, c, new)
             reach = min(reach, max(distance, 0.0) + _BESIDE_M)
         s += 1
@@ -285,11 +276,10 @@ def near(tables, checks, reach, frames, rows):
     placed, places = np.zeros(count, np.bool_), np.empty((len(robot[4]) // 4, 3))
     for c in range(count):
         _place_balls(frames[clusters[_CLUSTER * c]], balls, c, c + 1, centres)
-    ball, normal = np.empty(4), np.empty(3)
     for t in range(len(tests)):
         c = tests[t, 0]
-        ball[:3], ball[3] = centres[c], balls[4 * c + 3]
-        if _nearest_object(world, tests[t, 1], tests[t, 2], ball, reach, True, normal) < reach:
+        ball = (centres[c, 0], centres[c, 1], centres[c, 2], float(balls[4 * c + 3]))
+        if _nearest_object(world, tests[t, 1], tests[t, 2], ball, reach, True)[0] < reach:
             _place_cluster(robot, frames, c, placed, places)
             _object_gaps(tables, tests[t], reach, places, kept)
     for p in range(len(pairs)):
@@ -344,3 +334,28 @@ def closed_cell(robot, q):
         if cells[maps[m + 2] + _CELLS * row + column]:
             return True
     return False
+
+
+@compiled
+def around(tables, checks, q, velocity, own, reach, most):
+    """Return what is nearer than ``reach`` [m] to the arm of the variables ``own`` (k,) at ``q`` (n,), the ``most``
+    nearest gaps: distance (m,), slope (m, k), drift (m,), of_robot (m,) and closed as in ``surroundings.Near``.
+
+    velocity (n,): of all joints; tables, checks: see ``near``.
+    """
+    robot = tables[0]
+    frames, rows = np.empty((len(robot[0]) // _JOINT, 3, 4)), np.empty((most, COLUMNS))
+    place(robot, q, frames)
+    count = near(tables, checks, reach, frames, rows)
+    every, others = np.empty((count, len(q))), velocity.copy()
+    slopes(robot, frames, rows, count, every)
+    others[own] = 0.0
+    distance, slope, drift = np.empty(count), np.empty((count, len(own))), np.zeros(count)
+    of_robot = np.empty(count, np.bool_)
+    for k in range(count):
+        distance[k], of_robot[k] = rows[k, 0], rows[k, 8] >= 0.0
+        for a in range(len(own)):
+            slope[k, a] = every[k, own[a]]
+        for a in range(len(q)):
+            drift[k] += every[k, a] * others[a]
+    return distance, slope, drift, of_robot, closed_cell(robot, q)

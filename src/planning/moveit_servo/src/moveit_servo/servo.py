@@ -13,9 +13,9 @@ import numpy as np
 
 from arm_kinematics import Chain, ChainError
 from moveit_servo.directions import Arm, Thresholds, jacobian_of, velocity_for
-from moveit_servo.limits import JointLimits, Motion, speed_towards, stoppable
+from moveit_servo.limits import JointLimits, Motion, stoppable
 from moveit_servo.pose_tracking import PoseTracker
-from moveit_servo.quadratic import nearest_within
+from moveit_servo.possible import LEAD_RAD, Possible, Rates, possible, shares
 from moveit_servo.settings import STOP_DISTANCE, SettingsError
 from moveit_servo.straight import StraightWay
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from moveit_servo.settings import ServoSettings
     from moveit_servo.surroundings import Surroundings
 
-# Set-points lead the joints by at most this [rad], so that a blocked arm is not pushed harder and harder; within this
-# they are kept between two motions, so that an arm that sags a little does not creep.
-_LEAD_RAD, _SAME_RAD = 0.12, 0.03
+# Within this distance of the joints [rad] set-points are kept between two motions, so that an arm that sags a little
+# does not creep.
+_SAME_RAD = 0.03
 # Speed at which a threshold of distance is the place where slowing down begins [m/s].
 _SPEED_AT_THRESHOLD = 0.4
 # Gaps are looked for up to this distance [m]; the fastest hand needs no more to stop.
@@ -112,6 +112,10 @@ class Servo:
         self._rows = np.searchsorted(group.indices, self._indices)
         #: Pose (4, 4) of the model's root in its frame.
         self.base = np.eye(4)
+        base = self._chain.base
+        self._base_moves = any(joint.movable for joint in model.robot.chain(model.root, base))
+        self._base_in_root = model.frame_of(model.default_state().q, base)
+        self._nothing_near = (np.empty(0), np.empty((0, len(self.joints))), np.empty(0), np.empty(0, dtype=bool))
         self.surroundings: Surroundings | None = None
         self._motion: Motion | None = None
         self._tracker, self._target, self._way = PoseTracker(), None, StraightWay()
@@ -125,7 +129,7 @@ class Servo:
     @settings.setter
     def settings(self, settings: ServoSettings) -> None:
         self.limits = self._limits(settings)
-        self._settings = settings
+        self._settings, self._rates = settings, _rates(settings)
         if self._motion is not None:
             before, self._motion = self._motion, Motion(self._motion.position, self.limits)
             self._motion.velocity, self._motion.acceleration = before.velocity, before.acceleration
@@ -228,63 +232,44 @@ class Servo:
     # -- the motion that is wanted and possible ------------------------------------------------------------------
 
     def _wanted(self, whole, velocity, measured, command) -> _Wanted:
-        q = self._motion.position
-        lost, condition, behind = 0.0, 1.0, float(np.abs(q - measured).max())
+        q, settings = self._motion.position, self.settings
+        lost, condition = 0.0, 1.0
         if command.twist is not None and command.twist.any():
+            limits = self.limits
             keep = np.flatnonzero(~command.drift)
-            turn = command.axes.T @ self.pose(whole, self._chain.base)[:3, :3]
-            limits, settings = self.limits, self.settings
+            turn = command.axes.T @ self._chain_base(whole)[:3, :3]
             arm = Arm(*self._chain.arrays, turn, keep, limits.lower, limits.upper, limits.velocity)
             jacobian = jacobian_of(arm, q)
             wanted, metric, lost, condition = velocity_for(
                 command.twist[keep], jacobian, arm, q,
                 Thresholds(float(settings.lower_singularity_threshold),
                            float(settings.hard_stop_singularity_threshold)))
-            metric = metric + 1e-6 * np.eye(len(q))
         else:
             wanted, metric, jacobian = np.array(command.joints, dtype=float), np.eye(len(q)), np.eye(len(q))
-        wanted = wanted / max(1.0, float((np.abs(wanted) / self.limits.velocity).max()))
-        low, high = self._box(q, measured)
-        slope, least, distance = self._gap_bounds(whole, velocity, q - measured)
-        found = np.empty(len(q))
-        wanted, metric = np.ascontiguousarray(wanted), np.ascontiguousarray(metric)
-        held = nearest_within(wanted, metric, slope, least, low, high, found)
+        near = self._near(whole, velocity)
+        slope = near[1]
+        bounds = possible(wanted, metric, (q, measured), self.limits, near, self._rates)
+        found = bounds.velocity
         if self.surroundings is not None:
             found = self._open_cells(whole, found)
-        status, reason = self._status(jacobian, wanted, found, lost, condition, (slope, least, distance), (low, high))
-        if behind > 0.8 * _LEAD_RAD and status is Status.JOINT_BOUND:
-            reason = ("the arm does not follow: joint %s is %.2f rad behind its set-point; is the robot enabled, and "
-                      "does its controller run?" % (self.joints[int(np.abs(q - measured).argmax())], behind))
-        return _Wanted(found, status, reason, not held, slope, least)
+        status, reason = self._status(shares(jacobian, wanted, found, slope, bounds), found, lost, condition, bounds)
+        if status is Status.JOINT_BOUND:
+            behind = np.abs(q - measured)
+            if behind.max() > 0.8 * LEAD_RAD:
+                reason = ("the arm does not follow: joint %s is %.2f rad behind its set-point; is the robot enabled, "
+                          "and does its controller run?" % (self.joints[int(behind.argmax())], behind.max()))
+        return _Wanted(found, status, reason, not bounds.is_held, slope, bounds.least)
 
-    def _box(self, q: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest velocities (k,): joint limits with their margin, and the lead of set-points."""
-        limits, margin = self.limits, self.settings.joint_limit_margin
-        lag = 1.5 * self.settings.publish_period
-        lead, time = q - measured, self.settings.stopping_time
-        above, below = (np.maximum(_LEAD_RAD - side * lead, 0.0) / time for side in (1.0, -1.0))
-        high = np.minimum(speed_towards(limits.upper - margin - q, limits, lag), above)
-        low = -np.minimum(speed_towards(q - limits.lower - margin, limits, lag), below)
-        return low, high
+    def _chain_base(self, whole: np.ndarray) -> np.ndarray:
+        """The pose (4, 4) of the chain's base in the model's frame."""
+        return self.pose(whole, self._chain.base) if self._base_moves else self.base @ self._base_in_root
 
-    def _gap_bounds(self, whole: np.ndarray, velocity: np.ndarray, lead: np.ndarray):
-        """(slope (m, k), least (m,), distance (m,)): slope @ x >= least keeps what is near from coming too near, where
-        the set-points are and where the joints are, which they ``lead`` (k,)."""
-        settings = self.settings
-        if self.surroundings is None or not settings.check_collisions:
-            return np.empty((0, len(self.joints))), np.empty(0), np.empty(0)
+    def _near(self, whole: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, ...]:
+        """distance (m,), slope (m, k), drift (m,) and of_robot (m,) of what is near, as in ``surroundings.Near``."""
+        if self.surroundings is None or not self.settings.check_collisions:
+            return self._nothing_near
         near = self.surroundings.near(whole, velocity, _REACH_M)
-        threshold = np.where(near.of_robot, settings.self_collision_proximity_threshold,
-                             settings.scene_collision_proximity_threshold)
-        clearance = _CLEARANCE_M
-        if settings.collision_check_type == STOP_DISTANCE:
-            clearance, threshold = max(clearance, settings.min_allowable_collision_distance), 0.0
-        time = np.maximum(settings.stopping_time, threshold / _SPEED_AT_THRESHOLD)
-        slope = np.ascontiguousarray(near.slope[:, self._rows])
-        distance = near.distance - np.maximum(slope @ lead, 0.0)
-        allowed = np.maximum(distance - clearance, 0.0) / time
-        least = np.minimum(0.0, -allowed - np.minimum(near.drift, 0.0))
-        return slope, least, distance
+        return near.distance, np.ascontiguousarray(near.slope[:, self._rows]), near.drift, near.of_robot
 
     def _open_cells(self, whole: np.ndarray, found: np.ndarray) -> np.ndarray:
         """``found``, shortened where it leads into postures at which links may touch that spheres cannot tell apart."""
@@ -299,19 +284,13 @@ class Servo:
 
     # -- why -----------------------------------------------------------------------------------------------------
 
-    def _status(self, jacobian, wanted, found, lost, condition, of_gaps, box) -> tuple[Status, str]:
-        """What takes most of the motion: its Status, and a sentence."""
-        slope, least, distance = of_gaps
-        low, high = box
-        before = jacobian @ wanted
-        size = float(np.linalg.norm(before))
-        taken = float(np.linalg.norm(before - jacobian @ found)) / size if size > 1e-9 else 0.0
+    def _status(self, of_motion, found, lost, condition, bounds: Possible) -> tuple[Status, str]:
+        """What takes most of the motion: its Status, and a sentence. of_motion: see ``shares``."""
+        taken, left, nearest = of_motion
+        low, high = bounds.low, bounds.high
         if taken > _NOTICED and taken >= lost:
-            tight = np.flatnonzero(slope @ found <= least + 1e-4 + 1e-3 * np.abs(least)) if len(least) else []
-            halts = np.linalg.norm(jacobian @ found) < _REMAINS * size
-            if len(tight):
-                nearest = float(distance[tight].min())
-                return (Status.HALT_FOR_COLLISION if halts else Status.DECELERATE_FOR_COLLISION,
+            if math.isfinite(nearest):
+                return (Status.HALT_FOR_COLLISION if left < _REMAINS else Status.DECELERATE_FOR_COLLISION,
                         "%.0f %% of the motion is held back %.1f cm before a contact" % (
                             100.0 * min(taken, 1.0), 100.0 * max(nearest, 0.0)))
             at = [name for number, name in enumerate(self.joints)
@@ -324,6 +303,17 @@ class Servo:
                     "%.0f %% of the motion is lost to a singularity, condition number %.0f" % (
                         100.0 * min(lost, 1.0), condition))
         return Status.NO_WARNING, ""
+
+
+def _rates(settings: ServoSettings) -> Rates:
+    """The Rates of settings, in ``possible``'s words."""
+    clearance, threshold = _CLEARANCE_M, (settings.self_collision_proximity_threshold,
+                                          settings.scene_collision_proximity_threshold)
+    if settings.collision_check_type == STOP_DISTANCE:
+        clearance, threshold = max(clearance, settings.min_allowable_collision_distance), (0.0, 0.0)
+    times = (max(settings.stopping_time, one / _SPEED_AT_THRESHOLD) for one in threshold)
+    return Rates(*map(float, (settings.joint_limit_margin, 1.5 * settings.publish_period, settings.stopping_time,
+                              clearance, *times)))
 
 
 def _group(model, name):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from motion_planning.constraints.regions import rotation_vector
+from moveit_servo.compiled import compiled
 from urdf_model.transforms import axis_rotation
 
 # Time in which the hand takes the direction of a new twist [s]; rate at which it then returns to its way [1/s], and the
@@ -14,6 +15,9 @@ from urdf_model.transforms import axis_rotation
 _SETTLED_S, _RETURN_RATE, _MAX_SHARE = 0.15, 6.0, 0.1
 # A turn [rad] that counts as much as a shift [m] where one is weighed against the other.
 _LEVER_M = 0.25
+
+
+_rotation_vector, _axis_rotation = compiled(rotation_vector), compiled(axis_rotation)
 
 
 class StraightWay:
@@ -36,18 +40,32 @@ class StraightWay:
         if self._settled_in > 0.0:
             self._origin = pose
             return np.zeros(6)
-        shift = pose[:3, 3] - self._origin[:3, 3]
-        along = np.concatenate([twist[:3], _LEVER_M * twist[3:]])
-        turn = rotation_vector(pose[:3, :3] @ self._origin[:3, :3].T)
-        size = float(along @ along)
-        gone = float(along @ np.concatenate([shift, _LEVER_M * turn])) / size
-        speed = float(np.linalg.norm(twist[3:]))
-        turned = self._origin[:3, :3]
-        if speed:
-            turned = axis_rotation(twist[3:] / speed, speed * gone) @ turned
-        off = np.concatenate([gone * twist[:3] - shift, rotation_vector(turned @ pose[:3, :3].T)])
-        # The origin moves along, so that a turn by more than half a circle is none the other way round.
-        self._origin = np.eye(4)
-        self._origin[:3, :3], self._origin[:3, 3] = turned, pose[:3, 3] + off[:3]
+        off, self._origin = _off_the_way(pose, self._origin, twist)
+        size = math.sqrt(float(twist[:3] @ twist[:3]) + _LEVER_M**2 * float(twist[3:] @ twist[3:]))
         weighed = _RETURN_RATE * math.sqrt(float(off[:3] @ off[:3]) + _LEVER_M**2 * float(off[3:] @ off[3:]))
-        return _RETURN_RATE * off * min(1.0, _MAX_SHARE * math.sqrt(size) / max(weighed, 1e-12))
+        return _RETURN_RATE * off * min(1.0, _MAX_SHARE * size / max(weighed, 1e-12))
+
+
+@compiled
+def _off_the_way(pose, origin, twist):
+    """Return (off (6,), next origin (4, 4)): shift [m] and turn [rad] from ``pose`` (4, 4) to the way that leads from
+    ``origin`` along ``twist`` (6,). The origin moves along, so that a turn by more than half a circle is none the other
+    way round."""
+    before, here = np.ascontiguousarray(origin[:3, :3]), np.ascontiguousarray(pose[:3, :3])
+    turn = _rotation_vector(here @ before.T)
+    along, square, speed = 0.0, 0.0, math.sqrt(twist[3] ** 2 + twist[4] ** 2 + twist[5] ** 2)
+    for a in range(3):
+        v, w = twist[a], _LEVER_M**2 * twist[3 + a]
+        along += v * (pose[a, 3] - origin[a, 3]) + w * turn[a]
+        square += v * v + w * twist[3 + a]
+    gone = along / square
+    turned = before
+    if speed > 0.0:
+        turned = _axis_rotation((twist[3] / speed, twist[4] / speed, twist[5] / speed), speed * gone) @ before
+    off, after = np.empty(6), np.eye(4)
+    off[3:] = _rotation_vector(turned @ here.T)
+    for a in range(3):
+        off[a] = gone * twist[a] - (pose[a, 3] - origin[a, 3])
+        after[a, 3] = pose[a, 3] + off[a]
+    after[:3, :3] = turned
+    return off, after

@@ -45,7 +45,7 @@ class Surroundings:
     def __init__(self, sphere_model: SphereModel, group: Group, scene: Scene) -> None:
         """Prepare ``scene`` for the arm of ``group``; takes up to seconds for a new scene."""
         model = sphere_model.model
-        self.indices = np.array(group.indices)
+        self.indices = np.array(group.indices, np.int64)
         tables, self.remarks = bake(sphere_model, whole_robot(model, group), scene, scene.state)
         self._tables = tables
         robot = tables[0]
@@ -58,21 +58,12 @@ class Surroundings:
         pairs = np.where(mine[pairs[:, :1]], pairs, pairs[:, ::-1])
         self._checks = (np.ascontiguousarray(pairs, np.int64).reshape(-1, 2),
                         np.ascontiguousarray(tests[mine[tests[:, 0]]], np.int64).reshape(-1, 3))
-        self._frames = np.empty((len(robot[0]) // kernel.JOINT, 3, 4))
-        self._rows = np.empty((_MAX_GAPS, gaps.COLUMNS))
-        self._slopes = np.empty((_MAX_GAPS, len(model.variables)))
+        self._most = _MAX_GAPS
 
     def near(self, q: np.ndarray, velocity: np.ndarray, reach: float) -> Near:
         """Return the gaps below ``reach`` [m] at ``q`` (n,), all joints of the model, of which the others than the
-        arm's move at ``velocity`` (n,) [per s]. Not thread-safe."""
-        gaps.place(self._tables[0], q, self._frames)
-        count = gaps.near(self._tables, self._checks, reach, self._frames, self._rows)
-        gaps.slopes(self._tables[0], self._frames, self._rows, count, self._slopes)
-        slopes = self._slopes[:count]
-        others = velocity.copy()
-        others[self.indices] = 0.0
-        return Near(self._rows[:count, 0].copy(), slopes[:, self.indices], slopes @ others,
-                    self._rows[:count, 8] >= 0.0, self.closed(q))
+        arm's move at ``velocity`` (n,) [per s]."""
+        return Near(*gaps.around(self._tables, self._checks, q, velocity, self.indices, reach, self._most))
 
     def closed(self, q: np.ndarray) -> bool:
         """Whether links that spheres cannot tell apart may touch at ``q`` (n,)."""

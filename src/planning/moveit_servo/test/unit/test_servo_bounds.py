@@ -119,8 +119,7 @@ def test_a_point_inside_an_object_is_pushed_out_of_it():
                        (kernel.UPRIGHT_CYLINDER, (0.2, 0.0, 0.4))):
         thing = np.zeros(kernel.OBJECT, np.float32)
         thing[12:15] = size
-        normal = np.empty(3)
-        distance = gaps.object_distance(np.int64(kind), thing, 0, np.array((0.15, 0.01, 0.02)), normal)
+        distance, normal = gaps.object_distance(np.int64(kind), thing, 0, (0.15, 0.01, 0.02))
         assert distance == pytest.approx(-0.05, abs=0.003) and normal[0] == pytest.approx(1.0, abs=0.02)
 
 
