@@ -65,7 +65,9 @@ def _parser() -> Parser:
     folder = argparse.ArgumentParser(add_help=False)
     folder.add_argument("--folder", default=argparse.SUPPRESS, help=text)
     commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|renew|down|logs",
-                                     parser_class=functools.partial(Parser, parents=[folder]))
+                                     # Any callable will do.
+                                     parser_class=functools.partial(  # pyright: ignore[reportArgumentType]
+                                         Parser, parents=[folder]))
     up = commands.add_parser("up", help="start a class, and print the addresses")
     up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
                     "of last time")
@@ -75,7 +77,7 @@ def _parser() -> Parser:
     up.add_argument("--address", type=_server, metavar="URL", help="of a server with TLS in front of the front door, "
                     "such as https://labs.example/robots (docs/class.md)")
     up.add_argument("--idle", type=_minutes, metavar="MINUTES", help="a lab that nobody uses for so long is paused; 0: "
-                    "never (default: %g)" % (defaults.idle_s / 60.0))
+                    "never (default: %g)" % ((defaults.idle_s or 0.0) / 60.0))
     up.add_argument("--keep-running", action=argparse.BooleanOptionalAction, help="do not pause labs that have started "
                     "until their first visitor comes")
     up.add_argument("--memory", type=_gigabytes, metavar="GB", help="limit of each lab (default: %g)"
@@ -178,7 +180,7 @@ def _record(options: argparse.Namespace, store: Store) -> ClassRecord:
     values = {name: value for name, value in given.items() if value is not None}
     if options.idle is not None:
         values["idle_s"] = options.idle or None
-    if options.who is None:
+    if options.who is None and earlier is not None:
         kept = {**vars(earlier.options), **values}
         return ClassRecord.made(Options(**kept), earlier.students, earlier)
     values.setdefault("at_once", max(1, (os.cpu_count() or 1) // 2))
@@ -312,13 +314,21 @@ def _await_labs(store: Store) -> int:
         return _DONE
 
 
+def _stored(store: Store) -> ClassRecord:
+    """The class of a folder. Raises ClassError where there is none."""
+    record = store.read()
+    if record is None:
+        raise ClassError("there is no class in %s" % store.folder)
+    return record
+
+
 def _list(options: argparse.Namespace, store: Store) -> int:
     overview = control.call(store, "GET", "/labs")
     if options.addresses:
-        _print_addresses(store.read(), store)
+        _print_addresses(_stored(store), store)
         return _DONE
     if options.csv:
-        record, table = store.read(), csv.writer(sys.stdout, lineterminator="\n")
+        record, table = _stored(store), csv.writer(sys.stdout, lineterminator="\n")
         table.writerow(("name", "id", "address"))
         table.writerows((student.full_name, student.name, _address(record, store, student.name))
                         for student in record.students)
@@ -350,16 +360,14 @@ def _change(options: argparse.Namespace, store: Store):
 
 
 def _renew(options: argparse.Namespace, store: Store) -> int:
-    record = store.read()
-    if record is None:
-        raise ClassError("there is no class in %s" % store.folder)
+    record = _stored(store)
     names = list(record.tokens) if options.names == ["all"] else options.names
     for name in names:
         record = record.renewed(name)
     if _is_up(store):
         for name in names:
             control.call(store, "POST", "/renew/" + name)
-        record = store.read()
+        record = _stored(store)
     else:
         store.write(record)
     for name in names:

@@ -30,7 +30,7 @@ class _Connection(http.client.HTTPConnection):
         self.sock.connect(self._path)
 
 
-def call(store: Store, method: str, path: str) -> Any | None:
+def call(store: Store, method: str, path: str) -> Any:
     """The answer of the supervisor of this store.Store, as data (None for an empty one).
 
     Raises NoClass, and ClassError with the supervisor's words where it refuses.

@@ -28,7 +28,7 @@ class _ToSocket(netutil.Resolver):
         self._path = path
 
     async def resolve(self, host: str, port: int, family: Any = socket.AF_UNSPEC) -> list[tuple[int, str]]:
-        return [(socket.AF_UNIX, self._path)]
+        return [(socket.AF_UNIX, str(self._path))]
 
 
 class Factors:

@@ -138,7 +138,7 @@ class Passed(PassingHandler):
         self._kind = kind_of(self.is_upgrade, below)
         if self._is_poll:
             if self.door.supervisor.is_awake(self._name):
-                await self.pass_to(self.door.supervisor.socket_of(self._name), below)
+                await self.pass_to(str(self.door.supervisor.socket_of(self._name)), below)
             else:
                 # 503 would make JupyterLab ask its user what to do.
                 self.refuse(409, "this lab is not awake")
@@ -149,7 +149,7 @@ class Passed(PassingHandler):
         elif lab.busy + lab.sockets >= MAX_AT_ONCE:
             self.refuse(429, "this lab has %d requests and open pages already; close some" % MAX_AT_ONCE)
         else:
-            await self.pass_to(self.door.supervisor.socket_of(self._name), below)
+            await self.pass_to(str(self.door.supervisor.socket_of(self._name)), below)
 
     def _lets_in(self) -> bool:
         """Whether this request may go on; else it is refused."""

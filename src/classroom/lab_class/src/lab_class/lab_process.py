@@ -69,11 +69,15 @@ class LabProcess:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGCONT)
 
+    def _close_input(self) -> None:
+        if self._process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+
     def ask_to_end(self) -> None:
         """Its first program ends the others and itself."""
         self.wake()
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        self._close_input()
 
     def kill(self) -> None:
         """End all of its processes for good, and wait for that."""
@@ -85,8 +89,7 @@ class LabProcess:
             if not family:
                 break
             time.sleep(0.01)
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        self._close_input()
         self._process.wait()
 
     def memory_bytes(self, files_bytes: int = 0) -> int:

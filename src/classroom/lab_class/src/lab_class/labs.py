@@ -251,4 +251,4 @@ RIGHTS = {Role.INSTRUCTOR: ("see", "change"), Role.STUDENT: ("use", "watch"), Ro
 
 def may(role: Role | None, right: str) -> bool:
     """Whether a role (None: no valid token) has a right."""
-    return right in RIGHTS.get(role, ())
+    return role is not None and right in RIGHTS[role]

@@ -4,7 +4,7 @@ limit in a way that this user could set, and, where no control group counts it, 
 """
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from processes import usage
@@ -53,7 +53,7 @@ class Scratch:
         return 0, 0
 
 
-def too_many_sockets(pids: list[int]) -> str:
+def too_many_sockets(pids: Iterable[int]) -> str:
     """Why a lab of these processes is to end, or ""."""
     found = usage.sockets(pids)
     return "" if found <= SOCKETS else "it has opened %d sockets, and may have %d" % (found, SOCKETS)

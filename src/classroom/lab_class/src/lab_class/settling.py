@@ -21,7 +21,9 @@ class Settling:
     def __init__(self, now: float) -> None:
         """now: a clock [s]."""
         self._begun = now
-        self._since, self._processes, self._demand_s = None, frozenset(), 0.0
+        # Of the last change; None before the first look.
+        self._since, self._demand_s = now, 0.0
+        self._processes: frozenset[int] | None = None
 
     def look(self, processes: Iterable[int], demand_s: float, is_simulating: bool, now: float) -> bool:
         """Has it settled? processes: their ids; demand_s: by `demand_s`, since their start [s]; is_simulating: its
@@ -29,7 +31,7 @@ class Settling:
         if now - self._begun >= LIMIT_S:
             return True
         processes = frozenset(processes)
-        is_same = self._since is not None and processes == self._processes
+        is_same = processes == self._processes
         if is_same and now - self._since < QUIET_S:
             return False
         if is_same and is_simulating and demand_s - self._demand_s < MAX_DEMAND * (now - self._since):

@@ -109,6 +109,13 @@ def test_addresses_are_a_table_that_is_a_roster_again(tmp_path, monkeypatch, cap
     assert roster.read(said) == students
 
 
+@pytest.mark.parametrize("option", ["--addresses", "--csv"])
+def test_addresses_of_a_class_whose_record_is_gone(tmp_path, monkeypatch, capsys, option):
+    monkeypatch.setattr(command.control, "call", lambda *arguments: {"labs": []})
+    assert command.main(["--folder", str(tmp_path), "list", option]) == 1
+    assert "no class in %s" % tmp_path in capsys.readouterr().err
+
+
 def test_logs_of_a_lab_that_the_class_has_not_names_those_that_it_has(tmp_path, capsys):
     store = Store(tmp_path / "class")
     store.make()
