@@ -15,7 +15,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from rf_checks.submission import LARGEST_BYTES
 
@@ -163,7 +163,7 @@ class _ListLimited:
 
     def __init__(self, stream: BinaryIO, entries: int) -> None:
         self._stream, self._entries = stream, entries
-        self.most = _LISTED_BYTES * entries
+        self.most: int | None = _LISTED_BYTES * entries
 
     def __getattr__(self, name: str) -> str | Callable[..., Any]:
         return getattr(self._stream, name)
@@ -176,7 +176,7 @@ class _ListLimited:
 
 def _zip_entries(stream: BinaryIO, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
     limited = _ListLimited(stream, bounds.entries)
-    with zipfile.ZipFile(limited) as archive:
+    with zipfile.ZipFile(cast("BinaryIO", limited)) as archive:
         limited.most = None
         for info in archive.infolist():
             kind, path, problem = info.external_attr >> 16 & _FILE_KIND, _zip_name(info), ""
@@ -237,6 +237,11 @@ class _TarInfo(tarfile.TarInfo):
         return info
 
 
+def _content(archive: tarfile.TarFile, info: tarfile.TarInfo) -> bytes:
+    file = archive.extractfile(info)
+    return b"" if file is None else file.read(most_bytes(info.name) + 1)
+
+
 def _tar_entries(stream: Any, name: str, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
     if name.endswith((".gz", ".tgz")):
         stream = gzip.GzipFile(fileobj=stream)
@@ -251,4 +256,4 @@ def _tar_entries(stream: Any, name: str, bounds: Bounds) -> Iterator[tuple[Any, 
                 problem = "holds a link, %s to %s; links are not followed" % (info.name, info.linkname)
             elif not info.isreg():
                 problem = "holds %s, which is not a file" % info.name
-            yield info.name, problem, lambda info=info: archive.extractfile(info).read(most_bytes(info.name) + 1)
+            yield info.name, problem, lambda info=info: _content(archive, info)

@@ -26,7 +26,8 @@ class Grade(Job):
         """tasks: a JSON file, list of {"lab", "exercise", "program", "seed", "profile", "serial"}. wall_limit: of a
         check [s]. trusted: judge without sandboxes where the machine allows none. hidden: folders that no program may
         see."""
-        self._tasks, self._wall_limit, self._trusted, self._hidden = tasks, wall_limit, trusted, tuple(hidden)
+        self._file, self._wall_limit, self._trusted, self._hidden = tasks, wall_limit, trusted, [
+            Path(folder) for folder in hidden]
 
     def start(self) -> None:
         isolation.try_to_enter_network()
@@ -36,7 +37,7 @@ class Grade(Job):
 
         self._make_judge = Judge
         self._exercises = {(exercise.lab, exercise.name): exercise for exercise in EXERCISES}
-        self._tasks = json.loads(Path(self._tasks).read_text(encoding="utf-8"))
+        self._tasks = json.loads(Path(self._file).read_text(encoding="utf-8"))
         self._judges = {}
         # Tells now, not at the first task, that this machine allows no sandbox.
         self._judge_of("sim", 0)

@@ -78,7 +78,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _machine() -> dict[str, str | None]:
-    found = {"python": platform.python_version(), "machine": platform.machine()}
+    found: dict[str, str | None] = {"python": platform.python_version(), "machine": platform.machine()}
     for name in _LIBRARIES:
         try:
             found[name] = metadata.version(name)

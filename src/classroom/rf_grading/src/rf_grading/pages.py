@@ -97,7 +97,7 @@ def _exercise(results: Results, exercise: Exercise, cell: Cell,
         yield '<p class="hint">%s</p>' % _text(cell.sentence.rstrip(".") + ".")
     if cell.note:
         yield "<p>%s: %s.</p>" % (_text(cell.program), _text(cell.note))
-    if cell.status != GRADED:
+    if cell.status != GRADED or cell.verdict is None:
         return
     runs = cell.verdict["runs"]
     for number, run in enumerate(runs):
