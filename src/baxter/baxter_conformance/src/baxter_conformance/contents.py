@@ -103,7 +103,7 @@ def wrong_with_parameter(name: str, kind: str, value: Any) -> Any:
             return "is %r, not a text" % (value,)
     elif not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
         return "is %r, not a list of names" % (value,)
-    if name == "/rethink/software_version" and not re.match(SUPPORTED_SOFTWARE, value):
+    if name == "/rethink/software_version" and not re.match(SUPPORTED_SOFTWARE, str(value)):
         return "is %r; the SDK supports 1.2.x" % value
     for side in SIDES:
         names = list(joint_names(side))

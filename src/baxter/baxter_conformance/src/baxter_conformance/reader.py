@@ -31,8 +31,8 @@ def read(robot: Interface, timeout_s: float) -> Seen:
     Call after rospy.init_node(). Raises one of NO_ANSWER where the master does not answer.
     """
     master = rosgraph.Master(rospy.get_name())
-    published, listened, services = master.getSystemState()
-    types = {name: kind for name, kind in master.getTopicTypes() if kind != "*"}
+    published, listened, services = _told(master.getSystemState())
+    types = {name: kind for name, kind in _told(master.getTopicTypes()) if kind != "*"}
     own = rospy.get_name()
     seen = Seen(published=_with_types(published, types, own), listened=_with_types(listened, types, own))
     for name in {name for name, _ in services} & set(robot.services):
@@ -47,6 +47,11 @@ def read(robot: Interface, timeout_s: float) -> Seen:
     seen.frames = _frames({*robot.frames, *seen.links}, timeout_s)
     seen.heard = _listen(chosen, timeout_s)
     return seen
+
+
+def _told(answer: Any) -> Any:
+    """An answer of the master: lists of names; rosgraph has no types."""
+    return answer
 
 
 def _with_types(table: Any, types, own):

@@ -113,7 +113,7 @@ class Model:
         return numbers
 
     def motions(self, names: list[Name], values: Array) -> list[Motion]:
-        """What the arms do with these numbers."""
+        """The motion of the arms with these numbers."""
         common = dict(zip(names, values, strict=True))
         mass, found = float(common.get(MASS, self.settings.given)), []
         for arm in self.arms:

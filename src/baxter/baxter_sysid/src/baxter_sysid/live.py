@@ -52,6 +52,7 @@ class RobotArm(Protocol):
 
     def next(self) -> Seen:
         """Wait for the next joint states. Raises SysidError if none come."""
+        ...
 
     def command(self, position: Array, raw: bool) -> None:
         """Send set-points (7,) [rad]: raw ones, or those of position mode, which avoids collisions."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What arms were told and what they did, row by row; CSV files of it."""
+"""Commands to arms and their motions, row by row; CSV files of it."""
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Recording(NamedTuple):
         Raises SysidError where it cannot be used.
         """
         try:
-            table = np.genfromtxt(path, delimiter=",", names=True)
+            table = cast("Any", np.genfromtxt(path, delimiter=",", names=True))  # with names of columns
         except (OSError, ValueError) as error:
             raise SysidError("%s cannot be read: %s" % (path, error)) from error
         found: tuple[dict[str, Array], dict[str, Array]] = ({}, {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import rosgraph
@@ -47,7 +48,7 @@ class RosArm:
             name in self._joints for names in self._names.values() for name in names), _START_S,
             "robot/state and the joints of both arms on robot/joint_states")
         self._wait(lambda: self._publisher.get_num_connections() > 0, _START_S, "the robot to subscribe to "
-                   + self._publisher.resolved_name)
+                   + str(self._publisher.resolved_name))
 
     def posture(self, side: str) -> Array:
         """(7,) [rad] where an arm is."""
@@ -69,7 +70,7 @@ class RosArm:
 
     def others(self) -> list[str]:
         """Names of the other nodes that publish commands of this arm."""
-        publishers, _, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+        publishers = _publishers(rosgraph.Master(rospy.get_name()))
         return sorted(node for topic, nodes in publishers if topic == self._publisher.resolved_name
                       for node in nodes if node != rospy.get_name())
 
@@ -108,6 +109,11 @@ class RosArm:
         self._near = ", ".join(message.collision_object)
 
 
+def _publishers(master: Any) -> list[tuple[str, list[str]]]:
+    """(topic, its nodes) by the master; rosgraph has no types."""
+    return master.getSystemState()[0]
+
+
 def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tuple[Robot, Recording]:
     """Move one arm of the robot on the ROS master, after `agreed(what will happen)`. This process becomes a node.
 
@@ -119,7 +125,7 @@ def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tup
                          "baxter_sysid sysid --arm %s" % (uri, side))
     rospy.init_node("baxter_sysid", anonymous=True, disable_signals=True)
     try:
-        robot = parse_urdf(rospy.get_param("robot_description"), source="robot_description")
+        robot = parse_urdf(str(rospy.get_param("robot_description")), source="robot_description")
     except (KeyError, UrdfError) as error:
         raise SysidError("robot_description on %s cannot be used: %s" % (uri, error)) from error
     space, arm = Space(robot), RosArm(side)
