@@ -32,7 +32,7 @@ class Signal:
         with self._lock:
             self._references = [known for known in self._references if known != reference]
 
-    def __call__(self, *args: int, **kwargs) -> None:
+    def __call__(self, *args: Any, **kwargs: Any) -> None:
         """Call the slots in the order of their connection; errors of a slot reach the caller."""
         with self._lock:
             self._references = [reference for reference in self._references if reference() is not None]

@@ -78,7 +78,7 @@ class Ticker:
         self._next_s += self._period_s
 
 
-def require_timeout(timeout: object) -> float:
+def require_timeout(timeout: Any) -> float:
     """Return a time-out [s] as a float. Raises ValueError for what is no number."""
     try:
         seconds = float(timeout)

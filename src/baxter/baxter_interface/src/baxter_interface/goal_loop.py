@@ -9,8 +9,8 @@ import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import actionlib
 import rospy
+from actionlib.action_server import ActionServer
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
@@ -64,7 +64,7 @@ class GoalLoop:
         self._resets, self._resets_before = Resets(), 0
         self._clock = RosClock(gives_up=lambda: self._is_unwanted() or bool(self._trouble()))
         self._thread = threading.Thread(target=self._run, name=label, daemon=True)
-        self._server = actionlib.ActionServer(name, action, self._goals.put, self._goals.cancel, auto_start=False)
+        self._server = ActionServer(name, action, self._goals.put, self._goals.cancel, auto_start=False)
         start(self._server)
         self._thread.start()
 

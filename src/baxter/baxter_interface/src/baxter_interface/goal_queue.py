@@ -46,7 +46,7 @@ class GoalQueue:
             self._is_closed = True
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> str | None:
+    def take(self, timeout_s: float) -> Any:
         """Return the pending goal, which is then active until :meth:`done`; None if none comes within [s, wall]."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting is not None or self._is_closed, timeout_s)

@@ -6,7 +6,7 @@ import errno
 import json
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
@@ -38,7 +38,9 @@ class GripperLink:
 
     def __init__(self, side: str) -> None:
         self.name = "%s_gripper" % side
-        self.state = self.properties = None
+        # None until the first ones have come, for which the constructor waits.
+        self.state = cast("EndEffectorState", None)
+        self.properties = cast("EndEffectorProperties", None)
         self.parameters = {}
         self.on_type_changed = Signal()
         self.on_gripping_changed = Signal()

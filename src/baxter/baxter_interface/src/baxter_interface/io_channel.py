@@ -33,14 +33,17 @@ class IOChannel:
     report, rospy.ROSInitException before rospy.init_node.
     """
 
-    KIND = ADJECTIVE = STATE = COMMAND = None
+    KIND: str
+    ADJECTIVE: str
+    STATE: type
+    COMMAND: type
 
     def __init__(self, component_id: str) -> None:
         self._id = present_name(component_id)
         if self._id != component_id:
             rospy.logwarn("the %s channel %r of SDK 1.0 is now called %r", self.ADJECTIVE, component_id, self._id)
-        self._last = None
-        self._publisher = None
+        self._last: Any = None
+        self._publisher: rospy.Publisher  # of an output
         topic = "/robot/%s_io/%s/state" % (self.KIND, self._id)
         self._subscriber = rospy.Subscriber(topic, self.STATE, self._on_state, queue_size=10)
         try:

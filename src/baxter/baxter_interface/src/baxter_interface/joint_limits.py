@@ -25,7 +25,7 @@ def read_joint_limits(names: Sequence[str]) -> Any:
     Without a readable description, no joint has limits, and one line is logged.
     """
     try:
-        joints = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description").joints
+        joints = urdf_model.parse_urdf(str(rospy.get_param("robot_description")), source="robot_description").joints
     except KeyError:
         rospy.logwarn("the parameter robot_description is not set: the joints' limits are unknown, and not checked")
         joints = {}

@@ -144,7 +144,7 @@ class Move:
     With less time than the curve takes it follows a FilteredPath.
     """
 
-    def __init__(self, start: dict[str, float], target: dict[str, float], timeout_s: float,
+    def __init__(self, start: dict[str, float], target: dict[str, float], timeout_s: float | None,
                  threshold_rad: float = JOINT_ANGLE_TOLERANCE) -> None:
         self._target = dict(target)
         smooth = SmoothPath(start, target)

@@ -9,7 +9,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
@@ -69,8 +69,8 @@ class Limb:
         self._joint_names = limb_joint_names(limb)
         self._lock = threading.Lock()
         self._angles, self._velocities, self._efforts = {}, {}, {}
-        self._endpoint = None
-        self._robot_state = None
+        self._endpoint = cast("EndpointState", None)  # until the first one has come, for which the constructor waits
+        self._robot_state: AssemblyState | None = None
         self._ignored, self._hindrance = IgnoredCommands(), ArmHindrance(limb)
         self._warned_at_s = {}
 
@@ -267,14 +267,14 @@ class Limb:
         Raises NoIKSolution (a ValueError); OSError with errno ETIMEDOUT if there is no service; ValueError, KeyError or
         TypeError for an invalid pose or seed.
         """
-        request = SolvePositionIKRequest(pose_stamp=[_pose_stamped(pose)])
+        target = _pose_stamped(pose)
+        request = SolvePositionIKRequest(pose_stamp=[target])
         if seed is not None:
             seed = {**self.joint_angles(), **require_joint_values(seed, self._joint_names, "rad")}
             request.seed_angles = [JointState(name=list(seed), position=list(seed.values()))]
         name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % self.name
         answer = call_service(name, SolvePositionIK, request, timeout_s=timeout)
         if not answer.result_type or answer.result_type[0] == answer.RESULT_INVALID:
-            target = request.pose_stamp[0]
             point, why = target.pose.position, self._why_no_solution(target)
             raise NoIKSolution("the %s arm has no solution for the end-point at x y z %.3f %.3f %.3f in %s with this "
                                "orientation%s; more: rostopic echo -n 1 %s"

@@ -2,7 +2,7 @@
 """One of the four navigators: a wheel, three buttons and two lights on an arm or on the torso."""
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import rospy
 from baxter_core_msgs.msg import NavigatorState
@@ -37,7 +37,7 @@ class Navigator:
             raise AttributeError("there is no navigator %r: the navigators are %s"
                                  % (location, ", ".join(map(repr, LOCATIONS))))
         self._id = location
-        self._last = None
+        self._last = cast("NavigatorState", None)  # until the first one has come, for which the constructor waits
         self.button0_changed = Signal()
         self.button1_changed = Signal()
         self.button2_changed = Signal()

@@ -49,12 +49,12 @@ class Presence:
 def _has_living_publisher(topic: str) -> bool:
     master = rosgraph.Master(rospy.get_name())
     try:
-        nodes = dict(master.getSystemState()[0]).get(topic, [])
+        nodes = dict(startup.system_state(master)[0]).get(topic, [])
     except _NO_ANSWER:
         return False
     for node in nodes:
         try:
-            address = urlparse(master.lookupNode(node))
+            address = urlparse(str(master.lookupNode(node)))
             startup.connect(address.hostname, address.port)
             return True
         except _NO_ANSWER:

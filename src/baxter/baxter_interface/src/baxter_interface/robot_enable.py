@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import errno
+import math
 import threading
 import time
 from typing import Any
@@ -41,9 +42,9 @@ class RobotEnable:
     def __init__(self, versioned: bool = False) -> None:
         self._lock = threading.Lock()
         self._state = None
-        self._heard_at_s = None
+        self._heard_at_s = -math.inf
         self._subscriber = rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1)
-        conditions = [startup.message_arrives(self._subscriber.resolved_name, lambda: self._state is not None)]
+        conditions = [startup.message_arrives(str(self._subscriber.resolved_name), lambda: self._state is not None)]
         if versioned:
             conditions.insert(0, startup.parameter_set(rospy.resolve_name(VERSION_PARAMETER)))
         try:

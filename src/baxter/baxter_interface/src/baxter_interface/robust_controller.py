@@ -33,7 +33,7 @@ class RobustController:
     STATE_RUNNING = int(State.RUNNING)
     STATE_STOPPING = int(State.STOPPING)
 
-    def __init__(self, namespace: str, enable_msg: Message, disable_msg: Message, timeout: int = 60) -> None:
+    def __init__(self, namespace: str, enable_msg: Message, disable_msg: Message, timeout: float = 60) -> None:
         self._namespace = namespace
         self._messages = {True: enable_msg, False: disable_msg}
         self._timeout_s = timeout
@@ -54,7 +54,7 @@ class RobustController:
         Raises OSError: errno EIO if the robot reports a failure, ENOMSG if it ended without saying how, ETIMEDOUT,
         ECONNABORTED if ROS shut down meanwhile.
         """
-        status = self._subscriber.resolved_name
+        status = str(self._subscriber.resolved_name)
         startup.wait_for_start([startup.topic_published(status)], startup.PART_TIMEOUT_S)
         startup.wait_for_subscribers(self._publisher)
         # Reports from before the request belong to an earlier run.

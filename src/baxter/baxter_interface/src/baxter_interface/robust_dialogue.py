@@ -50,9 +50,9 @@ class Dialogue:
 
     def __init__(self, timeout_s: float) -> None:
         self.state = State.STARTING
-        self.failure = None
+        self.failure: tuple[int, str] | None = None
         self._timeout_s = timeout_s
-        self._stopping_since_s = None
+        self._stopping_since_s = 0.0
         self._next_request_s = 0.0
 
     def step(self, elapsed_s: float, report: Report | None) -> bool | None:
@@ -60,7 +60,7 @@ class Dialogue:
         False for "stop", None for none."""
         if self.state is State.STARTING:
             self._start(elapsed_s, report)
-        elif self.state is State.RUNNING:
+        elif self.state is State.RUNNING and report is not None:
             self._run(elapsed_s, report)
         if self.state is State.STOPPING:
             self._stop(elapsed_s, report)

@@ -9,6 +9,7 @@ from typing import Any
 import rosgraph
 import rospy
 
+from . import startup
 from .patience import others_than
 
 
@@ -34,7 +35,7 @@ def wait_for_service(name: str, timeout_s: float) -> None:
 def _services() -> list[str]:
     """List the names of the services that the master knows; none if it does not answer."""
     try:
-        return [service for service, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]]
+        return [service for service, _ in startup.system_state(rosgraph.Master(rospy.get_name()))[2]]
     except (OSError, rosgraph.MasterException):
         return []
 

@@ -11,7 +11,7 @@ import socket
 import xml.parsers.expat
 import xmlrpc.client
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 from urllib.parse import urlparse
 
 import rosgraph
@@ -24,6 +24,8 @@ from rospy_nodes.start import limit_ports
 
 from .patience import Condition, others_than, wait_in_order
 
+#: (name, its nodes) of topics or services.
+Registered = list[tuple[str, list[str]]]
 # Longest wait for a robot [s, wall], not counting the time while a simulator is starting.
 STARTUP_TIMEOUT_S = 30.0
 # Longest wait for one part of a robot that is up [s, wall]: shorter, because the part may not exist.
@@ -179,7 +181,7 @@ def wait_for_subscribers(publisher: rospy.Publisher, timeout: float = 1.0, enoug
     `timeout` [s, wall] in any case: a subscriber on the list may be dead. `enough`: this many are enough; None for all.
     """
     try:
-        expected = len(_nodes_of(publisher.resolved_name, subscribers=True))
+        expected = len(_nodes_of(str(publisher.resolved_name), subscribers=True))
     except _MASTER_ERRORS:
         return
     if enough is not None:
@@ -201,8 +203,13 @@ def _master():
     return rosgraph.Master(_caller())
 
 
-def _nodes_of(topic: str, subscribers: bool = False):
-    published, subscribed, _services = _master().getSystemState()
+def system_state(master: rosgraph.Master) -> tuple[Registered, Registered, Registered]:
+    """Publishers, subscribers and services by the master: (name, nodes) each. Raises what rosgraph raises."""
+    return cast("tuple[Registered, Registered, Registered]", master.getSystemState())  # rosgraph has no types
+
+
+def _nodes_of(topic: str, subscribers: bool = False) -> list[str]:
+    published, subscribed, _services = system_state(_master())
     return dict(subscribed if subscribers else published).get(topic, [])
 
 
@@ -216,7 +223,7 @@ def _publishers(topic: str):
 def _explain_topic(topic: str) -> str:
     """Explain from the master's data why no message of `topic` came."""
     try:
-        published = dict(_master().getSystemState()[0])
+        published = dict(system_state(_master())[0])
     except _MASTER_ERRORS as error:
         return "the master at %s is gone (%s)" % (rosgraph.get_master_uri(), error)
     if topic in published:

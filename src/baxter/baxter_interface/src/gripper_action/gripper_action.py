@@ -40,10 +40,11 @@ class GripperActionServer:
         self._gripper = Gripper(gripper, CHECK_VERSION)
         self._config = reconfig_server
         name, kind = self._gripper.name, self._gripper.type()
-        self._actions = {ELECTRIC.name: _Electric, SUCTION.name: _Suction}.get(kind)
-        if self._actions is None:
+        actions = {ELECTRIC.name: _Electric, SUCTION.name: _Suction}.get(kind or "")
+        if actions is None:
             raise OSError(errno.ENODEV, "%s is of type %s; this server moves electric and suction grippers"
                           % (name, kind))
+        self._actions = actions
         self._prepare()
         self._loop = GoalLoop("robot/end_effector/%s/gripper_action" % name, GripperCommandAction, RobotEnable(), name,
                               self._begin)
@@ -133,7 +134,7 @@ class _Suction:
         """(position [%], vacuum [%], stalled, reached)."""
         reached = self._pushed and (not (self._gripper.sucking() or self._gripper.blowing()) if self._opens
                                     else self._gripper.gripping())
-        return self._gripper.position(), self._gripper.vacuum_sensor(), False, reached
+        return self._gripper.position(), self._gripper.vacuum_sensor() or 0.0, False, reached
 
     def push(self) -> None:
         if self._pushed:

@@ -11,6 +11,7 @@ from baxter_control.pid import PID
 from joint_trajectory import Follower, GoalTolerances, Tolerances, bounds, merge_tolerances
 
 if TYPE_CHECKING:
+    from joint_trajectory import Verdict
     from joint_trajectory.command import Command
     from joint_trajectory.limits import Limits
 
@@ -114,7 +115,7 @@ class ArmMotion:
         self.begin_s = now_s if command.start_time is None else command.start_time
         return replacement
 
-    def tick(self, now_s: float, position: np.ndarray, velocity: np.ndarray) -> None:
+    def tick(self, now_s: float, position: np.ndarray, velocity: np.ndarray) -> Verdict | None:
         """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`Verdict` if the goal ends now.
 
         A goal that fails during the motion stops the joints where they are; one that fails at its end holds the end.

@@ -7,9 +7,9 @@ import threading
 import traceback
 from typing import TYPE_CHECKING, Any
 
-import actionlib
 import numpy as np
 import rospy
+from actionlib.action_server import ActionServer
 from baxter_core_msgs.msg import JointCommand
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
@@ -96,7 +96,7 @@ class JointTrajectoryActionServer:
                                                    queue_size=1, tcp_nodelay=True)
         self._command_subscriber = rospy.Subscriber(prefix + "joint_command", JointCommand, self._on_joint_command,
                                                     queue_size=1)
-        self._server = actionlib.ActionServer(prefix + "follow_joint_trajectory", FollowJointTrajectoryAction,
+        self._server = ActionServer(prefix + "follow_joint_trajectory", FollowJointTrajectoryAction,
                                               self._on_goal, self._on_cancel, auto_start=False)
         self._thread = threading.Thread(target=self._guarded, name="%s arm" % limb, daemon=True)
         start(self._server)

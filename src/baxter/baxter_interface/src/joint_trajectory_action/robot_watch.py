@@ -2,9 +2,10 @@
 """Watches robot, cuff and clock for reasons why an arm cannot be commanded, now or since a motion began."""
 from __future__ import annotations
 
+import math
 import threading
 import time
-from typing import Any
+from typing import Any, cast
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, DigitalIOState
@@ -28,10 +29,10 @@ class RobotWatch:
     def __init__(self, side: str) -> None:
         self._side = side
         self._lock = threading.Lock()
-        self._state = None
+        self._state = cast("AssemblyState", None)  # until the first one has come, for which the constructor waits
         self._cuff = False
         self._event = ""
-        self._heard_ros_s = self._heard_wall_s = None
+        self._heard_ros_s = self._heard_wall_s = -math.inf
         self._topic = rospy.resolve_name("robot/joint_states")
         self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
         self._resets = Resets(self._on_reset)
@@ -42,8 +43,8 @@ class RobotWatch:
             rospy.Subscriber("robot/digital_io/%s_lower_cuff/state" % side, DigitalIOState, self._on_cuff,
                              queue_size=1)]
         startup.wait_for_start([
-            startup.message_arrives(self._subscribers[0].resolved_name, lambda: self._state is not None),
-            startup.message_arrives(self._topic, lambda: self._heard_wall_s is not None)])
+            startup.message_arrives(str(self._subscribers[0].resolved_name), lambda: self._state is not None),
+            startup.message_arrives(self._topic, lambda: self._heard_wall_s > -math.inf)])
 
     def begin(self) -> str:
         """Forget earlier events; return why the arm cannot be commanded, or ""."""
@@ -112,7 +113,7 @@ class RobotWatch:
     def _on_joint_states(self, _message) -> None:
         now_s = rospy.get_time()
         with self._lock:
-            if self._heard_ros_s is not None and now_s < self._heard_ros_s:
+            if now_s < self._heard_ros_s:
                 self._note("time went back from %.3f to %.3f s: the simulation was reset or restarted"
                            % (self._heard_ros_s, now_s))
             self._heard_ros_s, self._heard_wall_s = now_s, time.monotonic()
