@@ -80,7 +80,7 @@ class ServoNode:
         self._heard: set[str] = set()
         self._indices = [model.index[name] for name in self.servo.joints]
         self._sent, self._halts, self._new_settings = False, 0, settings
-        self._said = (Status.NO_WARNING, "")
+        self._said, self._rests = (Status.NO_WARNING, ""), True
         self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
                                     {"joint_state_topic": settings.joint_topic})
         self._prepare(self.monitor.scene())
@@ -191,42 +191,49 @@ class ServoNode:
         was given, from where the arm is."""
         lasting(self._faults, "that makes the steps", self._steps)(rospy.is_shutdown)
 
-    def _steps(self, ends: Callable[[], bool]) -> None:
+    def _begin_again(self) -> None:
+        """Forget commands and motion."""
         with self._lock:
             self.commands.clear()
         self.servo.reset()
+        self._rests = True
+
+    def _steps(self, ends: Callable[[], bool]) -> None:
+        self._begin_again()
         last = rospy.get_time()
         due = last
         while not ends():
             settings = self.servo.settings
             due = max(due + settings.publish_period, rospy.get_time() - settings.publish_period)
-            self._wait_until(due, settings)
+            begins = self._wait_until(due, settings)
             now = rospy.get_time()
             if now < last:
-                with self._lock:
-                    self.commands.clear()
-                self.servo.reset()
+                self._begin_again()
                 last = due = now
                 continue
             seconds = min(now - last, _MAX_PERIODS * settings.publish_period)
             last = now
+            if begins:
+                seconds, due = settings.publish_period, now
             if seconds > 0.0:
                 self._step(now, seconds)
 
-    def _wait_until(self, due: float, settings: ServoSettings) -> None:
-        self._news.clear()
+    def _wait_until(self, due: float, settings: ServoSettings) -> bool:
+        """Wait until a step is ``due`` [s]. True: a command has come before to an arm at rest, which begins at once,
+        with a step of one period."""
         while not rospy.is_shutdown():
             left = due - rospy.get_time()
             if left <= 0.0 or left > 10.0 * settings.publish_period:
-                return
-            if settings.low_latency_mode:
-                if self._news.wait(min(left, 0.001)):
-                    return
+                break
+            if self._rests or settings.low_latency_mode:
+                if self._news.wait(left if self._rests else min(left, 0.001)):
+                    return self._rests
             else:
                 try:
                     rospy.sleep(left)
                 except rospy.ROSException:  # time has gone back, or the node ends
-                    return
+                    break
+        return False
 
     def _step(self, now: float, seconds: float) -> None:
         servo = self.servo
@@ -237,10 +244,12 @@ class ServoNode:
                 rospy.logwarn("the parameters stay as they were: %s", error)
             self._new_settings = servo.settings
         settings = servo.settings
+        self._news.clear()
         with self._lock:
             q, velocity = self._q.copy(), self._velocity.copy()
             kind, value, frame = self.commands.newest(now, settings)
         step = servo.step(q, velocity, self._command(kind, value, frame, q, settings), seconds)
+        self._rests = step.rests
         if step.reached and not settings.target_pose_timeout:
             with self._lock:
                 self.commands.reached()
