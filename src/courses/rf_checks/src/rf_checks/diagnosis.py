@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from baxter_model import SIDES
+from baxter_model.readiness import UNFOLD
 from rf_checks import slips
 from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
 from rf_checks.recording import RECORD_S, Fault
@@ -267,8 +268,8 @@ def held_back(run: Run, sides: tuple[str]) -> Fault | None:
         held = run.recording.held(side)
         if held and path_length(run.recording.arm(side)[held[0]:]) < STRAY_RAD:
             return Fault("held", "collision avoidance held the %s arm at %.1f s: it came too near to %s. Take "
-                         "another way; move_to_joint_positions returns False there, and its log says so"
-                         % (side, run.recording.times[held[0]], ", ".join(held[1])))
+                         "another way, unfold folded arms (%s); move_to_joint_positions returns False there, and its "
+                         "log says so" % (side, run.recording.times[held[0]], ", ".join(held[1]), UNFOLD))
     return None
 
 

@@ -125,7 +125,7 @@ def test_an_arm_that_collision_avoidance_held_is_told():
             trace.records[row]["held"] = {"left": ["collision_head_link_1"], "right": []}
         return run(trace)
     fault = diagnosis.held_back(held_in(range(100, 150)), ("left",))
-    assert fault.key == "held" and "left arm at 1.5 s" in fault.sentence
+    assert fault.key == "held" and "left arm at 1.5 s" in fault.sentence and "tuck_arms.py -u" in fault.sentence
     assert "too near to collision_head_link_1" in fault.sentence
     assert diagnosis.held_back(held_in([]), ("left",)) is None
     assert diagnosis.held_back(held_in([100]), ("right",)) is None
