@@ -19,6 +19,9 @@ from .errors import LabError
 from .planning import FLOOR
 
 if TYPE_CHECKING:
+    from sensor_renderer.gl_renderer import GlRenderer
+    from sensor_renderer.tiny_renderer import TinyRenderer
+
     from .lab import Lab
 
 #: {camera: the link that is its optical frame}
@@ -40,7 +43,9 @@ class Cameras:
     """Draws the world of a lab. lab: `lab.Lab`. What it draws with is made at the first picture."""
 
     def __init__(self, lab: Lab) -> None:
-        self._lab, self._mirror, self._renderer, self._shown = lab, None, None, None
+        self._lab, self._shown = lab, None
+        self._mirror: Mirror | None = None
+        self._renderer: GlRenderer | TinyRenderer | None = None
         self._lenses = {}
 
     def close(self) -> None:
@@ -70,15 +75,15 @@ class Cameras:
         return self._draw(pinhole, looking_at(np.asarray(eye, dtype=float), np.asarray(target, dtype=float)), depth)
 
     def _draw(self, pinhole, frame, depth):
-        self._follow()
-        pixels, distance = self._renderer.render(self._mirror, pinhole, frame, True, depth)
+        renderer, mirror = self._follow()
+        pixels, distance = renderer.render(mirror, pinhole, frame, True, depth)
         matrix = np.array([[pinhole.fx, 0.0, pinhole.cx], [0.0, pinhole.fy, pinhole.cy], [0.0, 0.0, 1.0]])
-        return Picture(pixels.copy(), distance.copy() if depth else None, frame, matrix)
+        return Picture(np.array(pixels), None if distance is None else distance.copy(), frame, matrix)
 
-    def _follow(self):
+    def _follow(self) -> tuple[GlRenderer | TinyRenderer, Mirror]:
         """Bring the mirror to the world's present state."""
         models = self._lab.world.models
-        if self._mirror is None:
+        if self._mirror is None or self._renderer is None:
             self._mirror = Mirror(DrawingCache(), self._lab.find_mesh, self._lab._warn)
             self._renderer, problem = best_renderer()
             if problem:
@@ -92,6 +97,7 @@ class Cameras:
             pose = model.base_pose()
             values += [*pose.position, *pose.quaternion, *model.read_joints()[0].tolist()]
         self._mirror.set_state(np.array(values))
+        return self._renderer, self._mirror
 
 
 def _lenses(urdf):

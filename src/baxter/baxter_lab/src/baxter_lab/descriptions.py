@@ -4,6 +4,7 @@ import contextlib
 import importlib
 import threading
 from pathlib import Path
+from typing import Any, cast
 
 import yaml
 
@@ -17,7 +18,7 @@ _engine = threading.Lock()
 @contextlib.contextmanager
 def _answers(packages):
     """Let ``$(find PACKAGE)`` be answered by `packages`: PyPI's xacro would ask a ROS 2 that is not here."""
-    substitution = importlib.import_module("xacro.substitution_args")
+    substitution = cast("Any", importlib.import_module("xacro.substitution_args"))
     before = substitution._eval_find, dict(substitution._eval_dict)
     substitution._eval_find = substitution._eval_dict["find"] = packages.get_path
     try:
@@ -32,7 +33,9 @@ def _expanded(package, file, arguments):
     packages = find_packages()
     path = Path(packages.get_path(package)) / file
     with _engine, _answers(packages):
-        return xacro.process_file(str(path), mappings=dict(arguments)).toxml()
+        # Here it is PyPI's, not the command of the same name in this workspace.
+        return xacro.process_file(  # pyright: ignore[reportAttributeAccessIssue]
+            str(path), mappings=dict(arguments)).toxml()
 
 
 def baxter_urdf(arguments: dict[str, str]) -> str:

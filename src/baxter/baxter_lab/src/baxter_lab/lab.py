@@ -237,7 +237,8 @@ class Lab:
         It is fixed unless it has a `mass_kg`; `friction`, `colour`: as in `Body`. Raises BulletSimError for a name
         that is taken, and for numbers out of bounds.
         """
-        return self._spawn(name, Box(tuple(map(float, size))), place, yaw, Body(**body))
+        x, y, z = map(float, size)
+        return self._spawn(name, Box((x, y, z)), place, yaw, Body(**body))
 
     def add_cylinder(self, name: str, radius: float, length: float, place: npt.ArrayLike, yaw: float = 0.0,
                      **body: Any) -> Thing:

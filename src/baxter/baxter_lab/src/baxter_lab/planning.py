@@ -32,7 +32,8 @@ class Planning:
     """The planner of a Lab; made at the first plan, which takes seconds. lab: `lab.Lab`."""
 
     def __init__(self, lab: Lab) -> None:
-        self._lab, self._exact, self._limits = lab, None, None
+        self._lab, self._exact = lab, None
+        self._limits: dict[str, dict[str, float]] = {}
 
     def _checker(self):
         if self._exact is None:

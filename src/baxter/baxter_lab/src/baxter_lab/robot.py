@@ -93,7 +93,8 @@ class Arm:
         self.joint_names = self.chain.joint_names
         self.gripper = Gripper(simulated, side, wait)
         self._index = simulated.limb_index[side]
-        self._posed_at = self._pose = None
+        self._posed_at: np.ndarray | None = None
+        self._pose = np.eye(4)
 
     @property
     def angles(self) -> np.ndarray:
@@ -128,7 +129,8 @@ class Arm:
         """The command mode of each joint."""
         return [Mode(mode) for mode in self._simulated.baxter.arms.modes(self.side)]
 
-    def command(self, mode: Mode, values: Sequence[float], names: Sequence[str] | None = None) -> JointCommand:
+    def command(self, mode: Mode, values: Sequence[float] | np.ndarray,
+                names: Sequence[str] | None = None) -> JointCommand:
         """One joint command, as on ``joint_command``: `values` [rad, rad/s or Nm] for `names`, by default all joints.
 
         Streamed modes expire after 0.2 s. Returns the command as the robot took it, whose ``clamped`` names the joints

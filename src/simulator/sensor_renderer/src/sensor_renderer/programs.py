@@ -135,7 +135,7 @@ def set_uniform(program: moderngl.Program, name: str, value: float | tuple[float
 
 
 def _kinds(light: Light) -> _Kinds:
-    """What the programs depend on."""
+    """The parts of the light that the programs depend on."""
     return light.shadows and any(light.sun), light.sky, tuple(lamp.kind for lamp in light.lamps)
 
 
