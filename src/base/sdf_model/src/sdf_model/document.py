@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ ROOT_TAGS = ("sdf", "gazebo")
 #: The size of a shape whose size is 0 [m].
 NO_SIZE_M = 1e-4
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
+_NUMBER = re.compile(r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf(?:inity)?|nan)", re.IGNORECASE)
 
 
 class SdfError(ValueError):
@@ -133,44 +135,65 @@ class Document:
 
     def number(self, element: etree._Element, tag: str, default: float | None = None,
                may_be_infinite: bool = False) -> float | None:
-        """Return the number in a child, or ``default``."""
-        child = element.find(tag)
+        """Return the number in a child, or ``default``, also where the child is empty."""
+        child = self._filled(element, tag, default)
         return default if child is None else self.numbers(child, 1, may_be_infinite)[0]
 
     def vector(self, element: etree._Element, tag: str, default: Sequence[float]) -> tuple[float, ...]:
-        """Return the numbers (tuple) in a child, as many as ``default`` has."""
-        child = element.find(tag)
+        """Return the numbers (tuple) in a child, as many as ``default`` has, which an empty one means, too."""
+        child = self._filled(element, tag, default)
         return tuple(default) if child is None else self.numbers(child, len(default))
 
+    def _filled(self, element, tag, default):
+        """The child ``tag``, None if there is none or nothing in it."""
+        child = element.find(tag)
+        if child is None or (child.text or "").strip():
+            return child
+        self.mend(child, "<%s> without a number, for which %s is used" % (tag, "the default" if default is None else
+                                                                         default))
+        return None
+
     def positive(self, element: etree._Element, tag: str, count: int) -> tuple[float, ...]:
-        """Return ``count`` positive numbers in a child that must be there; 0 is NO_SIZE_M, as in Gazebo."""
+        """Return ``count`` positive numbers in a child: SDF's 1 where there is none, NO_SIZE_M for 0, as in Gazebo, and
+        no more than a length may be."""
         child = element.find(tag)
         if child is None:
-            raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
-        values = self.numbers(child, count)
+            self.mend(element, "<%s> without <%s>, which is 1" % (element.tag, tag))
+            return (1.0,) * count
+        values = self.vector(element, tag, (1.0,) * count)
         if min(values) < 0.0:
             raise self.error(child, "<%s> is '%s', expected positive numbers" % (tag, child.text.strip()))
         if min(values) == 0.0:
             self.mend(child, "<%s> of %s, of which %g is used for 0" % (tag, child.text.strip(), NO_SIZE_M))
-        return tuple(value or NO_SIZE_M for value in values)
+        if max(values) > bounds.LENGTH.high:
+            self.mend(child, "<%s> of %s, of which %g is used at most" % (tag, child.text.strip(), bounds.LENGTH.high))
+        return tuple(min(value or NO_SIZE_M, bounds.LENGTH.high) for value in values)
 
     def numbers(self, element: etree._Element, count: int, may_be_infinite: bool = False) -> tuple[float, ...]:
-        """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something. Further
-        ones are left out, as by Gazebo, with a note."""
+        """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something.
+
+        As sdformat does, it reads numbers as long as there are some, and true and false for 1 and 0; what is left is
+        noted."""
         text = (element.text or "").strip()
-        try:
-            values = tuple(float(word) for word in text.split())
-        except ValueError:
-            values = ()
-        known = all(math.isfinite(value) or may_be_infinite and math.isinf(value) for value in values)
-        if len(values) > count and known:
-            self.mend(element, "<%s> of %s, of which the first %d are used" % (element.tag, text, count))
-            values = values[:count]
-        if len(values) != count or not known:
+        words = [{"true": "1", "false": "0"}.get(word.lower(), word) for word in text.split()]
+        values, left = [], len(words) != count
+        for word in words[:count]:
+            found = _NUMBER.match(word)
+            if found is None:
+                break
+            values.append(float(found.group()))
+            if found.end() < len(word):
+                left = True
+                break
+        if len(values) != count or not all(math.isfinite(value) or may_be_infinite and math.isinf(value)
+                                           for value in values):
             raise self.error(
                 element, "<%s> is '%s', expected %d number%s" % (element.tag, text, count, "s" * (count > 1))
             )
-        return values
+        if left or words != text.split():
+            self.mend(element, "<%s> of %s, of which %s is used"
+                      % (element.tag, text, " ".join("%g" % value for value in values)))
+        return tuple(values)
 
     @staticmethod
     def relative_to(element: etree._Element) -> str:

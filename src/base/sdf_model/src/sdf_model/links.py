@@ -66,7 +66,8 @@ def _inertial(document: Document, link: etree._Element) -> Inertial:
         return Inertial(1.0, np.zeros(3), np.eye(3))
     mass = document.number(element, "mass", 1.0)
     if mass <= 0.0:
-        raise document.error(element, "<mass> is %g kg, expected a positive number" % mass)
+        document.mend(element, "<mass> of %g kg, which no body has" % mass)
+        mass = 0.0
     matrix = np.eye(3)
     inertia = element.find("inertia")
     if inertia is not None:

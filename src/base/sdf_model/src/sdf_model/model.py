@@ -395,7 +395,7 @@ def _dynamics(document: Document, axis: etree._Element) -> Dynamics:
     if element is None:
         return Dynamics()
     # Gazebo takes a negative damping or stiffness for one that it may reduce.
-    return Dynamics(*(_bounded(document, element, tag, take(document.number(element, tag, 0.0)), bound)
+    return Dynamics(*(_bounded(document, element, tag, take(document.number(element, tag, 0.0, True)), bound)
                       for tag, take, bound in (("damping", abs, bounds.DAMPING), ("friction", float, bounds.FRICTION),
                                                ("spring_stiffness", abs, bounds.DAMPING),
                                                ("spring_reference", float, bounds.POSITION))))
@@ -425,14 +425,14 @@ def _limit(document: Document, given: etree._Element, name: str, kind: str) -> t
     element = given.find("limit")
     if element is None:
         return ("continuous" if kind == "revolute" else kind), Limit()
-    lower = document.number(element, "lower", -math.inf)
-    upper = document.number(element, "upper", math.inf)
+    lower = document.number(element, "lower", -math.inf, may_be_infinite=True)
+    upper = document.number(element, "upper", math.inf, may_be_infinite=True)
     if lower > upper:
         document.mend(element, "joint '%s' with lower limit %g above its upper limit %g: no limits, as for ODE"
                       % (name, lower, upper))
         lower, upper = -math.inf, math.inf
     # In SDF, a negative limit means unlimited.
-    values = (document.number(element, tag, -1.0) for tag in ("effort", "velocity"))
+    values = (document.number(element, tag, -1.0, may_be_infinite=True) for tag in ("effort", "velocity"))
     effort, velocity = (value if 0.0 <= value <= bounds.NO_LIMIT else None for value in values)
     if lower <= -bounds.NO_LIMIT and upper >= bounds.NO_LIMIT or kind == "continuous":
         return ("continuous" if kind == "revolute" else kind), Limit(velocity=velocity, effort=effort)

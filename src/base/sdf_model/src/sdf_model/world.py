@@ -21,6 +21,8 @@ from .model import ModelReader, SdfModel, actor, unused
 
 # Left out, with a note.
 _NAMED = ("plugin",)
+# SDF's [s, m/s^2].
+_STEP_S, _GRAVITY = 0.001, (0.0, 0.0, -9.8)
 _ROAD_HEIGHT_M = 0.002
 _AT_REST = 0.01  # m/s and rad/s: what Gazebo saves of bodies that stand
 _ASPHALT = (0.25, 0.25, 0.25, 1.0)
@@ -97,7 +99,7 @@ class _WorldReader:
         document = self._document
         step = element.find("max_step_size")
         if step is not None:
-            (value,) = document.numbers(step, 1)
+            value = document.number(element, "max_step_size", _STEP_S)
             used = min(max(value, bounds.TIME_STEP.low), bounds.TIME_STEP.high)
             if used != value:
                 document.mend(step, "<max_step_size> of %g s, for which %g s is used" % (value, used))
@@ -106,7 +108,7 @@ class _WorldReader:
             self._world.gravity = self._gravity(element)
 
     def _gravity(self, element: etree._Element) -> tuple[float, ...]:
-        return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", (0.0,) * 3),
+        return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", _GRAVITY),
                              element.find("gravity"))
 
     def _bounded(self, bound: bounds.Bound, values: tuple[float, ...], element: etree._Element) -> tuple[float, ...]:

@@ -347,13 +347,13 @@ def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
     found = world(tmp_path, """<include><uri>model://castle</uri></include>
 <include><uri>model://can</uri></include>
 <include><uri>model://can</uri><name>can</name></include>
-<model name="bad"><link name="l"><inertial><mass>0</mass></inertial></link></model>""", shelf)
+<model name="bad"><link name="l"><inertial><mass>much</mass></inertial></link></model>""", shelf)
     assert [model.name for model in found.models] == ["can"]
     missing, twice, massless = found.problems
     assert "a.world, line 3" in missing and "model://castle not found" in missing and "one" in missing
     assert "GAZEBO_MODEL_PATH" in missing
     assert "line 5" in twice and "appears twice" in twice and "<name>" in twice
-    assert "line 6" in massless and "<mass> is 0 kg" in massless
+    assert "line 6" in massless and "<mass> is 'much'" in massless
 
 
 def test_what_is_not_understood_is_one_warning_with_file_and_lines(tmp_path, shelf):
@@ -532,7 +532,6 @@ def test_a_joint_may_have_a_spring():
     (sdf('<link name="a"><gravity>maybe</gravity></link>'), "<gravity> is 'maybe', expected true or false"),
     (sdf('<link name="a"><visual name="c"><geometry><sphere><radius>-1</radius></sphere></geometry></visual></link>'),
      "<radius> is '-1', expected positive"),
-    (sdf('<link name="a"><visual name="c"><geometry><box/></geometry></visual></link>'), "<box> has no <size>"),
     (sdf('<link name="a"/>' + joint("j", "a", "b", "fixed")), "frame 'b' does not exist; frames: a, j"),
     (sdf('<link name="a"/>' + joint("j", "b", "a", "fixed")), "'j' names link 'b', which does not exist; links: a"),
     (sdf('<link name="a"><pose relative_to="b"/></link><link name="b"><pose relative_to="a">1 0 0 0 0 0</pose></link>'),
@@ -588,9 +587,29 @@ def test_a_shape_without_a_size_is_tiny_and_a_negative_one_is_refused():
         parse_sdf_model(sdf(box % "1 1 -1"), "m.sdf")
 
 
-def test_numbers_too_many_are_left_out_with_a_note():
-    plane = ('<link name="l"><visual name="v"><geometry><plane><normal>0 0 1</normal><size>2 3 4</size></plane>'
-             "</geometry></visual></link>")
-    found = parse_sdf_model(sdf(plane), "m.sdf")
-    assert found.robot.links["l"].visuals[0].geometry == Plane((2.0, 3.0))
-    assert "<size> of 2 3 4, of which the first 2 are used (m.sdf line" in found.warning
+# What sdformat reads; None: that its default is used.
+@pytest.mark.parametrize("path, tag, text, expected", [
+    ("collision/geometry/sphere", "radius", "2.5m", 2.5), ("collision/geometry/sphere", "radius", "2 3", 2.0),
+    ("collision/geometry/sphere", "radius", "", 1.0), ("collision/geometry/sphere", None, "", 1.0),
+    ("collision/geometry/sphere", "radius", "1e6", 1e4), ("collision/surface/friction/ode", "mu", "true", 1.0),
+    ("collision/surface/friction/ode", "mu", "", None), ("inertial", "mass", "", 1.0), ("inertial", "mass", "0", 0.0),
+    ("axis/limit", "lower", "-inf", None), ("axis/limit", "effort", "inf", None), ("axis/limit", "upper", "", None),
+    ("axis/dynamics", "damping", "inf", 1e12), ("axis/dynamics", "damping", "", 0.0)])
+def test_numbers_are_read_as_by_sdformat_with_a_note(path, tag, text, expected):
+    inside = "<%s>%s</%s>" % (tag, text, tag) if tag else ""
+    for part in reversed(path.split("/")):
+        inside = "<%s>%s</%s>" % (part, inside, part)
+    shape = '<geometry><sphere><radius>1</radius></sphere></geometry>'
+    held = inside.replace("<collision>", '<collision name="c">' + shape * ("<surface>" in inside))
+    hinge = joint("j", "a", "b", axis=inside.replace("<axis>", "<axis><xyz>0 0 1</xyz>") if path.startswith("axis")
+                  else "<axis><xyz>0 0 1</xyz></axis>")
+    found = parse_sdf_model(sdf('<link name="a">%s</link><link name="b"/>%s' % (
+        "" if path.startswith("axis") else held, hinge)), "m.sdf")
+    link, turns = found.robot.links["a"], found.robot.joints["j"]
+    read = {"sphere": lambda: link.collisions[0].geometry.radius, "ode": lambda: link.surface and link.surface.friction,
+            "inertial": lambda: link.inertial.mass, "limit": lambda: getattr(turns.limit, tag),
+            "dynamics": lambda: turns.damping}
+    assert read[path.split("/")[-1]]() == expected
+    assert ("not as SDF has it, but read" in found.warning) == ("inf" not in text or tag == "damping")
+
+
