@@ -107,7 +107,7 @@ def judge(joint_names: Sequence[str], points: Any,
     return Plan(names, joined(lead_in, trajectory) if lead_in else trajectory, positions[-1])
 
 
-def _pace(names: tuple[str, str], bounds: np.ndarray, settings: StreamerSettings) -> tuple[np.ndarray, np.ndarray]:
+def _pace(names: tuple[str, ...], bounds: np.ndarray, settings: StreamerSettings) -> tuple[np.ndarray, np.ndarray]:
     """Velocities [rad/s] and accelerations [rad/s^2] (k,) for trajectories whose times the server chooses."""
     velocity, acceleration = ([table[name.rpartition("_")[2]] for name in names]
                               for table in (settings.max_velocity, settings.max_acceleration))
@@ -157,7 +157,7 @@ def _judge_times(times: np.ndarray, settings: StreamerSettings) -> None:
 
 
 def _start(names: tuple[str, ...], first: np.ndarray, limits: dict[str, JointLimit],
-           measured: dict[str, float]) -> np.ndarray:
+           measured: dict[str, float] | None) -> np.ndarray:
     """(k,) [rad]: the robot's position, or, if that is unknown, the position within the limits nearest to ``first``."""
     for name in names:
         if name not in limits:

@@ -34,7 +34,7 @@ class LineMove:
         self._client = client
         if not rospy.has_param("robot_description"):
             raise SettingsError("the parameter robot_description is not set; the arms' kinematics are read from it")
-        robot = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description")
+        robot = urdf_model.parse_urdf(str(rospy.get_param("robot_description")), source="robot_description")
         self._chains = {side: Chain.from_robot(robot, BASE_FRAME, tip_of(side)) for side in SIDES}
         self._limits = read_limits()
 

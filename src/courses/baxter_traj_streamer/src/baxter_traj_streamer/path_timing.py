@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 
 from .settings import SIDES, arm_joint_names
-from .srv import TimePath, TimePathResponse
+from .srv import TimePath, TimePathResponse  # pyright: ignore[reportMissingImports]  (generated)
 from .streamer import stuff_trajectory
 from .timing import transition_time
 

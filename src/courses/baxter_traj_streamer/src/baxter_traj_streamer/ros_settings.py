@@ -18,14 +18,16 @@ from .settings import SettingsError, StreamerSettings
 NAMESPACE = "/baxter_traj_streamer"
 
 
-def read_settings(changes: dict[str, Any] | None = None) -> StreamerSettings:
+def read_settings(changes: str | None = None) -> StreamerSettings:
     """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
     it. Raises SettingsError."""
-    overrides = {**(_read(changes) if changes else {}), **rospy.get_param(NAMESPACE, {})}
-    return StreamerSettings(_read("streamer.yaml"), overrides)
+    parameters = rospy.get_param(NAMESPACE, {})
+    if not isinstance(parameters, dict):
+        raise SettingsError("the parameter %s is %r; expected settings by their names" % (NAMESPACE, parameters))
+    return StreamerSettings(_read("streamer.yaml"), {**(_read(changes) if changes else {}), **parameters})
 
 
-def _read(name: str):
+def _read(name: str) -> dict[str, Any]:
     path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / name
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
@@ -34,7 +36,7 @@ def read_limits() -> dict[str, JointLimit]:
     """{joint: JointLimit} of both arms, from robot_description. Raises SettingsError, urdf_model.UrdfError."""
     if not rospy.has_param("robot_description"):
         raise SettingsError("the parameter robot_description is not set; the joints' limits are read from its URDF")
-    joints = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description").joints
+    joints = urdf_model.parse_urdf(str(rospy.get_param("robot_description")), source="robot_description").joints
     found = {name: joints[name].limit for name in KNOWN_JOINTS if name in joints}
     return {name: JointLimit(limit.lower, limit.upper, limit.velocity) for name, limit in found.items()
-            if None not in (limit.lower, limit.upper, limit.velocity)}
+            if limit.lower is not None and limit.upper is not None and limit.velocity is not None}

@@ -35,6 +35,28 @@ class StreamerSettings:
     defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.
     """
 
+    max_velocity: dict[str, float]
+    max_acceleration: dict[str, float]
+    speed_scale_factor: float
+    min_segment_s: float
+    cartesian_speed: float
+    rate_hz: float
+    interpolation: str
+    check_limits: bool
+    start: str
+    joints: str
+    feedback: bool
+    preemption: bool
+    stop_when_client_leaves: bool
+    start_tolerance: float
+    limit_slack: float
+    max_duration_s: float
+    max_points: int
+    stop_deceleration: float
+    goal_tolerance: float
+    settle_time_s: float
+    poses: dict[str, Any]
+
     def __init__(self, defaults: dict[str, Any], overrides: dict[str, Any] | None = None) -> None:
         overrides = overrides or {}
         if unknown := sorted(set(overrides) - set(defaults)):

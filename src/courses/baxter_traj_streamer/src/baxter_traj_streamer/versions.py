@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import genpy.dynamic
 
-from .msg import trajAction
+from .msg import trajAction  # pyright: ignore[reportMissingImports]  (generated)
 
 NOTES, CURRENT = "baxter_traj_streamer/traj", "cwru_action/traj"
 _ID_LINE = "int32 traj_id\n"

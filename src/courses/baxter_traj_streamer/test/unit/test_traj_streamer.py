@@ -70,6 +70,14 @@ def test_unusable_settings_are_refused(overrides):
         make_settings(**overrides)
 
 
+def test_a_parameter_that_is_no_table_is_refused(monkeypatch):
+    from baxter_traj_streamer import ros_settings
+
+    monkeypatch.setattr(ros_settings.rospy, "get_param", lambda *_: 3)
+    with pytest.raises(SettingsError, match="parameter /baxter_traj_streamer is 3"):
+        ros_settings.read_settings()
+
+
 def test_poses_of_the_robot_are_known_too():
     for side in SIDES:
         assert SETTINGS.pose("neutral", side) == [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
