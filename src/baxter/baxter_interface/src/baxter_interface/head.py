@@ -2,7 +2,9 @@
 """The head: it turns, and it nods."""
 from __future__ import annotations
 
-from typing import Any
+import errno
+import math
+from typing import Any, cast
 
 import rospy
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
@@ -15,6 +17,9 @@ from .hindrance import wait_for_motion
 from .joint_checks import require_number
 from .settings import HEAD_PAN_ANGLE_TOLERANCE
 
+# The head turns so far to each side [rad].
+_RANGE_RAD = 0.5 * math.pi
+
 
 class Head:
     """The robot's head. Angles are in rad, positive to the robot's left.
@@ -24,7 +29,7 @@ class Head:
     """
 
     def __init__(self) -> None:
-        self._last = None
+        self._last = cast("HeadState", None)  # until the first one has come, for which the constructor waits
         self._pan_publisher = rospy.Publisher("/robot/head/command_head_pan", HeadPanCommand, queue_size=10)
         self._nod_publisher = rospy.Publisher("/robot/head/command_head_nod", Bool, queue_size=10)
         topic = "/robot/head/head_state"
@@ -56,7 +61,8 @@ class Head:
         Parameters:
             speed: share of full speed, 0.0 to 1.0; with `scale_speed` in percent. A value out of range is logged and
             sent. timeout: longest time for it [s, ROS time]; 0 sends the command once and does not wait.
-        Raises OSError with errno ETIMEDOUT; ValueError for a number that is not finite.
+        Raises OSError with errno ETIMEDOUT, at once with ERANGE for an angle out of the head's range, to whose end it
+        turns; ValueError for a number that is not finite.
         """
         angle = require_number(angle, "the head's angle [rad]")
         ratio = require_number(speed, "the head's speed") / (100.0 if scale_speed else 1.0)
@@ -65,10 +71,13 @@ class Head:
         command = HeadPanCommand(target=angle, speed_ratio=ratio,
                                  enable_pan_request=HeadPanCommand.REQUEST_PAN_ENABLE)
         self._pan_publisher.publish(command)
-        if timeout != 0:
-            wait_for_motion(lambda: abs(self.pan() - angle) <= HEAD_PAN_ANGLE_TOLERANCE, timeout,
-                            lambda: self._pan_publisher.publish(command),
-                            "the head, which turns from -1.57 to 1.57 rad, did not turn to %.3f rad" % angle)
+        if timeout == 0:
+            return
+        if abs(angle) > _RANGE_RAD + HEAD_PAN_ANGLE_TOLERANCE:
+            raise OSError(errno.ERANGE, "the head turns from %.3f to %.3f rad, not to %.3f rad" % (
+                -_RANGE_RAD, _RANGE_RAD, angle))
+        wait_for_motion(lambda: abs(self.pan() - angle) <= HEAD_PAN_ANGLE_TOLERANCE, timeout,
+                        lambda: self._pan_publisher.publish(command), "the head did not turn to %.3f rad" % angle)
 
     def command_nod(self, timeout: float = 5.0) -> None:
         """Nod once and wait for its end; `timeout` [s, ROS time] applies to its start, and again to its end.

@@ -3,6 +3,7 @@
 """DigitalIO, AnalogIO, Navigator and Head against the fake parts, fault by fault."""
 import errno
 import functools
+import math
 import time
 import unittest
 from unittest import mock
@@ -203,6 +204,14 @@ class HeadTest(PartsTest):
         set_knobs(head_turns=False)
         self.assert_times_out(lambda: self.head.set_pan(-1.0, timeout=0.3), "did not turn to -1.000 rad within 0.3 s")
         self.assertRaises(ValueError, self.head.set_pan, float("nan"))
+
+    def test_pan_out_of_range_is_refused_at_once(self):
+        for angle in (-3.0, 3.0):
+            begin_s = time.monotonic()
+            with self.assertRaisesRegex(OSError, "-1.571 to 1.571 rad, not to %.3f rad" % angle):
+                self.head.set_pan(angle, timeout=DEADLINE_S)
+            self.assertLess(time.monotonic() - begin_s, 0.5 * DEADLINE_S)
+        self.head.set_pan(math.pi / 2)
 
     def test_head_of_a_robot_that_is_not_enabled_says_so_soon(self):
         set_knobs(head_turns=False, nods=False)
