@@ -16,7 +16,8 @@ FLOAT32 = (0.0, -0.0, 1.0, -1.0, 1e-44, 1e9, 3.4e38, -3.4e38, math.nan, math.inf
 LONG_TEXT = 100_000
 # Lengths of arrays without a fixed length; the longest is rare.
 LENGTHS = (0, 1, 1, 2, 7, 7, 8, 100)
-DEEP = 5_000
+# Python 3.13 reads JSON of 8,000 levels.
+DEEP = 20_000
 DIGITS = 400
 STYLES = ("plausible", "one bad", "one bad", "boundary", "damaged")
 XML = (

@@ -149,7 +149,7 @@ def test_garbage_is_bytes_of_many_kinds(modules, is_xmlrpc):
     assert len(kinds) > 50 and all(isinstance(one, bytes) for one in kinds)
 
 
-def test_deep_json_is_too_deep_for_pythons_own_reader():
+def test_deep_json_is_too_deep_for_pythons_own_reader(modules):
     """The generator's depth is large enough to break careless code."""
     with pytest.raises(RecursionError):
-        json.loads('{"a":' * 5000 + "1" + "}" * 5000)
+        json.loads('{"a":' * modules.hostile.DEEP + "1" + "}" * modules.hostile.DEEP)

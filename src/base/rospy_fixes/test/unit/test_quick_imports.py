@@ -12,20 +12,22 @@ import sys
 import roslaunch
 print([name for name in ("setuptools", "distutils", "pyparsing", "catkin_pkg") if name in sys.modules])
 import rosclean
-print(rosclean.find_executable("sh"))
+print(rosclean.find_executable("sh") if sys.version_info < (3, 12) else rosclean.which("sh"))
 from catkin.find_in_workspaces import find_in_workspaces, get_workspaces
 print(len(find_in_workspaces(["share"], project="rospy_fixes", first_match_only=True)), callable(get_workspaces))
 import catkin.find_in_workspaces
 print("catkin_pkg" in sys.modules, catkin.find_in_workspaces.__file__.endswith("find_in_workspaces.py"))
-import distutils.spawn
-print(callable(distutils.spawn.spawn))
+if sys.version_info < (3, 12):  # later Pythons have no distutils
+    import distutils.spawn
+    print(callable(distutils.spawn.spawn))
 """
 
 
 def test_a_launch_imports_what_it_uses_when_it_uses_it():
     done = subprocess.run([sys.executable, "-W", "ignore", "-c", PROGRAM], capture_output=True, text=True, check=True)
-    unused, shell, found, search, spawns = done.stdout.splitlines()
-    assert (unused, found, search, spawns) == ("[]", "1 True", "True True", "True")
+    unused, shell, found, search, *spawns = done.stdout.splitlines()
+    assert (unused, found, search) == ("[]", "1 True", "True True")
+    assert spawns == (["True"] if sys.version_info < (3, 12) else [])
     assert shell.endswith("/sh")
 
 

@@ -302,7 +302,8 @@ def test_slow_uploads_count_from_their_first_byte_to_their_end(tmp_path, monkeyp
                 writer.write(b"body")
                 assert (await reader.read()).endswith(b"hello")
             assert lab.busy == 0
-        (tmp_path / "anna").unlink()
+        # From Python 3.13 on the server itself removes its socket.
+        (tmp_path / "anna").unlink(missing_ok=True)
         async with House(tmp_path) as house:
             assert (await house.ask("/anna/", token=house.tokens["anna"].act))[0] == 502
             assert house.supervisor.labs["anna"].busy == 0

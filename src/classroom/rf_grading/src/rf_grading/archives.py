@@ -229,12 +229,11 @@ class _Limited(io.RawIOBase):
 class _TarInfo(tarfile.TarInfo):
     """An entry of a tar file; refuses descriptions that would fill the memory."""
 
-    @classmethod
-    def frombuf(cls, buf: bytes, encoding: str, errors: str) -> tarfile.TarInfo:
-        info = super().frombuf(buf, encoding, errors)
-        if info.type in _DESCRIPTIONS and info.size > _MAX_DESCRIPTION_BYTES:
-            raise BadArchive("holds a file name or attributes of %d bytes" % info.size)
-        return info
+    # tarfile's entry point for subclasses; it gives the size before anything of it is read.
+    def _proc_member(self, archive: tarfile.TarFile) -> tarfile.TarInfo:
+        if self.type in _DESCRIPTIONS and self.size > _MAX_DESCRIPTION_BYTES:
+            raise BadArchive("holds a file name or attributes of %d bytes" % self.size)
+        return super()._proc_member(archive)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _content(archive: tarfile.TarFile, info: tarfile.TarInfo) -> bytes:
