@@ -218,13 +218,16 @@ def test_the_core_loads_without_ros():
     subprocess.run([sys.executable, "-c", block + imports], check=True)
 
 
-def test_a_pendulum_on_a_ball_joint_swings_in_all_directions():
+@pytest.mark.parametrize("kind", ["ball", "universal", "revolute2"])
+def test_a_pendulum_on_a_joint_of_several_axes_swings_in_all_directions(kind):
+    axes = '<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>' * (kind != "ball")
     world = World(time_step_s=0.001, gravity=(0.0, 0.0, -9.81))
     robot = parse_sdf_model("""<sdf version="1.6"><model name="m"><link name="rod"><inertial><pose>0 0 -1 0 0 0</pose>
         <mass>1</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link><joint name="j"
-        type="ball"><parent>world</parent><child>rod</child></joint></model></sdf>""", "m.sdf").robot
+        type="%s"><parent>world</parent><child>rod</child>%s</joint></model></sdf>""" % (kind, axes), "m.sdf").robot
     rod = world.spawn(robot, "rod")
-    rod.set_joint_positions(np.arange(3), np.array([0.1, 0.2, 0.0]))
+    assert len(rod.joint_names) == (3 if kind == "ball" else 2)
+    rod.set_joint_positions(np.arange(2), np.array([0.1, 0.2]))
     x, y, z = rod.link_pose("rod").matrix()[:3, :3] @ (0, 0, -1)
     for _ in range(round(1e3 * math.pi * math.sqrt(1.02 / 9.81))):  # half a period
         world.step()
