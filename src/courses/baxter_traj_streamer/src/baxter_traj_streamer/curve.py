@@ -17,8 +17,8 @@ def has_positions_only(points: list[tuple[float, list[float], list[float], list[
     return not any(len(point[2]) or len(point[3]) for point in points)
 
 
-def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[float], list[Any]]], start: np.ndarray | None,
-                interpolation: str) -> Trajectory:
+def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[float], list[Any]]],
+                start: np.ndarray | None, interpolation: str) -> Trajectory:
     """The :class:`Trajectory` from ``start`` (k,) [rad], or from point 0 if that is None, through the points.
 
     ``times`` (m,) [s], increasing. From a ``start`` the curve begins at rest, and a point at time 0 is replaced by it.
