@@ -54,9 +54,11 @@ def parse_sdf_model(xml: str | bytes, source: str | Path, folders: ModelFolders 
     document = Document(xml, source, folder, Notes())
     reader = ModelReader(folders or ModelFolders([]))
     found = [child for child in document.children(document.root) if child.tag in ("model", "include")]
-    if len(found) != 1:
+    if not found:
         held = ", ".join("<%s>" % child.tag for child in document.children(document.root)) or "nothing"
         raise document.error(document.root, "it holds %s; expected one <model>" % held)
+    for further in found[1:]:
+        document.note(further, "<%s> behind the first, which alone counts" % further.tag)
     if found[0].tag == "model":
         model = reader.model(document, found[0])
     else:
@@ -145,8 +147,10 @@ class ModelReader:
             raise document.error(element, "%s (%s) cannot be read: %s" % (uri, path, error.strerror)) from None
         inner = Document(content, path, Path(path).parent, document.notes)
         models = inner.root.findall("model") or inner.root.findall("actor")
-        if len(models) > 1 or not (models or inner.root.findall("light")):
-            raise inner.error(inner.root, "it holds %d <model>, expected one" % len(models))
+        if not models and not inner.root.findall("light"):
+            raise inner.error(inner.root, "it holds no <model>, expected one")
+        for further in models[1:]:
+            inner.note(further, "<%s> behind the first, which alone counts" % further.tag)
         return inner, models[0] if models else None
 
     def _parts(self, document: Document, element: etree._Element, prefix: str, origin: np.ndarray, depth: int) -> Parts:

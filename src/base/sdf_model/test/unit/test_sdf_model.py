@@ -453,6 +453,16 @@ def test_collisions_of_a_link_keep_their_surfaces():
     assert patch.surface.friction is None and [shape.name for shape in patch.collisions] == ["b"]
 
 
+def test_of_several_models_in_a_file_the_first_counts_as_in_gazebo(tmp_path):
+    two = '<sdf version="1.6"><model name="%s"><link name="l"/></model><model name="b"><link name="k"/></model></sdf>'
+    (tmp_path / "pair").mkdir()
+    (tmp_path / "pair" / "model.sdf").write_text(two % "a", encoding="utf-8")
+    found = world(tmp_path, "<include><uri>model://pair</uri></include>", ModelFolders([tmp_path]))
+    spawned = parse_sdf_model(two % "a", "m.sdf")
+    for model, warning in ((found.models[0], found.warning), (spawned, spawned.warning)):
+        assert list(model.robot.links) == ["l"] and "<model> behind the first" in warning
+
+
 @pytest.mark.parametrize("second, expected", [("", 0.004), (' default="true"', 0.002)])
 def test_of_several_physics_the_first_or_the_default_counts(tmp_path, second, expected):
     profile = "<physics%s><max_step_size>%s</max_step_size></physics>"
