@@ -33,9 +33,9 @@ from .frames import (
 #: for drives do not follow what comes at once.
 _NOISE, _TURN_NOISE, _LASTING, _STRETCH, _COMING = 0.08, 0.02, 0.9, 10, 0.3
 #: Experts need much less; more is a try that failed.
-MAX_STEPS = 200
+MAX_STEPS = 300
 #: A student acts for so many actions of an episode at most; then the expert ends it.
-STUDENT_STEPS = 120
+STUDENT_STEPS = 160
 _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
 
 

@@ -15,6 +15,7 @@ from baxter_lab import Arm
 from baxter_model import SIDES
 from gym_baxter.controls import OSC_POSITION_M, OSC_ROTATION_RAD
 from gym_baxter.core import Core
+from gym_baxter.tasks import TABLE_TOP_M
 
 #: The control that experts steer by.
 CONTROL = "osc_pose"
@@ -27,8 +28,9 @@ _SPEED_M, _SPEED_RAD = 0.016, 0.06
 #: So far from where it begins, a hand has the full speed [m]; there it has the least [m]. Without this its shoulder,
 #: which gains 0.5 rad/s in an action, would fall behind and then overshoot, and what is observed does not say which.
 _EASY_M, _MIN_M = 0.06, 0.004
-#: A hand is at its place when it is so near [m], [rad].
-_NEAR_M, _NEAR_RAD = 0.008, 0.06
+#: A hand is at its place when it is so near [m], [rad]; fingers that have begun to close go on in so many times that,
+#: and have begun when they are not as far open as this [%].
+_NEAR_M, _NEAR_RAD, _STILL_NEAR, _BEGUN = 0.008, 0.06, 2.5, 90.0
 #: Hands come down, and carry, at this height above the place [m], and from this distance beside it they sink.
 _ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 2.0
 #: A thing is carried the more freely the higher it is, from the first to the second height over its place [m].
@@ -85,7 +87,7 @@ def _risen(height):
 
 def _eased(way):
     """Most of one action [m] of a hand that is `way` [m] from where it began."""
-    return min(_MIN_M + (_SPEED_M - _MIN_M) * way / _EASY_M, _SPEED_M)
+    return min(_MIN_M + (_SPEED_M - _MIN_M) * max(way, 0.0) / _EASY_M, _SPEED_M)
 
 
 def _nearest(yaw, to, period):
@@ -129,10 +131,10 @@ class Expert:
         turn = _clipped(_GAIN * rotation_vector(hand.rotation @ pose[:3, :3].T), hand.speed * _SPEED_RAD)
         return np.array([*(shift / OSC_POSITION_M), *(turn / OSC_ROTATION_RAD), hand.grip])
 
-    def _is_at(self, side, place, rotation):
+    def _is_at(self, side, place, rotation, times=1.0):
         pose = self.arms[side].pose
-        return bool(np.linalg.norm(place - pose[:3, 3]) < _NEAR_M
-                    and np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)) < _NEAR_RAD)
+        return bool(np.linalg.norm(place - pose[:3, 3]) < times * _NEAR_M
+                    and np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)) < times * _NEAR_RAD)
 
     def _approach(self, side, place, rotation):
         """A hand that comes to its place along its own axis, and closes there."""
@@ -140,7 +142,9 @@ class Expert:
         off = pose[:3, 3] - place
         beside = float(np.linalg.norm(off - axis * (axis @ off)))
         beside += 0.05 * float(np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)))
-        return Hand(place - axis * _funnel(beside), rotation, CLOSED if self._is_at(side, place, rotation) else OPEN)
+        times = _STILL_NEAR if self.arms[side].gripper.position < _BEGUN else 1.0
+        closes = self._is_at(side, place, rotation, times)
+        return Hand(place - axis * _funnel(beside), rotation, CLOSED if closes else OPEN)
 
 
 class ReachExpert(Expert):
@@ -157,6 +161,8 @@ class PickPlaceExpert(Expert):
     """Down onto the block, and over the mark."""
 
     TASK, MOVED = "PickPlace", ("left",)
+    #: It lets go of the block this high above the mark [m].
+    _LOW_M = 0.015
 
     def hands(self):
         """The left hand at the block, or with it at the mark."""
@@ -165,7 +171,8 @@ class PickPlaceExpert(Expert):
         place, hand = block[:3, 3], self.arms["left"].pose[:3, 3]
         left = float(np.linalg.norm(goal[:2] - place[:2]))
         holds = self.arms["left"].gripper.holds
-        if left < (_BESIDE_M if holds else self.task.WITHIN_M) and place[2] - goal[2] < 0.008:
+        near, low = (_BESIDE_M, self._LOW_M) if holds else (self.task.WITHIN_M, 2.0 * self._LOW_M)
+        if left < near and place[2] - goal[2] < low:
             return {"left": Hand(hand, self.arms["left"].pose[:3, :3], OPEN)}  # it stands there
         if not holds:
             return {"left": self._approach("left", place, rotation)}
@@ -205,7 +212,7 @@ class TwoArmHandoverExpert(Expert):
     _RIGHT_M, _LEFT_M = 0.05, -0.07
     #: Where the right hand holds it for the left one, and how far hands lean outwards then.
     _MEETING, _TILT_RAD = np.array((0.62, -0.02, 0.10)), math.radians(45.0)
-    _WAITING_M = 0.12
+    _WAITING_M, _BEGUN_M = 0.12, 0.04
 
     def hands(self):
         """Both hands."""
@@ -226,10 +233,14 @@ class TwoArmHandoverExpert(Expert):
         hand = self.arms["right"].pose[:3, 3]
         rotation = self._leaning("right", np.array((-1.0, 0.0, 0.0)))
         if not self.task._lifted() and hand[1] < self._MEETING[1] - 0.1:
-            return {**found, "right": Hand(hand + (0.0, 0.0, 0.1), down(math.atan2(axis[1], axis[0])), CLOSED)}
+            speed = _eased(float(hammer[2, 3]) - TABLE_TOP_M - 0.5 * self.task.HEAD_M[2]) / _SPEED_M
+            return {**found, "right": Hand(hand + (0.0, 0.0, 0.1), down(math.atan2(axis[1], axis[0])), CLOSED, speed)}
         found["right"] = Hand(self._MEETING, rotation, CLOSED)
-        if self._is_at("right", self._MEETING, rotation):
-            found["left"] = self._approach("left", grasp["left"], self._leaning("left", axis))
+        begun = float(np.linalg.norm(self.arms["left"].pose[:3, 3] - waiting))
+        # The left hand goes to the hammer, wherever it is: once it is on its way, the other need not keep still.
+        if self._is_at("right", self._MEETING, rotation, 2.0 if begun < self._BEGUN_M else 5.0):
+            found["left"] = self._approach("left", grasp["left"], self._leaning("left", axis))._replace(
+                speed=_eased(begun) / _SPEED_M)
         return found
 
     def _leaning(self, side, axis):

@@ -26,12 +26,12 @@ class TrainingSettings:
     """chunk: actions predicted at once; hidden: sizes of layers; steps, batch: of Adam; rate: of learning at first, it
     falls to 0 as a cosine; decay: of weights; valid: share of the episodes that only judge; seed: of all chance."""
 
-    chunk: int = 8
+    chunk: int = 4
     hidden: tuple[int, ...] = (256, 256, 256)
     steps: int = 12000
     batch: int = 256
     rate: float = 1e-3
-    decay: float = 1e-2
+    decay: float = 0.3
     valid: float = 0.1
     seed: int = 0
 
