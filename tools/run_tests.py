@@ -115,6 +115,8 @@ def main(arguments: list[str]) -> int:
     # Some machines of continuous integration set it. A run starts a thousand Python programs, which would all compile
     # the same modules.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    # Users do not have it either, and it hides what waits for an output that is still in a buffer.
+    os.environ.pop("PYTHONUNBUFFERED", None)
     sys.dont_write_bytecode = False
     # Workers import the plugin, tests import the tools.
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), os.environ.get("PYTHONPATH")]))

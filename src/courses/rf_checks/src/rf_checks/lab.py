@@ -146,7 +146,9 @@ class Lab:
         environment = isolation.environment_of(os.environ) if self._walls else dict(os.environ)
         environment.update({"ROS_MASTER_URI": self.uri, "ROS_HOSTNAME": "localhost",
                             "ROS_LOG_DIR": str(self._folder / "log"), SOCKETS_VARIABLE: str(self._folder / "sockets"),
-                            OBSERVER[0]: OBSERVER[1]})
+                            OBSERVER[0]: OBSERVER[1],
+                            # What roslaunch says of the nodes is read while it runs, and it writes to a file.
+                            "PYTHONUNBUFFERED": "1"})
         environment.pop("ROS_IP", None)
         self._ended = threading.Event()
         self._is_closed_world = False
