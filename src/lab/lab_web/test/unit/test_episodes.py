@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from demonstrations.editing import Listed
 from demonstrations.frames import ACTION, Schema, numbers
 from demonstrations.writing import SetWriter
 from lab_testing.waiting import wait_until
@@ -52,6 +53,16 @@ def test_a_recording_begins_is_marked_and_ends(made):
     made.episodes.ask(1, {"do": "delete", "number": 0})
     made.errands.run(lambda: True)
     assert len(made.states[-1]["episodes"]) == 1 and made.states[-1]["version"] > state["version"]
+
+
+def test_the_first_episode_decides_on_the_camera(made, monkeypatch):
+    write(made.episodes.folder)
+    monkeypatch.setattr("lab_web.episodes.editing.listed", lambda folder: (
+        [Listed(0, 4, True)], ("observation.images.left_hand",), 10))
+    made.episodes.ask(1, {"do": "delete", "number": 7})  # it looks again
+    made.errands.run(lambda: True)
+    made.episodes.ask(1, {**START, "camera": "head"})
+    assert made.started == [("Pick up the block.", "left_hand")]
 
 
 @pytest.mark.parametrize(("asked", "why"), [
