@@ -526,10 +526,11 @@ from motion_planning.exact import kernels as exact
 from motion_planning.planners import kernels as planning
 from motion_planning.spheres import kernel
 for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.free_edges, exact.unproven,
-                 exact.fill_poses):
+                 exact.fill_poses, planning.traced, planning.between_checked, kernel.free_way, exact.balls_of):
     print(function.__name__, len(function.signatures))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "free_edges", "1", "unproven", "1",
-                                   "fill_poses", "1"]
+                                   "fill_poses", "1", "traced", "1", "between_checked", "1", "free_way", "1",
+                                   "balls_of", "1"]

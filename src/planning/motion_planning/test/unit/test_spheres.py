@@ -280,6 +280,9 @@ def test_an_edge_is_what_its_states_are(baxter, cluttered, spheres):
     free = checker.edges(points)
     assert free.tolist() == [checker.edge(a, b) for a, b in itertools.pairwise(points)]
     assert free.any() and not free.all()
+    assert checker.edges(points, ~free).all(), "those that are known to be free are not checked"
+    first = int(np.flatnonzero(~free)[0])
+    assert checker.way(points[: first + 1]) and not checker.way(points)
 
 
 def test_no_states_and_one(baxter, cluttered, spheres):

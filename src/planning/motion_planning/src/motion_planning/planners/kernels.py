@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motion_planning.lanes import below, fill, load, store
 from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.kernel import free_edge, work_arrays
-from motion_planning.spheres.lanes import below, fill, load, store
 
 if TYPE_CHECKING:
     from motion_planning.planners.trees import Trees
@@ -311,3 +311,45 @@ def way_through(free: np.ndarray, closed: np.ndarray) -> np.ndarray:
         cell = queue[count - 1 - k]
         cells[k, 0], cells[k, 1] = cell // columns, cell % columns
     return cells
+
+
+@compiled
+def between_checked(points: np.ndarray, resolution: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (states (m, k), indices of the corners): the corners ``points`` (n, k) of a path, and what lies halfway
+    between the states on its lines that the search has checked, which are at most ``resolution`` apart."""
+    count, k = points.shape
+    corners = np.zeros(count, np.int64)
+    for i in range(1, count):
+        steps = max(1, int(np.ceil(np.sqrt(np.square(points[i] - points[i - 1]).sum()) / resolution)))
+        corners[i] = corners[i - 1] + steps + 1
+    states = np.empty((corners[-1] + 1, k))
+    for i in range(count):
+        states[corners[i]] = points[i]
+        if i + 1 < count:
+            steps = corners[i + 1] - corners[i] - 1
+            for number in range(steps):
+                share = (number + 0.5) / steps
+                for j in range(k):
+                    states[corners[i] + 1 + number, j] = points[i, j] + share * (points[i + 1, j] - points[i, j])
+    return states, corners
+
+
+@compiled
+def traced(nodes: np.ndarray, parents: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Return the points (m, k) from the first tree's root through the meeting point to a root of the second; the
+    meeting point appears once."""
+    counts = np.zeros(2, np.int64)
+    for tree in range(2):
+        node = numbers[4 + tree]
+        while node >= 0:
+            counts[tree] += 1
+            node = parents[tree, node]
+    points = np.empty((counts[0] + counts[1], nodes.shape[1]))
+    for tree in range(2):
+        node, at = numbers[4 + tree], counts[0] - 1 + tree
+        while node >= 0:
+            for j in range(nodes.shape[1]):
+                points[at, j] = nodes[tree, j, node]
+            at += 2 * tree - 1
+            node = parents[tree, node]
+    return points

@@ -75,7 +75,7 @@ def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, g
         ways.append(shorten(found, alone, run, *_ALONE).points)
         shortening += run.clock() - since
     points = _at_once(checker.parts, ways)
-    if not checker.between_parts.edges(points).all():
+    if not checker.between_parts.way(points):
         points = _past_each_other(checker, ways)
     return points, samples, shortening
 
@@ -129,14 +129,19 @@ def _past_each_other(checker: SphereChecker, ways: Sequence[np.ndarray]) -> np.n
     # The caller has checked that both ends are free.
     free[0, 0] = free[-1, -1] = True
     closed = np.zeros((*free.shape, 9), dtype=np.bool_)
+    known = set()
     for _ in range(_TURNS):
         cells = kernels.way_through(free, closed)
         points = grid[cells[:, 0], cells[:, 1]]
         if not len(cells):
             return None
-        bad = np.flatnonzero(~checker.between_parts.edges(points))
+        # Ways that avoid a step have most others in common.
+        steps = list(itertools.pairwise(map(tuple, cells.tolist())))
+        open_ones = checker.between_parts.edges(points, np.array([step in known for step in steps]))
+        bad = np.flatnonzero(~open_ones)
         if not len(bad):
             return points
+        known.update(itertools.compress(steps, open_ones))
         for k in bad:
             (i, j), (di, dj) = cells[k], cells[k + 1] - cells[k]
             closed[i, j, 3 * di + dj + 4] = closed[i + di, j + dj, 4 - 3 * di - dj] = True

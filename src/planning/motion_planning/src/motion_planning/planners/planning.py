@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from motion_planning.planners import kernels
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.parts import TOGETHER, two_parts
@@ -204,13 +205,14 @@ class _Planning:
                          % (self.group.name, count, start.shape, goals.shape))
         if not (np.isfinite(start).all() and np.isfinite(goals).all()):
             raise NoPath("start or goal of group '%s' has values that are not finite" % self.group.name)
-        turns = self.model.continuous[self.group.indices]
+        turns = np.flatnonzero(self.model.continuous[self.group.indices])
         goals[:, turns] -= 2.0 * math.pi * np.round((goals[:, turns] - start[turns]) / (2.0 * math.pi))
         ends = np.concatenate([start[None], goals])
         # A start slightly beyond a limit may move back.
         self.bounds[:, 0] = np.minimum(self.bounds[:, 0], ends.min(axis=0))
         self.bounds[:, 1] = np.maximum(self.bounds[:, 1], ends.max(axis=0))
-        self.bounds[turns] = np.column_stack([ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi])[turns]
+        self.bounds[turns, 0] = ends[:, turns].min(axis=0) - math.pi
+        self.bounds[turns, 1] = ends[:, turns].max(axis=0) + math.pi
         return start, goals
 
     def _free_or_raise(self, what: str, postures: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
@@ -410,7 +412,7 @@ class _Planning:
         contain the robot: if they are free, so is the robot. Exact geometry checks all other states, and in any case
         every eighth state and each corner.
         """
-        states, corners = _between_checked(points, self.checker.resolution)
+        states, corners = kernels.between_checked(points, self.checker.resolution)
         doubtful = ~self.checker.valid(states)
         some = np.zeros(len(states), dtype=bool)
         some[::_SEEN], some[corners] = True, True
@@ -440,17 +442,3 @@ class _Planning:
 def _between_ways(outwards: np.ndarray, path: Path, inward: np.ndarray) -> Path:
     """The Path, which begins where the points ``outwards`` end, with these and those ``inward`` from its end."""
     return path._replace(points=np.concatenate([outwards, path.points[1:-1], inward]))
-
-
-def _between_checked(points: np.ndarray, resolution: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (states (m, k), indices of the corners): the corners ``points`` of a path, and what lies halfway between
-    the states on its lines that the search has checked, which are at most ``resolution`` apart."""
-    steps = np.diff(points, axis=0)
-    counts = np.maximum(1, np.ceil(np.linalg.norm(steps, axis=1) / resolution)).astype(int)
-    corners = np.concatenate([[0], np.cumsum(counts + 1)])
-    states = np.empty((corners[-1] + 1, points.shape[1]))
-    line = np.repeat(np.arange(len(steps)), counts)
-    number = np.arange(len(line)) - np.repeat(np.cumsum(counts) - counts, counts)
-    states[number + corners[line] + 1] = points[line] + steps[line] * ((number + 0.5) / counts[line])[:, None]
-    states[corners] = points
-    return states, corners

@@ -90,7 +90,7 @@ def growing(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals
         result = kernels.grow(checker.tables, trees, (bounds[0], bounds[1]), np.float32(reach),
                               np.float32(checker.resolution), SAMPLES)
         if result == kernels.MET:
-            yield Path(_traced(trees), int(trees[2][6]))
+            yield Path(kernels.traced(*trees), int(trees[2][6]))
             return
         run.check("a path was looked for: %d samples were drawn, the trees from start and goal have %d and %d postures"
                   % (trees[2][6], trees[2][0], trees[2][1]))
@@ -147,9 +147,10 @@ def _seeds(start: np.ndarray, goals: np.ndarray, seed: int) -> Trees:
     """Trees that consist of their roots."""
     room = max(_MIN_ROOM, 2 * len(goals) + 16)
     room += -room % 16
-    nodes, parents = np.empty((2, len(start), room), np.float32), np.full((2, room), -1, np.int32)
+    nodes, parents = np.empty((2, len(start), room), np.float32), np.empty((2, room), np.int32)
     numbers = _numbers(seed)
     nodes[0, :, 0], nodes[1, :, : len(goals)] = start, goals.T
+    parents[0, 0] = parents[1, : len(goals)] = -1
     numbers[:2] = 1, len(goals)
     return nodes, parents, numbers
 
@@ -164,17 +165,3 @@ def _roomier(trees: Trees) -> Trees:
     more_parents = np.full((2, room), -1, np.int32)
     more_parents[:, : parents.shape[1]] = parents
     return more, more_parents, numbers
-
-
-def _traced(trees: Trees) -> np.ndarray:
-    """The points from the first tree's root through the meeting point to a root of the second; the meeting point
-    appears once."""
-    nodes, parents, numbers = trees
-    ways = []
-    for tree in (0, 1):
-        way, node = [], numbers[4 + tree]
-        while node >= 0:
-            way.append(nodes[tree, :, node])
-            node = parents[tree, node]
-        ways.append(way)
-    return np.array(ways[0][::-1] + ways[1], dtype=float)

@@ -15,6 +15,8 @@ from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
 from motion_planning.scene import Scene
 from motion_planning.spheres import SphereChecker, SphereModel
+from motion_planning.spheres.world_tables import solids_of
+from urdf_model import Cylinder
 
 # Compiled code does not depend on the robot, so any robot is suitable. This one cannot pass its base.
 _URDF = """<robot name="two">
@@ -37,7 +39,11 @@ def warm_up() -> None:
         pass  # as expected; everything is compiled now
     shorten(Path(ends), checker, run)
     checker.valid(ends)
+    checker.edges(ends)
+    solids_of([(Cylinder(0.1, 0.2), np.eye(4))])
     kernels.at_once(ends, ends)
+    kernels.between_checked(ends, 0.1)
+    kernels.traced(np.zeros((2, 1, 16), np.float32), np.full((2, 16), -1, np.int32), np.zeros(7, np.int64))
     kernels.way_through(np.ones((2, 2), dtype=bool), np.zeros((2, 2, 9), dtype=bool))
     arm, level = model.groups["arm"], ConstraintSet(orientations=(OrientationTarget("arm", np.eye(3)),))
     Manifold(Scene(model), arm, level, ends[0]).project(ends[0])

@@ -70,12 +70,17 @@ class SphereChecker:
 
     def edge(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Whether the straight line from ``a`` to ``b`` (k,) is free; ``a`` itself is not checked."""
-        return bool(self.edges((a, b))[0])
+        return self.way((a, b))
 
-    def edges(self, points: ArrayLike) -> np.ndarray:
-        """Return (m - 1,) bool: whether each straight line between ``points`` (m, k) is free; the first point is not
-        checked."""
+    def way(self, points: ArrayLike) -> bool:
+        """Whether all straight lines between ``points`` (m, k) are free; the first point is not checked."""
         points = np.ascontiguousarray(points, dtype=np.float32)
-        free = np.empty(len(points) - 1, dtype=bool)
+        return bool(kernel.free_way(self.tables, points, np.float32(self.resolution)))
+
+    def edges(self, points: ArrayLike, known: np.ndarray | None = None) -> np.ndarray:
+        """Return (m - 1,) bool: whether each straight line between ``points`` (m, k) is free; the first point is not
+        checked. known (m - 1,) bool: those that are free for certain."""
+        points = np.ascontiguousarray(points, dtype=np.float32)
+        free = np.zeros(len(points) - 1, dtype=bool) if known is None else np.array(known, dtype=bool)
         kernel.free_edges(self.tables, points, np.float32(self.resolution), free)
         return free

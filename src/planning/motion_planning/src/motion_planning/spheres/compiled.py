@@ -8,5 +8,5 @@ _PACKAGE = Path(__file__).parents[1]
 
 #: Decorates a function: compiled at its first call, or loaded from the cache if the files of spheres and planners have
 #: not changed.
-compiled = compiler("motion_planning", [*_PACKAGE.glob("spheres/*.py"), *_PACKAGE.glob("planners/*.py")],
-                    nogil=True, error_model="numpy")
+compiled = compiler("motion_planning", [_PACKAGE / "lanes.py", *_PACKAGE.glob("spheres/*.py"),
+                                        *_PACKAGE.glob("planners/*.py")], nogil=True, error_model="numpy")

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motion_planning.lanes import below, fill, least, load, store
 from motion_planning.spheres.compiled import compiled
-from motion_planning.spheres.lanes import below, fill, least, load, store
 
 if TYPE_CHECKING:
-    from motion_planning.spheres.lanes import Vector
+    from motion_planning.lanes import Vector
 
 _FAR = np.float32(np.inf)
 

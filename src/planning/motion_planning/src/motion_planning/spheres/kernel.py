@@ -26,11 +26,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from motion_planning.lanes import below, fill, greatest, load, magnitude, ramp, root, sine_and_cosine, store
 from motion_planning.spheres.compiled import compiled
-from motion_planning.spheres.lanes import below, fill, greatest, load, magnitude, ramp, root, store, whole
 
 if TYPE_CHECKING:
-    from motion_planning.spheres.lanes import Vector
+    from motion_planning.lanes import Vector
 
     Table = tuple[np.ndarray, ...]
     World = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -43,35 +43,8 @@ JOINT, JOINT_NUMBERS, CLUSTER, OBJECT, BRANCH, MAP = 3, 14, 3, 16, 6, 3
 CELLS = 64
 ALL = 0xFFFF
 
-_PI_HIGH, _PI_LOW = np.float32(3.140625), np.float32(np.pi - 3.140625)
-_ONE_OVER_PI, _HALF, _FOUR, _ONE = np.float32(1.0 / np.pi), np.float32(0.5), np.float32(4.0), np.float32(1.0)
-_ZERO = np.float32(0.0)
+_ONE, _ZERO = np.float32(1.0), np.float32(0.0)
 _CELLS_PER_RADIAN = np.float32(CELLS / (2.0 * np.pi))
-# Taylor's series of sine and cosine, to the precision of single floats on [-pi/2, pi/2].
-_S3, _S5, _S7 = np.float32(-1.0 / 6.0), np.float32(1.0 / 120.0), np.float32(-1.0 / 5040.0)
-_S9, _S11 = np.float32(1.0 / 362880.0), np.float32(-1.0 / 39916800.0)
-_C2, _C4, _C6 = np.float32(-0.5), np.float32(1.0 / 24.0), np.float32(-1.0 / 720.0)
-_C8, _C10, _C12 = np.float32(1.0 / 40320.0), np.float32(-1.0 / 3628800.0), np.float32(1.0 / 479001600.0)
-
-
-@compiled
-def sine_and_cosine(x: Vector) -> tuple[Vector, Vector]:
-    """Both share the turns that are taken off: x = turns pi + rest, |rest| <= pi / 2; odd turns change the signs."""
-    turns = whole(x * fill(_ONE_OVER_PI))
-    rest = (x - turns * fill(_PI_HIGH)) - turns * fill(_PI_LOW)
-    square = rest * rest
-    s = fill(_S9) + square * fill(_S11)
-    s = fill(_S7) + square * s
-    s = fill(_S5) + square * s
-    s = fill(_S3) + square * s
-    c = fill(_C10) + square * fill(_C12)
-    c = fill(_C8) + square * c
-    c = fill(_C6) + square * c
-    c = fill(_C4) + square * c
-    c = fill(_C2) + square * c
-    halves = turns * fill(_HALF)
-    sign = fill(_ONE) - magnitude(halves - whole(halves)) * fill(_FOUR)
-    return (rest + rest * square * s) * sign, (fill(_ONE) + square * c) * sign
 
 
 @compiled
@@ -362,7 +335,19 @@ def free_edge(tables: Tables, work: Work, a: np.ndarray, b: np.ndarray, step: fl
 
 @compiled
 def free_edges(tables: Tables, points: np.ndarray, step: float, free: np.ndarray) -> None:
-    """Write into ``free`` (m - 1,) whether each line between ``points`` (m, k) float32 is, see ``free_edge``."""
+    """Write into ``free`` (m - 1,) whether each line between ``points`` (m, k) float32 is, see ``free_edge``; those
+    that are true already are not checked."""
     work = work_arrays(tables[0])
     for i in range(len(free)):
-        free[i] = free_edge(tables, work, points[i], points[i + 1], step)
+        if not free[i]:
+            free[i] = free_edge(tables, work, points[i], points[i + 1], step)
+
+
+@compiled
+def free_way(tables: Tables, points: np.ndarray, step: float) -> bool:
+    """Whether all lines between ``points`` (m, k) float32 are free, see ``free_edge``."""
+    work = work_arrays(tables[0])
+    for i in range(len(points) - 1):
+        if not free_edge(tables, work, points[i], points[i + 1], step):
+            return False
+    return True

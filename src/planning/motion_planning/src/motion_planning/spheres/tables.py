@@ -147,8 +147,11 @@ def _baked(sphere_model: SphereModel, group: Group, scene: Scene, state: State,
               for may, (parts, owners) in groups.items()]
     remarks = [*remarks, *coarse]
     world, places = forest([still.tree for still in stills], robot.world)
-    return (_with_tests(robot, [*stills, *robot.still], [*places[len(robot.still):], *places[: len(robot.still)]]),
-            world), tuple(remarks)
+    stills, places = [*stills, *robot.still], [*places[len(robot.still):], *places[: len(robot.still)]]
+    # The tests do not depend on where things are.
+    rows = tuple([still.may if place[1] > place[0] else None for still, place in zip(stills, places, strict=True)])
+    tests, _ = sphere_model.kept(("tests", id(robot), rows), lambda: (_tests(robot, rows), robot))
+    return (_with_tests(robot, tests, places), world), tuple(remarks)
 
 
 def _named(allowed: AllowedCollisions) -> frozenset[str]:
@@ -156,24 +159,27 @@ def _named(allowed: AllowedCollisions) -> frozenset[str]:
     return frozenset(allowed.defaults).union(*allowed.entries)
 
 
-def _with_tests(robot: _Robot, stills: Sequence[_Still], places: Sequence[tuple[int, int]]) -> Table:
-    """The complete robot table: the tests of each cluster, objects before the robot itself."""
+def _tests(robot: _Robot, rows: Sequence[tuple[bool, ...] | None]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (clusters (t,), what each is tested against (t,), the kernel's branches): objects before the robot itself.
+    rows: for each thing that does not move, for each cluster whether they may touch; None for nothing."""
     branch, depth = np.array(robot.branch, dtype=np.int64), np.array(robot.depth, dtype=np.int64)
-    found = []
-    for rank, (still, place) in enumerate(zip(stills, places, strict=True)):
-        if place[1] > place[0]:
-            clusters = np.flatnonzero(~np.array(still.may, dtype=bool))
-            found.append(np.column_stack([np.full((len(clusters), 1), rank), clusters,
-                                          np.broadcast_to(place, (len(clusters), 2))]))
-    rank, cluster, *place = np.concatenate([np.empty((0, 4), np.int64), *found]).T
+    rank, cluster = np.array([(number, place) for number, may in enumerate(rows) if may is not None
+                              for place, one in enumerate(may) if not one], np.int64).reshape(-1, 2).T
     order = np.lexsort((cluster, -depth[cluster], rank, branch[cluster]))
-    cluster = cluster[order]
-    joints, *rest, skips, joint_branch = robot.arrays
+    joint_branch, cluster = robot.arrays[-1], cluster[order]
     numbers = np.arange(max(joint_branch, default=-1) + 1)
     ends = [end for keys in (joint_branch, branch, branch[cluster])
             for end in (np.searchsorted(keys, numbers), np.searchsorted(keys, numbers, "right"))]
-    return (joints, *rest, robot.pairs, np.column_stack([cluster, *(end[order] for end in place)]).astype(
-        np.int32).ravel(), np.column_stack(ends).astype(np.int32).ravel(), skips, *robot.maps)
+    return cluster, rank[order], np.column_stack(ends).astype(np.int32).ravel()
+
+
+def _with_tests(robot: _Robot, tests: tuple[np.ndarray, np.ndarray, np.ndarray],
+                places: Sequence[tuple[int, int]]) -> Table:
+    """The complete robot table with ``_tests`` of things at ``places`` in the world's."""
+    cluster, rank, branches = tests
+    rows = np.column_stack([cluster, np.array(places, np.int32).reshape(-1, 2)[rank]]).astype(np.int32)
+    joints, *rest, skips, _ = robot.arrays
+    return (joints, *rest, robot.pairs, rows.ravel(), branches, skips, *robot.maps)
 
 
 def split(tables: Tables) -> list[tuple[np.ndarray, Tables]]:

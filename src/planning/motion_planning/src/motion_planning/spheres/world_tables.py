@@ -77,25 +77,61 @@ def solids_of(parts: Sequence[tuple[Geometry | Boxes, np.ndarray]], pad: float =
 
 def _boxes(centres: np.ndarray, rotations: np.ndarray, half: np.ndarray) -> Solids:
     """The Solids of boxes: centres, half sides (n, 3), rotations (n, 3, 3) from the planning frame."""
-    reach = np.einsum("ni,nij->nj", half, np.abs(rotations))
-    straight = (np.abs(np.abs(rotations) - 1.0) < 1e-9).sum(axis=(1, 2)) == 3
-    numbers = np.zeros((len(centres), kernel.OBJECT), np.float32)
-    numbers[:, :3], numbers[:, 3:12] = centres, rotations.reshape(-1, 9)
-    numbers[:, 12:15] = np.where(straight[:, None], reach, half)
-    return Solids(np.where(straight, kernel.AXIS_BOX, kernel.BOX).astype(np.int32), numbers, centres - reach,
-                  centres + reach)
+    found = _room(len(centres))
+    _fill_boxes(*map(np.ascontiguousarray, (centres, rotations, half)), *found)
+    return found
 
 
 def _cylinders(centres: np.ndarray, rotations: np.ndarray, radii: np.ndarray, halves: np.ndarray) -> Solids:
     """The Solids of cylinders: centres (n, 3), rotations (n, 3, 3) from the planning frame, radii and half lengths."""
-    axes = rotations[:, 2]
-    reach = halves[:, None] * np.abs(axes) + radii[:, None] * np.sqrt(np.maximum(0.0, 1.0 - axes**2))
-    numbers = np.zeros((len(centres), kernel.OBJECT), np.float32)
-    numbers[:, :3], numbers[:, 3:12] = centres, rotations.reshape(-1, 9)
-    numbers[:, 12], numbers[:, 14] = radii, halves
-    upright = np.abs(np.abs(axes[:, 2]) - 1.0) < 1e-9
-    return Solids(np.where(upright, kernel.UPRIGHT_CYLINDER, kernel.CYLINDER).astype(np.int32), numbers,
-                  centres - reach, centres + reach)
+    found = _room(len(centres))
+    _fill_cylinders(*map(np.ascontiguousarray, (centres, rotations, np.column_stack([radii, halves]))), *found)
+    return found
+
+
+def _room(count: int) -> Solids:
+    return Solids(np.empty(count, np.int32), np.empty((count, kernel.OBJECT), np.float32), *np.empty((2, count, 3)))
+
+
+@compiled
+def _fill_boxes(centres: np.ndarray, rotations: np.ndarray, half: np.ndarray, kinds: np.ndarray, numbers: np.ndarray,
+                low: np.ndarray, high: np.ndarray) -> None:
+    for n in range(len(kinds)):
+        straight = 0
+        for b in range(3):
+            reach = 0.0
+            for a in range(3):
+                reach += half[n, a] * abs(rotations[n, a, b])
+                straight += abs(abs(rotations[n, a, b]) - 1.0) < 1e-9
+            low[n, b], high[n, b] = centres[n, b] - reach, centres[n, b] + reach
+        kinds[n] = kernel.AXIS_BOX if straight == 3 else kernel.BOX
+        _fill_place(centres[n], rotations[n], numbers[n])
+        for b in range(3):
+            numbers[n, 12 + b] = 0.5 * (high[n, b] - low[n, b]) if straight == 3 else half[n, b]
+
+
+@compiled
+def _fill_cylinders(centres: np.ndarray, rotations: np.ndarray, sizes: np.ndarray, kinds: np.ndarray,
+                    numbers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    for n in range(len(kinds)):
+        radius, half = sizes[n, 0], sizes[n, 1]
+        for b in range(3):
+            along = rotations[n, 2, b]
+            reach = half * abs(along) + radius * math.sqrt(max(0.0, 1.0 - along * along))
+            low[n, b], high[n, b] = centres[n, b] - reach, centres[n, b] + reach
+        upright = abs(abs(rotations[n, 2, 2]) - 1.0) < 1e-9
+        kinds[n] = kernel.UPRIGHT_CYLINDER if upright else kernel.CYLINDER
+        _fill_place(centres[n], rotations[n], numbers[n])
+        numbers[n, 12], numbers[n, 14] = radius, half
+
+
+@compiled
+def _fill_place(centre: np.ndarray, rotation: np.ndarray, numbers: np.ndarray) -> None:
+    numbers[:] = 0.0
+    for a in range(3):
+        numbers[a] = centre[a]
+        for b in range(3):
+            numbers[3 + 3 * a + b] = rotation[a, b]
 
 
 def _of_boxes(geometry: Geometry | Boxes, patience: Patience, remark: Callable[[str], object]) -> Geometry | Boxes:
@@ -162,7 +198,7 @@ def pyramid(cone: Cone) -> TriangleMesh:
 def tree_of(solids: Solids) -> Tree:
     """Return the Tree over Solids: halves of the order in which a space-filling curve meets them, one object a leaf."""
     count = len(solids.kinds)
-    order = _along_curve(0.5 * (solids.low + solids.high))
+    order = _along_curve(solids.low, solids.high)
     links = np.empty((max(0, 2 * count - 1), 2), np.int32)
     nodes = np.empty((len(links), 6), np.float32)
     _fill_tree(np.concatenate([solids.low[order] - _ROUNDING, solids.high[order] + _ROUNDING], axis=1).astype(
@@ -196,15 +232,27 @@ def _fill_tree(boxes: np.ndarray, links: np.ndarray, nodes: np.ndarray) -> None:
                 nodes[number, 3 + axis] = max(nodes[number + 1, 3 + axis], nodes[other, 3 + axis])
 
 
-def _along_curve(points: np.ndarray) -> np.ndarray:
-    """The order in which Morton's curve meets ``points`` (n, 3)."""
-    low, high = points.min(axis=0, initial=_FAR), points.max(axis=0, initial=-_FAR)
-    cell = ((points - low) / np.maximum(high - low, 1e-9) * 1023.0).astype(np.int64)
-    code = np.zeros(len(points), dtype=np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
-    return np.argsort(code, kind="stable")
+def _along_curve(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The order in which Morton's curve meets the middles of boxes with these corners (n, 3)."""
+    return np.argsort(_codes(low, high), kind="stable")
+
+
+@compiled
+def _codes(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Where each box's middle is along Morton's curve through all of them."""
+    count = len(low)
+    code = np.zeros(count, np.int64)
+    for axis in range(3):
+        least, most = _FAR, -_FAR
+        for n in range(count):
+            middle = 0.5 * (low[n, axis] + high[n, axis])
+            least, most = min(least, middle), max(most, middle)
+        scale = 1023.0 / max(most - least, 1e-9)
+        for n in range(count):
+            cell = int((0.5 * (low[n, axis] + high[n, axis]) - least) * scale)
+            for bit in range(10):
+                code[n] |= (cell >> bit & 1) << (3 * bit + axis)
+    return code
 
 
 def forest(trees: Sequence[Tree], before: Forest | None = None) -> Forest:
