@@ -7,7 +7,8 @@ import pybullet
 import pytest
 
 from motion_planning.exact import ExactChecker, apart
-from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of, plane_overlap
+from motion_planning.exact.geometry import bounds_of, fcl_geometry, plane_overlap
+from motion_planning.exact.tables import Geometries
 from motion_planning.model import MeshUnreadable, ModelError, PlanningModel
 from motion_planning.scene import OCTOMAP, AllowedCollisions, Cone, Octree, Scene, TriangleMesh, WorldObject
 from urdf_model import Box, Cylinder, Plane, Sphere
@@ -23,6 +24,10 @@ SLIDER = """<robot name="slider"><link name="base"/>
     <limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
 SEMANTIC = """<robot name="slider"><group name="car"><joint name="x"/></group><group name="finger"><joint name="y"/>
   </group></robot>"""
+# A ball at the end of a rod of 1 m, which turns without end.
+TURNING = """<robot name="turning"><link name="base"/>
+  <link name="rod"><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 0 1"/></joint></robot>"""
 CORNERS = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
 SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 CUBE = TriangleMesh(CORNERS, [corners for a, b, c, d in SIDES for corners in ((a, b, c), (a, c, d))])
@@ -396,6 +401,30 @@ def test_the_quick_way_finds_what_a_check_of_every_pair_finds(baxter, meshes):
         assert {(one.a, one.b) for one in exact.contacts(scene, state, most=10_000)} == expected
 
 
+@pytest.mark.parametrize("away", [0.0, 5e4])
+@pytest.mark.parametrize("side", [0.2, 8e4])
+def test_no_posture_that_touches_is_passed_over_where_numbers_are_large(away, side):
+    """Single floats have steps of 4 mm there."""
+    scene, exact = slider("sphere")
+    scene = scene.with_state(scene.state.with_base(at(away, -away))).with_object(
+        thing(Box((side, side, side)), away + 0.405 + 0.5 * side, -away))
+    positions = np.column_stack([np.linspace(0.2805, 0.3195, 40), np.zeros(40)])
+    found = [exact.first_blocked(scene, q[None]) is not None for q in positions]
+    assert found == (positions[:, 0] > 0.305).tolist()
+    assert exact.first_blocked(scene, positions) == found.index(True)
+
+
+def test_turns_without_end_are_known_to_the_last_bit():
+    """A joint that turned a million times is where it is, though single floats do not tell."""
+    model = PlanningModel.from_xml(TURNING, "<robot name='turning'/>")
+    exact, scene = ExactChecker(model, {}.__getitem__), Scene(model).with_object(thing(Sphere(0.1), 1.0))
+    for turns in (0, 1_000_000, -1_000_000):
+        for angle in np.linspace(-3.0, 3.0, 61):
+            q = 2.0 * math.pi * turns + angle
+            blocked = exact.first_blocked(scene, np.full((3, 1), q)) is not None
+            assert blocked == (2.0 * abs(math.sin(0.5 * angle)) < 0.2), (turns, angle)
+
+
 def ball_of_triangles(radius, around=12):
     """A TriangleMesh of a sphere."""
     height, turn = np.meshgrid(np.linspace(0.0, math.pi, around), np.linspace(0.0, 2.0 * math.pi, 2 * around))
@@ -419,8 +448,7 @@ def test_a_proof_is_right_and_found_where_there_is_room(mine, other):
     forms, fcl_shapes, bounds = [], [], []
     for shape in (MANY[mine], MANY[other]):
         bounds.append(bounds_of(shape))
-        kind, nodes = form_of(shape, bounds[-1])
-        forms.append((np.array([kind]), np.array([0]), np.array([len(nodes)]), nodes))
+        forms.append(Geometries().tables([shape])[3])
         fcl_shapes.append(fcl_geometry(shape))
     proven = needed = 0
     for _ in range(400):

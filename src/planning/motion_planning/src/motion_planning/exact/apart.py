@@ -2,8 +2,10 @@
 """Compiled proofs that two shapes are apart: a plane between them, or between all parts of them.
 
 The ``forms`` of shapes: kinds (m,), BOX ... PLANE; firsts, counts (m,) of their nodes; nodes (t, 6): centre, about that
-of the shape's bounds, and half sides of a box along the shape's axes. A box, sphere, cylinder, cone or plane is one
-node. Other shapes are a tree of boxes around their parts, those of node k in nodes 2 k + 1 and 2 k + 2, leaves last.
+of the shape's bounds, and half sides of a box along the shape's axes; slabs (m,) and heights (s, d): the row of a
+mesh's heights, -1 for other shapes, and how far it reaches along each of ``DIRECTIONS`` from that centre. A box,
+sphere, cylinder, cone or plane is one node. Other shapes are a tree of boxes around their parts, those of node k in
+nodes 2 k + 1 and 2 k + 2, leaves last.
 """
 from __future__ import annotations
 
@@ -14,13 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from disk_cache.compiled import compiler
+from motion_planning import lanes
 from motion_planning.model import kernels as model_kernels
 
 if TYPE_CHECKING:
     Triple = tuple[float, float, float]
     Where = tuple[int, np.ndarray, np.ndarray]
     Convex = tuple[int, np.ndarray, Triple, np.ndarray]
-    Forms = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+    Forms = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 BOX, SPHERE, CYLINDER, CONE, PLANE = range(5)
 # Shapes that are nearer than this are not apart [m].
@@ -28,8 +31,22 @@ _MARGIN = 1e-6
 # Steps in search of a plane between two convex shapes; pairs of nodes that are looked at; room for those that wait.
 _STEPS, _LOOKS, _ROOM = 24, 200, 128
 
-compiled = compiler("motion_planning_exact", [Path(__file__), Path(__file__).with_name("kernels.py"),
-                                              Path(model_kernels.__file__)], nogil=True, error_model="numpy")
+
+
+def _directions(count: int) -> np.ndarray:
+    """Return (count, 3) unit vectors that are spread evenly: a spiral."""
+    k = np.arange(count) + 0.5
+    height, angle = 1.0 - 2.0 * k / count, math.pi * (1.0 + math.sqrt(5.0)) * k
+    out = np.sqrt(1.0 - height**2)
+    return np.column_stack([out * np.cos(angle), out * np.sin(angle), height])
+
+
+#: Normals of planes that are tried first between a mesh and another shape.
+DIRECTIONS = _directions(62)
+
+compiled = compiler("motion_planning_exact", [
+    *(Path(__file__).with_name(name) for name in ("apart.py", "kernels.py", "sixteen.py")), Path(lanes.__file__),
+    Path(model_kernels.__file__)], nogil=True, error_model="numpy")
 
 
 @compiled
@@ -45,8 +62,15 @@ def pair_apart(one: Forms, here: Where, other: Forms, there: Where, waiting: np.
     """
     i, turn_a, place_a = here
     j, turn_b, place_b = there
-    kinds_a, firsts_a, counts_a, nodes_a = one
-    kinds_b, firsts_b, counts_b, nodes_b = other
+    kinds_a, firsts_a, counts_a, nodes_a, slabs_a, heights_a = one
+    kinds_b, firsts_b, counts_b, nodes_b, slabs_b, heights_b = other
+    box_a, box_b = nodes_a[firsts_a[i]], nodes_b[firsts_b[j]]
+    if slabs_a[i] >= 0 and _beyond_slabs(heights_a[slabs_a[i]], turn_a, place_a, (
+            kinds_b[j], turn_b, _moved(turn_b, place_b, box_b), box_b[3:])):
+        return True
+    if slabs_b[j] >= 0 and _beyond_slabs(heights_b[slabs_b[j]], turn_b, place_b, (
+            kinds_a[i], turn_a, _moved(turn_a, place_a, box_a), box_a[3:])):
+        return True
     waiting[0, 0], waiting[0, 1] = 0, 0
     count, looks = 1, 0
     while count:
@@ -73,6 +97,32 @@ def pair_apart(one: Forms, here: Where, other: Forms, there: Where, waiting: np.
             waiting[count, 1], waiting[count + 1, 1] = 2 * b + 1, 2 * b + 2
         count += 2
     return True
+
+
+@compiled
+def _beyond_slabs(heights: np.ndarray, turn: np.ndarray, place: np.ndarray, other: Convex) -> bool:
+    """Whether a convex shape is beyond one of the planes around a mesh that are across ``DIRECTIONS``."""
+    kind, other_turn, centre, half = other
+    if kind == PLANE:
+        return False
+    x, y, z = centre[0] - place[0], centre[1] - place[1], centre[2] - place[2]
+    u = turn[0, 0] * x + turn[1, 0] * y + turn[2, 0] * z
+    v = turn[0, 1] * x + turn[1, 1] * y + turn[2, 1] * z
+    w = turn[0, 2] * x + turn[1, 2] * y + turn[2, 2] * z
+    # Every shape reaches this far in all directions.
+    thin = 0.0 if kind == CONE else min(half[0], half[1], half[2])
+    for d in range(heights.shape[0]):
+        a, b, c = DIRECTIONS[d, 0], DIRECTIONS[d, 1], DIRECTIONS[d, 2]
+        room = a * u + b * v + c * w - heights[d]
+        if room <= thin:
+            continue
+        x = turn[0, 0] * a + turn[0, 1] * b + turn[0, 2] * c
+        y = turn[1, 0] * a + turn[1, 1] * b + turn[1, 2] * c
+        z = turn[2, 0] * a + turn[2, 1] * b + turn[2, 2] * c
+        p, q, r = _farthest(kind, other_turn, half, -x, -y, -z)
+        if room + p * x + q * y + r * z > _MARGIN:
+            return True
+    return False
 
 
 @compiled

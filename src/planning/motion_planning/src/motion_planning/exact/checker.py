@@ -14,7 +14,7 @@ import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning.exact import kernels
-from motion_planning.exact.geometry import grown, plane_overlap
+from motion_planning.exact.geometry import grown, plane_overlap, simple_of
 from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, without_fixed_joints
 from motion_planning.model import ModelError
 from motion_planning.shapes import Octree, TriangleMesh
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from motion_planning.shapes import Geometry, Meshes
 
 T = TypeVar("T")
-#: Pairs of movers; links and movers that differ between postures; what has been found of pairs of names.
-_Pairing = tuple[np.ndarray, tuple[np.ndarray, np.ndarray], dict[tuple[str, str], bool]]
+#: Pairs of movers; those that are checked against fixed shapes; what has been found of pairs of names.
+_Pairing = tuple[np.ndarray, np.ndarray, dict[tuple[str, str], bool]]
 
 #: Number of cached tables of scenes: a scene and its few successors are checked many times.
 _KEPT = 12
 # Number of shapes that are made between two looks at the clock; of postures that are checked at once, the first time
 # and afterwards: where one is in collision, the first ones often are.
 _AT_ONCE = 16
-_FIRST_POSTURES, _POSTURES = 8, 64
+_FIRST_POSTURES, _POSTURES = 16, 64
 _ANY = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 _ALL = fcl.CollisionRequest(num_max_contacts=50, enable_contact=True)
 _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True)
@@ -176,7 +176,7 @@ class ExactChecker:
         best = None
         with self._lock:
             query = self._query(scene, state, group)
-            rows, least = kernels.gaps(query.robot, query.movers.arrays, query.pairs, query.moving[1],
+            rows, least = kernels.gaps(query.robot, query.movers.arrays, query.pairs, query.active,
                                        query.fixed.arrays, query.poses)
             for k in np.argsort(least, kind="stable"):
                 if best is not None and least[k] >= best.distance:
@@ -202,7 +202,8 @@ class ExactChecker:
                 check()
                 with self._lock:
                     for shape in shapes[begin : begin + _AT_ONCE]:
-                        self._geometries.of(shape)
+                        if simple_of(shape) is None:
+                            self._geometries.of(shape)
                         self._geometries.geometry(shape)
         check()
         with self._lock:
@@ -218,22 +219,24 @@ class ExactChecker:
             raise ModelError("joint values are not all finite: %s" % dict(zip(self.model.variables, q.tolist(),
                                                                               strict=True)))
         movers = self._movers(scene, state)
-        pairs, moving, memory = self._pairing(scene, movers, group)
+        pairs, active, memory = self._pairing(scene, movers, group)
         base = np.array(state.base)
         if not math.isfinite(base.sum()):
             raise ModelError("the pose of link '%s' is not finite: %s" % (self.model.root, base.tolist()))
-        return _Query((self._kinematics, q, base), movers, pairs, moving,
+        return _Query((self._kinematics, q, base), movers, (pairs, active),
                       self._fixed(scene), scene.allowed, memory)
 
     def _near(self, query: _Query) -> list[list[int]]:
-        """List of [i, j] that may touch, as from kernels.unproven, without allowed pairs."""
-        return [[i, j] for _, i, j in self._unproven(query, query.robot[1][None])]
+        """List of [i, j] that may touch, as from kernels.unproven, without allowed pairs. Their poses are filled."""
+        found = [[i, j] for _, i, j in self._unproven(query, query.robot[1][None])]
+        if found:
+            query.move(query.robot[1], frozenset())
+        return found
 
     def _unproven(self, query: _Query, postures: np.ndarray) -> list[list[int]]:
         """List of [number of a posture (p, n), i, j], as from kernels.unproven, without allowed pairs."""
         kinematics, _, base = query.robot
-        arguments = ((kinematics, base), postures, query.movers.arrays, (query.pairs, *query.moving),
-                     query.fixed.arrays, query.poses)
+        arguments = ((kinematics, base), postures, query.movers.arrays, (query.pairs, query.active), query.fixed.arrays)
         count = kernels.unproven(*arguments, self._rows)
         if count > len(self._rows):
             self._rows = np.empty((2 * count, 3), dtype=np.int64)
@@ -335,8 +338,8 @@ class ExactChecker:
         moving, carriers = None, np.arange(len(self._kinematics[0]))
         if group is not None:
             moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
-            carriers = np.array(sorted({self._carriers[link][0] for link in moving}), dtype=np.int64)
-        return movers.pairs(allowed, moving), (carriers, np.flatnonzero(np.isin(movers.arrays[0], carriers))), {}
+            carriers = [self._carriers[link][0] for link in moving]
+        return movers.pairs(allowed, moving), np.flatnonzero(np.isin(movers.arrays[0], carriers)), {}
 
     @staticmethod
     def _fixed_key(scene: Scene) -> tuple[Hashable, object]:
@@ -362,9 +365,9 @@ def _things(scene: Scene) -> list[WorldObject]:
 class _Query:
     """One state in one scene: poses of all bodies, computed on demand."""
 
-    def __init__(self, robot: RobotAt, movers: Movers, pairs: np.ndarray, moving: tuple[np.ndarray, np.ndarray],
+    def __init__(self, robot: RobotAt, movers: Movers, checked: tuple[np.ndarray, np.ndarray],
                  fixed: Fixed, allowed: AllowedCollisions, memory: dict[tuple[str, str], bool]) -> None:
-        self.robot, self.movers, self.pairs, self.moving, self.fixed = robot, movers, pairs, moving, fixed
+        self.robot, self.movers, (self.pairs, self.active), self.fixed = robot, movers, checked, fixed
         self.poses = np.empty((len(movers.parts), 4, 4))
         self._allowed, self._memory, self._placed = allowed, memory, set()
 

@@ -16,7 +16,6 @@ from urdf_model import Box, Cylinder, Plane, Sphere
 if TYPE_CHECKING:
     from motion_planning.shapes import Geometry
 
-_KINDS = {Sphere: apart.SPHERE, Cylinder: apart.CYLINDER, Cone: apart.CONE, Plane: apart.PLANE}
 # The greatest number of triangles or cubes in a leaf of a shape's tree of boxes, and the most levels of such a tree.
 _IN_A_LEAF, _MAX_LEVELS = 4, 14
 #: Half the side of a plane's box [m]: larger than any scene.
@@ -35,17 +34,34 @@ class Bounds(NamedTuple):
     radius: float
 
 
+class Form(NamedTuple):
+    """nodes (n, 6) of a shape that is made of parts and, of a mesh, heights (d,): see ``apart``."""
+
+    nodes: np.ndarray
+    heights: np.ndarray | None
+
+
+def simple_of(shape: Geometry) -> tuple[int, tuple[float, float, float], float] | None:
+    """Return (kind, see ``apart``, half sides of the box around a shape, radius of the ball) of a shape about its
+    origin, None for those that are made of parts."""
+    if isinstance(shape, Box):
+        x, y, z = (0.5 * side for side in shape.size)
+        return apart.BOX, (x, y, z), math.hypot(x, y, z)
+    if isinstance(shape, Cylinder | Cone):
+        kind = apart.CYLINDER if isinstance(shape, Cylinder) else apart.CONE
+        return kind, (shape.radius, shape.radius, 0.5 * shape.length), math.hypot(shape.radius, 0.5 * shape.length)
+    if isinstance(shape, Sphere):
+        return apart.SPHERE, (shape.radius, shape.radius, shape.radius), shape.radius
+    if isinstance(shape, Plane):
+        return apart.PLANE, (_ENDLESS, _ENDLESS, 0.0), 2.0 * _ENDLESS
+    return None
+
+
 def bounds_of(shape: Geometry) -> Bounds:
     """Return the :class:`Bounds` of a shape. Raises TypeError for other objects."""
-    zero = np.zeros(3)
-    if isinstance(shape, Box):
-        half = 0.5 * np.array(shape.size)
-        return Bounds(zero, half, float(np.linalg.norm(half)))
-    if isinstance(shape, Sphere):
-        return Bounds(zero, np.full(3, shape.radius), shape.radius)
-    if isinstance(shape, Cylinder | Cone):
-        half = np.array((shape.radius, shape.radius, 0.5 * shape.length))
-        return Bounds(zero, half, float(np.hypot(shape.radius, half[2])))
+    simple = simple_of(shape)
+    if simple is not None:
+        return Bounds(np.zeros(3), np.array(simple[1]), simple[2])
     if isinstance(shape, TriangleMesh):
         low, high = shape.corners.min(axis=0), shape.corners.max(axis=0)
         centre = 0.5 * (low + high)
@@ -55,21 +71,21 @@ def bounds_of(shape: Geometry) -> Bounds:
         low, high = (shape.boxes[:, :3] - side).min(axis=0), (shape.boxes[:, :3] + side).max(axis=0)
         half = 0.5 * (high - low)
         return Bounds(0.5 * (low + high), half, float(np.linalg.norm(half)))
-    if isinstance(shape, Plane):
-        return Bounds(zero, np.array((_ENDLESS, _ENDLESS, 0.0)), 2.0 * _ENDLESS)
     raise TypeError("%r is not a shape that can collide" % (shape,))
 
 
-def form_of(shape: Geometry, bounds: Bounds) -> tuple[int, np.ndarray]:
-    """Return (kind, nodes (n, 6)) of a shape with these Bounds, see ``apart``."""
-    if not isinstance(shape, TriangleMesh | Octree):
-        return _KINDS.get(type(shape), apart.BOX), np.array([[0.0, 0.0, 0.0, *bounds.half]])
+def form_of(shape: Geometry, bounds: Bounds) -> Form:
+    """Return the Form of a mesh or octree with these Bounds. Raises TypeError for other objects."""
     if isinstance(shape, TriangleMesh):
         corners = shape.vertices[shape.triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
-    else:
-        side = 0.5 * shape.boxes[:, 3:]
+        heights = np.array([(shape.corners @ way).max() - way @ bounds.centre for way in apart.DIRECTIONS])
+    elif isinstance(shape, Octree):
+        # Cubes of a cloud change all the time, and planes around all of them say little.
+        side, heights = 0.5 * shape.boxes[:, 3:], None
         low, high = shape.boxes[:, :3] - side, shape.boxes[:, :3] + side
+    else:
+        raise TypeError("%r is not made of parts" % (shape,))
     levels = min(_MAX_LEVELS, max(0, math.ceil(math.log2(len(low) / _IN_A_LEAF))))
     middle, order = low + high, np.arange(len(low))[None]
     # Each level cuts all groups in half along their longest sides; where they are not equal, one is in both halves.
@@ -85,7 +101,7 @@ def form_of(shape: Geometry, bounds: Bounds) -> tuple[int, np.ndarray]:
     while True:
         found.append(np.concatenate([0.5 * (low + high) - bounds.centre, 0.5 * (high - low)], axis=1))
         if len(low) == 1:
-            return apart.BOX, np.concatenate(found[::-1])
+            return Form(np.concatenate(found[::-1]), heights)
         low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled proofs that shapes do not touch: forward kinematics, then balls, then boxes, then planes between them.
+"""Compiled proofs that shapes do not touch: balls of sixteen postures at once, then boxes, then planes between them.
 
 Shapes that move with the robot ("movers", m) belong to links: links (m,) index, local (m, 4, 4) pose in the link,
-centres (m, 3), halves (m, 3) and radii (m,) of their bounds. Fixed shapes (f) have rotations (f, 3, 3), centres (f, 3),
-halves (f, 3), radii (f,) in the planning frame, sorted so that chunks of them lie together: starts (c + 1,), balls (c,
-4) centre and radius of each chunk. Both have forms, see ``apart``.
+centres (m, 3), halves (m, 3) and radii (m,) of their bounds, and the centres (m, 3) in the link. Fixed shapes (f)
+have rotations (f, 3, 3), centres (f, 3), halves (f, 3), radii (f,) in the planning frame, sorted so that chunks of them
+lie together: starts (c + 1,), balls (c, 4) centre and radius of each chunk. Both have forms, see ``apart``.
 """
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from motion_planning.exact import apart
 from motion_planning.exact.apart import boxes_meet, compiled, pair_apart
+from motion_planning.exact.sixteen import near_each_other, place_sixteen
 from motion_planning.model.kernels import fill_frame
 
 if TYPE_CHECKING:
@@ -22,32 +23,26 @@ if TYPE_CHECKING:
     from motion_planning.model.kernels import Kinematics
 
     RobotAt = tuple[Kinematics, np.ndarray, np.ndarray]
-    MoverArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Forms]
+    MoverArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Forms, np.ndarray]
     FixedArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Forms]
     Work = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @compiled
-def place(robot: RobotAt, movers: MoverArrays, links: np.ndarray, which: np.ndarray, work: Work) -> None:
-    """Write the ``frames`` (l, 4, 4) of ``links`` (indices, parents first) and the ``poses`` (m, 4, 4), ``rotations``
-    (m, 3, 3) and ``places`` (m, 3) of the boxes of the movers ``which`` (indices). robot: kinematics, q, base; work:
-    frames, poses, rotations, places."""
-    kinematics, q, base = robot
+def _place_mover(i: int, movers: MoverArrays, work: Work) -> None:
+    """Write the pose of mover ``i``, and the rotation and the place of its box. work: frames of the links, poses (m, 4,
+    4), rotations (m, 3, 3), places (m, 3)."""
     of_links, local, centres = movers[0], movers[1], movers[2]
     frames, poses, rotations, places = work
-    for link in links:
-        fill_frame(kinematics, link, q, base, frames)
-    for i in which:
-        frame, inner, out = frames[of_links[i]], local[i], poses[i]
-        for a in range(3):
-            for b in range(4):
-                value = frame[a, 0] * inner[0, b] + frame[a, 1] * inner[1, b] + frame[a, 2] * inner[2, b]
-                out[a, b] = value + frame[a, 3] if b == 3 else value
-            places[i, a] = (out[a, 0] * centres[i, 0] + out[a, 1] * centres[i, 1] + out[a, 2] * centres[i, 2]
-                            + out[a, 3])
-            for b in range(3):
-                rotations[i, a, b] = out[a, b]
-        out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
+    frame, inner, out = frames[of_links[i]], local[i], poses[i]
+    for a in range(3):
+        for b in range(4):
+            value = frame[a, 0] * inner[0, b] + frame[a, 1] * inner[1, b] + frame[a, 2] * inner[2, b]
+            out[a, b] = value + frame[a, 3] if b == 3 else value
+        places[i, a] = out[a, 0] * centres[i, 0] + out[a, 1] * centres[i, 1] + out[a, 2] * centres[i, 2] + out[a, 3]
+        for b in range(3):
+            rotations[i, a, b] = out[a, b]
+    out[3, 0], out[3, 1], out[3, 2], out[3, 3] = 0.0, 0.0, 0.0, 1.0
 
 
 @compiled
@@ -57,58 +52,87 @@ def _work_arrays(kinematics: Kinematics, poses: np.ndarray) -> Work:
 
 
 @compiled
+def _place_all(robot: RobotAt, movers: MoverArrays, work: Work) -> None:
+    kinematics, q, base = robot
+    for link in range(kinematics[0].shape[0]):
+        fill_frame(kinematics, link, q, base, work[0])
+    for i in range(work[1].shape[0]):
+        _place_mover(i, movers, work)
+
+
+@compiled
 def fill_poses(robot: RobotAt, movers: MoverArrays, poses: np.ndarray) -> None:
     """Fill ``poses`` (m, 4, 4) with those of all movers. robot: kinematics, q, base."""
-    place(robot, movers, np.arange(robot[0][0].shape[0]), np.arange(poses.shape[0]), _work_arrays(robot[0], poses))
+    _place_all(robot, movers, _work_arrays(robot[0], poses))
+
+
+@compiled
+def _place_at(i: int, robot: RobotAt, movers: MoverArrays, work: Work,
+              made: tuple[int, np.ndarray, np.ndarray]) -> None:
+    """Place mover ``i`` and the links that lead to it, if that is not done. made: number of the posture, and those for
+    which each link and each mover was placed last."""
+    kinematics, q, base = robot
+    parents = kinematics[0]
+    number, of_links, of_movers = made
+    if of_movers[i] == number:
+        return
+    link = movers[0][i]
+    while of_links[link] != number:
+        first = link
+        while parents[first] >= 0 and of_links[parents[first]] != number:
+            first = parents[first]
+        fill_frame(kinematics, first, q, base, work[0])
+        of_links[first] = number
+    _place_mover(i, movers, work)
+    of_movers[i] = number
 
 
 @compiled
 def unproven(robot: tuple[Kinematics, np.ndarray], postures: np.ndarray, movers: MoverArrays,
-             checked: tuple[np.ndarray, np.ndarray, np.ndarray], fixed: FixedArrays, poses: np.ndarray,
-             out: np.ndarray) -> int:
+             checked: tuple[np.ndarray, np.ndarray], fixed: FixedArrays, out: np.ndarray) -> int:
     """Fill ``out`` (o, 3) with what may touch; return how many rows there are, which may be more than ``out`` has.
 
     robot: kinematics, base. postures (p, n). A row is the index of a posture and two movers, or a mover and -1 - the
-    fixed shape, that are not proven to be apart. checked: pairs (p, 2) of movers that are checked against each other;
-    the indices of the links that differ between postures, and of the movers on them, which are checked against fixed
-    shapes. Fills ``poses`` (m, 4, 4), of the last posture.
+    fixed shape, that are not proven to be apart; in the order of postures. checked: pairs (p, 2) of movers that are
+    checked against each other; the indices of the movers that are checked against fixed shapes.
     """
     kinematics, base = robot
-    pairs, links, active = checked
-    work = _work_arrays(kinematics, poses)
+    count, links = movers[1].shape[0], kinematics[0].shape[0]
+    work = _work_arrays(kinematics, np.empty((count, 4, 4)))
     rotations, places = work[2], work[3]
     halves, radii, forms = movers[3], movers[4], movers[5]
     turns, centres, sides, sizes, starts, balls, fixed_forms = fixed
+    of_links, of_movers = np.full(links, -1), np.full(count, -1)
+    frames, spots = np.empty(192 * links, np.float32), np.empty(48 * count, np.float32)
     stack = apart.stack()
     found = 0
-    for p in range(postures.shape[0]):
-        if p == 0:
-            place((kinematics, postures[0], base), movers, np.arange(kinematics[0].shape[0]),
-                  np.arange(poses.shape[0]), work)
-        else:
-            place((kinematics, postures[p], base), movers, links, active, work)
-        for k in range(pairs.shape[0]):
-            i, j = pairs[k, 0], pairs[k, 1]
-            reach = radii[i] + radii[j] + 1e-6
-            if _square(places[i], places[j]) <= reach * reach and boxes_meet(
-                    rotations[i], places[i], halves[i], rotations[j], places[j], halves[j]) and not pair_apart(
-                    forms, (i, rotations[i], places[i]), forms, (j, rotations[j], places[j]), stack):
-                if found < out.shape[0]:
-                    out[found, 0], out[found, 1], out[found, 2] = p, i, j
-                found += 1
-        for c in range(balls.shape[0]):
-            for i in active:
-                reach = radii[i] + balls[c, 3] + 1e-6
-                if _square(places[i], balls[c]) > reach * reach:
+    for begin in range(0, postures.shape[0], 16):
+        some = postures[begin : begin + 16]
+        margin = place_sixteen(kinematics, base[:3, :3], some, movers, frames, spots)
+        near, size = near_each_other((frames, spots), movers, checked, fixed,
+                                     (base[:3, 3], margin, (1 << len(some)) - 1))
+        for lane in range(len(some)):
+            at, made = (kinematics, some[lane], base), (begin + lane, of_links, of_movers)
+            for row in range(size):
+                if not near[row, 2] >> lane & 1:
                     continue
-                for k in range(starts[c], starts[c + 1]):
-                    reach = radii[i] + 1e-6
-                    if _square_to_box(places[i], turns[k], centres[k], sides[k]) <= reach * reach and boxes_meet(
-                            rotations[i], places[i], halves[i], turns[k], centres[k], sides[k]) and not pair_apart(
-                            forms, (i, rotations[i], places[i]), fixed_forms, (k, turns[k], centres[k]), stack):
-                        if found < out.shape[0]:
-                            out[found, 0], out[found, 1], out[found, 2] = p, i, -1 - k
-                        found += 1
+                i, j = near[row, 0], near[row, 1]
+                _place_at(i, at, movers, work, made)
+                if j >= 0:
+                    _place_at(j, at, movers, work, made)
+                    reach = radii[i] + radii[j] + 1e-6
+                    is_apart = _square(places[i], places[j]) > reach * reach or not boxes_meet(
+                        rotations[i], places[i], halves[i], rotations[j], places[j], halves[j]) or pair_apart(
+                        forms, (i, rotations[i], places[i]), forms, (j, rotations[j], places[j]), stack)
+                else:
+                    k, reach = -1 - j, radii[i] + 1e-6
+                    is_apart = _square_to_box(places[i], turns[k], centres[k], sides[k]) > reach * reach or \
+                        not boxes_meet(rotations[i], places[i], halves[i], turns[k], centres[k], sides[k]) or \
+                        pair_apart(forms, (i, rotations[i], places[i]), fixed_forms, (k, turns[k], centres[k]), stack)
+                if not is_apart:
+                    if found < out.shape[0]:
+                        out[found, 0], out[found, 1], out[found, 2] = begin + lane, i, j
+                    found += 1
     return found
 
 
@@ -121,7 +145,7 @@ def gaps(robot: RobotAt, movers: MoverArrays, pairs: np.ndarray, active: np.ndar
     The distance of the centre of one from the other's box, less its ball's radius, and the other way round.
     """
     work = _work_arrays(robot[0], poses)
-    place(robot, movers, np.arange(robot[0][0].shape[0]), np.arange(poses.shape[0]), work)
+    _place_all(robot, movers, work)
     rotations, places = work[2], work[3]
     halves, radii = movers[3], movers[4]
     turns, centres, sides, sizes = fixed[0], fixed[1], fixed[2], fixed[3]
@@ -141,6 +165,20 @@ def gaps(robot: RobotAt, movers: MoverArrays, pairs: np.ndarray, active: np.ndar
                            _to_box(centres[k], rotations[i], places[i], halves[i]) - sizes[k])
             n += 1
     return rows, least
+
+
+@compiled
+def balls_of(centres: np.ndarray, radii: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Return (c, 4), centre and radius of a ball around each chunk of balls with ``centres`` (f, 3) and ``radii`` (f,).
+    starts (c + 1,): where the chunks begin, and where the last one ends."""
+    balls = np.zeros((len(starts) - 1, 4))
+    for chunk in range(len(balls)):
+        begin, end = starts[chunk], starts[chunk + 1]
+        for a in range(3):
+            balls[chunk, a] = 0.5 * (centres[begin:end, a].min() + centres[begin:end, a].max())
+        for k in range(begin, end):
+            balls[chunk, 3] = max(balls[chunk, 3], math.sqrt(_square(centres[k], balls[chunk])) + radii[k])
+    return balls
 
 
 @compiled

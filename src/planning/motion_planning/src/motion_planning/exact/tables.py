@@ -10,11 +10,12 @@ import fcl
 import numpy as np
 
 from motion_planning.errors import PlanningError
-from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of
+from motion_planning.exact import apart, kernels
+from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of, simple_of
 
 if TYPE_CHECKING:
     from motion_planning.exact.apart import Forms
-    from motion_planning.exact.geometry import Bounds
+    from motion_planning.exact.geometry import Bounds, Form
     from motion_planning.model.kernels import Kinematics
     from motion_planning.scene import AllowedCollisions
     from motion_planning.shapes import Geometry
@@ -65,26 +66,45 @@ class Geometries:
     def __init__(self) -> None:
         self._known, self._geometries = WeakKeyDictionary(), WeakKeyDictionary()
 
-    def of(self, shape: Geometry) -> tuple[Bounds, tuple[int, np.ndarray]]:
-        """Return (Bounds, form, see ``form_of``)."""
+    def of(self, shape: Geometry) -> tuple[Bounds, Form]:
+        """Return the Bounds and the Form of a mesh or octree."""
         entry = self._known.get(shape)
         if entry is None:
             bounds = bounds_of(shape)
             entry = self._known[shape] = bounds, form_of(shape, bounds)
         return entry
 
+    def tables(self, shapes: Sequence[Geometry]) -> tuple[np.ndarray, np.ndarray, np.ndarray, Forms]:
+        """Return centres (n, 3), half sides (n, 3) and radii (n,) of the bounds of shapes, and their forms, see
+        ``apart``."""
+        count = len(shapes)
+        centres, halves, radii = np.zeros((count, 3)), np.empty((count, 3)), np.empty(count)
+        kinds, counts, slabs = np.empty(count, np.int64), np.ones(count, np.int64), np.full(count, -1)
+        made, heights = {}, []
+        for k, shape in enumerate(shapes):
+            simple = simple_of(shape)
+            if simple is not None:
+                kinds[k], halves[k], radii[k] = simple
+                continue
+            bounds, form = self.of(shape)
+            kinds[k], centres[k], halves[k], radii[k] = apart.BOX, *bounds
+            counts[k], made[k] = len(form.nodes), form.nodes
+            if form.heights is not None:
+                slabs[k] = len(heights)
+                heights.append(form.heights)
+        firsts = np.cumsum(counts) - counts
+        nodes = np.zeros((counts.sum(), 6))
+        nodes[firsts, 3:] = halves
+        for k, some in made.items():
+            nodes[firsts[k] : firsts[k] + counts[k]] = some
+        return centres, halves, radii, (kinds, firsts, counts, nodes, slabs,
+                                        np.array(heights).reshape(-1, len(apart.DIRECTIONS)))
+
     def geometry(self, shape: Geometry) -> Any:
         """Return the FCL geometry of a shape, None for a plane."""
         if shape not in self._geometries:
             self._geometries[shape] = fcl_geometry(shape)
         return self._geometries[shape]
-
-
-def _forms(found: Sequence[tuple[Bounds, tuple[int, np.ndarray]]]) -> Forms:
-    """The forms of ``apart`` for entries of Geometries."""
-    counts = np.array([len(nodes) for _, (_, nodes) in found], dtype=np.int64)
-    return (np.array([kind for _, (kind, _) in found], dtype=np.int64), np.cumsum(counts) - counts, counts,
-            np.concatenate([np.empty((0, 6)), *[nodes for _, (_, nodes) in found]]))
 
 
 class Movers:
@@ -95,16 +115,13 @@ class Movers:
         """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; carriers: see
         ``without_fixed_joints``."""
         self.parts, self.touch = parts, touch
-        found = [geometries.of(part.shape) for part in parts]
         self.geometries = [geometries.geometry(part.shape) for part in parts]
         self.objects = [None if geometry is None else fcl.CollisionObject(geometry) for geometry in self.geometries]
         count = len(parts)
-        self.arrays = (
-            np.array([carriers[part.link][0] for part in parts], dtype=np.int64),
-            np.array([carriers[part.link][1] @ part.pose for part in parts], dtype=float).reshape(count, 4, 4),
-            np.array([bounds.centre for bounds, _ in found], dtype=float).reshape(count, 3),
-            np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3),
-            np.array([bounds.radius for bounds, _ in found], dtype=float), _forms(found))
+        local = np.array([carriers[part.link][1] @ part.pose for part in parts], dtype=float).reshape(count, 4, 4)
+        centres, halves, radii, forms = geometries.tables([part.shape for part in parts])
+        self.arrays = (np.array([carriers[part.link][0] for part in parts], dtype=np.int64), local, centres, halves,
+                       radii, forms, np.einsum("nab,nb->na", local[:, :3, :3], centres) + local[:, :3, 3])
 
     def pairs(self, allowed: AllowedCollisions, moving: set[int] | None) -> np.ndarray:
         """Return (p, 2) indices of movers that are checked against each other, of two things each.
@@ -153,24 +170,17 @@ class Fixed:
     def __init__(self, parts: Sequence[Part], geometries: Geometries) -> None:
         count = len(parts)
         poses = np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4)
-        found = [geometries.of(part.shape) for part in parts]
-        local = np.array([bounds.centre for bounds, _ in found], dtype=float).reshape(count, 3)
-        halves = np.array([bounds.half for bounds, _ in found], dtype=float).reshape(count, 3)
-        radii = np.array([bounds.radius for bounds, _ in found], dtype=float)
+        local, halves, radii, (kinds, firsts, counts, nodes, slabs, heights) = geometries.tables(
+            [part.shape for part in parts])
         centres = np.einsum("nab,nb->na", poses[:, :3, :3], local) + poses[:, :3, 3]
         order = _neighbours_together(centres, radii)
-        self.parts = [parts[k] for k in order]
-        self.poses = poses[order]
+        self.parts, self.poses = [parts[k] for k in order], poses[order]
+        centres, halves, radii = centres[order], halves[order], radii[order]
+        forms = kinds[order], firsts[order], counts[order], nodes, slabs[order], heights
         self._geometries, self._objects = geometries, [None] * count
-        centres, radii = centres[order], radii[order]
         starts = np.append(np.arange(0, count, _CHUNK), count)
-        balls = np.empty((len(starts) - 1, 4))
-        for chunk, (start, end) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
-            middle = 0.5 * (centres[start:end].min(axis=0) + centres[start:end].max(axis=0))
-            reach = np.linalg.norm(centres[start:end] - middle, axis=1) + radii[start:end]
-            balls[chunk, :3], balls[chunk, 3] = middle, reach.max()
-        self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves[order], radii, starts, balls,
-                       _forms([found[k] for k in order]))
+        self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves, radii, starts,
+                       kernels.balls_of(centres, radii, starts), forms)
 
     def object(self, k: int) -> Any:
         """Return the fcl.CollisionObject of shape ``k``, None for a plane; made when it is first needed."""
