@@ -9,7 +9,7 @@ import fcl
 import numpy as np
 
 from motion_planning.exact import apart
-from motion_planning.exact.octree import occupied_tree
+from motion_planning.exact.octree import codes_of, occupied_tree
 from motion_planning.shapes import Cone, Octree, TriangleMesh
 from urdf_model import Box, Cylinder, Plane, Sphere
 
@@ -78,22 +78,25 @@ def form_of(shape: Geometry, bounds: Bounds) -> Form:
     """Return the Form of a mesh or octree with these Bounds. Raises TypeError for other objects."""
     if isinstance(shape, TriangleMesh):
         corners = shape.vertices[shape.triangles]
-        low, high = corners.min(axis=1), corners.max(axis=1)
+        low, high, order = corners.min(axis=1), corners.max(axis=1), np.arange(len(corners))[None]
         heights = np.array([(shape.corners @ way).max() - way @ bounds.centre for way in apart.DIRECTIONS])
     elif isinstance(shape, Octree):
         # Cubes of a cloud change all the time, and planes around all of them say little.
         side, heights = 0.5 * shape.boxes[:, 3:], None
         low, high = shape.boxes[:, :3] - side, shape.boxes[:, :3] + side
+        order = np.argsort(codes_of(shape), kind="stable")[None]
     else:
         raise TypeError("%r is not made of parts" % (shape,))
     levels = min(_MAX_LEVELS, max(0, math.ceil(math.log2(len(low) / _IN_A_LEAF))))
-    middle, order = low + high, np.arange(len(low))[None]
-    # Each level cuts all groups in half along their longest sides; where they are not equal, one is in both halves.
+    middle = low + high
+    # Each level cuts all groups in half, cubes along Morton's curve and triangles along their group's longest side;
+    # where halves are not equal, one is in both.
     for _ in range(levels):
-        some = middle[order]
-        axis = np.ptp(some, axis=1).argmax(axis=1)
-        along = np.take_along_axis(some, axis[:, None, None], axis=2)[:, :, 0]
-        order = np.take_along_axis(order, np.argsort(along, axis=1, kind="stable"), axis=1)
+        if isinstance(shape, TriangleMesh):
+            some = middle[order]
+            axis = np.ptp(some, axis=1).argmax(axis=1)
+            along = np.take_along_axis(some, axis[:, None, None], axis=2)[:, :, 0]
+            order = np.take_along_axis(order, np.argsort(along, axis=1, kind="stable"), axis=1)
         half = (order.shape[1] + 1) // 2
         order = np.stack([order[:, :half], order[:, -half:]], axis=1).reshape(-1, half)
     low, high = low[order].min(axis=1), high[order].max(axis=1)

@@ -22,8 +22,7 @@ def occupied_tree(octree: Octree) -> np.ndarray:
     """Return the stream (bytes as int8) of a ``shapes.Octree`` with at least one cube."""
     boxes = octree.boxes
     levels = np.rint(np.log2(boxes[:, 3] / octree.resolution)).astype(np.int64)
-    keys = np.floor(boxes[:, :3] / octree.resolution).astype(np.int64) + 2 ** (OCTREE_DEPTH - 1)
-    codes = _spread(keys[:, 0]) | _spread(keys[:, 1]) << 1 | _spread(keys[:, 2]) << 2
+    codes = codes_of(octree)
     for level in np.unique(levels):
         # A cube within a larger one adds nothing, and would take the larger one's place in the stream.
         covered = (levels < level) & np.isin(codes >> (3 * level), codes[levels == level] >> (3 * level))
@@ -39,6 +38,12 @@ def occupied_tree(octree: Octree) -> np.ndarray:
         nodes.append((inner << (3 * (level + 1)), np.full(len(inner), OCTREE_DEPTH - level), masks))
     first, depth, masks = (np.concatenate(column) for column in zip(*nodes, strict=True))
     return masks[np.lexsort((depth, first))].astype("<u2").view(np.int8)
+
+
+def codes_of(octree: Octree) -> np.ndarray:
+    """Return (n,) where the middles of an octree's cubes are along Morton's curve, in cells of its resolution."""
+    keys = np.floor(octree.boxes[:, :3] / octree.resolution).astype(np.int64) + 2 ** (OCTREE_DEPTH - 1)
+    return _spread(keys[:, 0]) | _spread(keys[:, 1]) << 1 | _spread(keys[:, 2]) << 2
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
