@@ -17,7 +17,7 @@ from urdf_model import Robot
 
 from . import fit as least
 from .arm_body import ArmBody, Array, arm_body, hand_in_last, with_load
-from .recording import Recording, start_of
+from .recording import COUNT_RAD, Recording, start_of
 from .replay import Motion, replay, set_points
 
 #: {number: (least, most, largest standard deviation with which it counts as determined: a share of it, or so much)}.
@@ -26,7 +26,13 @@ FREE = {"proportional_gain": (5.0, 1500.0, 0.3, 0.0), "motor_damping": (0.05, 30
 EXCESS = ("counterbalance_excess", "s1")
 #: Beside those of joints: the mass in the hand [kg], the way of a message to and fro [s].
 MASS, DELAY = ("mass", "hand"), ("delay", "messages")
+#: Torque that a joint's friction carries at the start, so that the controller's integral has it [Nm]. Where an arm came
+#: from decides it, so it is fitted to tell it from the rest, and reported nowhere.
+HELD = "held"
+HELD_NM = 3.0
 COMMON = {MASS: (0.0, 4.0, 0.2, 0.15), DELAY: (0.0, 0.06, 0.2, 0.003), EXCESS: (-0.5, 0.5, 0.2, 0.04)}
+#: How much longer the latest message of a robot at hand takes than the earliest [s]: the effect `delay`.
+JITTER_S = 0.003
 #: The load's place on the hand's axis [m from the frame `<side>_hand`]: that of a gripper.
 LOAD_M = 0.08
 MAX_REFUSALS = 4
@@ -36,13 +42,15 @@ Name = tuple[str, str]
 
 class Settings(NamedTuple):
     """load: whether a mass in the hand is fitted; known: whether the controller was told of it (`configure`); delay:
-    whether the way of messages is fitted; excess: whether s1's counterbalance is; given: [kg] a mass that is there."""
+    whether the way of messages is fitted; excess: whether s1's counterbalance is; given: [kg] a mass that is there;
+    jitter_s: how much longer the latest messages take than the earliest."""
 
     load: bool = False
     known: bool = False
     delay: bool = False
     excess: bool = True
     given: float = 0.0
+    jitter_s: float = 0.0
 
 
 class Found(NamedTuple):
@@ -96,12 +104,13 @@ class Model:
         settings = self.settings
         common = [name for name, is_free in ((EXCESS, settings.excess), (MASS, settings.load), (DELAY, settings.delay))
                   if is_free]
-        return [(number, joint) for number in FREE for joint in JOINTS] + common
+        held = [(HELD, joint) for arm in self.arms for joint in joint_names(arm.side)]
+        return [(number, joint) for number in FREE for joint in JOINTS] + held + common
 
     def start(self, names: list[Name]) -> Array:
         """(p,) the numbers as they are."""
         first = self.arms[0].numbers
-        return np.array([{MASS: 0.5, DELAY: 0.01}[name] if name in (MASS, DELAY)
+        return np.array([{MASS: 0.5, DELAY: 0.01}.get(name, 0.0) if name[0] not in NUMBERS
                          else first[NUMBERS.index(name[0]), JOINTS.index(name[1])] for name in names])
 
     def numbers(self, arm: _Arm, names: list[Name], values: Array) -> Array:
@@ -118,9 +127,10 @@ class Model:
         mass, found = float(common.get(MASS, self.settings.given)), []
         for arm in self.arms:
             loaded = with_load(arm.body, mass, arm.hand[:3, :3] @ [0.0, 0.0, LOAD_M] + arm.hand[:3, 3])
-            points = set_points(arm.commanded, self._period, float(common.get(DELAY, 0.0)))
+            points = set_points(arm.commanded, self._period, float(common.get(DELAY, 0.0)), self.settings.jitter_s)
+            held = np.array([common.get((HELD, joint), 0.0) for joint in joint_names(arm.side)])
             found.append(replay(loaded, loaded if self.settings.known else arm.body, self.numbers(arm, names, values),
-                                arm.start, points, self._period))
+                                (*arm.start, held), points, self._period))
         return found
 
     def errors(self, names: list[Name], values: Array) -> Array:
@@ -141,6 +151,8 @@ def identify(model: Model) -> Found:
             return model.errors(names, values)
 
         found = least.least_squares(errors, start, bounds)
+        if model.settings.jitter_s:
+            found = found._replace(deviation=_with_jitter(names, found))
         vague = _vague(names, found)
         if not vague.any():
             break
@@ -148,7 +160,7 @@ def identify(model: Model) -> Found:
             names, found.deviation, vague, strict=True) if is_vague})
         names = [name for name, is_vague in zip(names, vague, strict=True) if not is_vague]
     without = found.error.copy()
-    others = least.left_out(errors, found, bounds)
+    others = _left_out(model, names, found, bounds)
     for number, block in enumerate(least.block_slices(len(without))):
         without[block] = others[number][block]
     shape = (len(without), len(model.arms), len(JOINTS))
@@ -158,13 +170,40 @@ def identify(model: Model) -> Found:
                  {arm.side: model.numbers(arm, names, found.numbers) for arm in model.arms})
 
 
+def _left_out(model: Model, names: list[Name], found: least.Fit, bounds: least.Bounds) -> Array:
+    """`fit.left_out` of a model. What friction held at the start is kept: other blocks of time say nothing of it."""
+    free = np.array([name[0] != HELD for name in names])
+
+    def errors(values: Array) -> Array:
+        whole = found.numbers.copy()
+        whole[free] = values
+        return model.errors(names, whole)
+
+    part = least.Fit(found.numbers[free], found.error, found.slopes[free], found.deviation[free])
+    return least.left_out(errors, part, least.Bounds(*(each[free] for each in bounds)))
+
+
+def _with_jitter(names: list[Name], found: least.Fit) -> Array:
+    """(p,) standard deviations where commands come with jitter: a set-point that waits for a late command looks like
+    rest to the controller, whose integral then takes some of the friction, up to a count of the sensor by the gain."""
+    deviation = found.deviation.copy()
+    for index, (number, joint) in enumerate(names):
+        gain = ("proportional_gain", joint)
+        if number == "friction" and gain in names:
+            deviation[index] = np.hypot(deviation[index], COUNT_RAD * found.numbers[names.index(gain)])
+    return deviation
+
+
 def _limits(name: Name) -> tuple[float, float, float, float]:
+    if name[0] == HELD:
+        return -HELD_NM, HELD_NM, 0.0, 1e9
     return COMMON[name] if name in COMMON else FREE[name[0]]
 
 
 def _bounds(names: list[Name], start: Array) -> least.Bounds:
     limits = np.array([_limits(name)[:2] for name in names])
-    return least.Bounds(limits[:, 0], limits[:, 1], np.maximum(0.02 * np.abs(start), 2e-3))
+    steps = np.where([name[0] == HELD for name in names], 0.02, np.maximum(0.02 * np.abs(start), 2e-3))
+    return least.Bounds(limits[:, 0], limits[:, 1], steps)
 
 
 def _vague(names: list[Name], found: least.Fit) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ it answers. What messages take to and fro is the delay that the fit finds.
 """
 from __future__ import annotations
 
+from collections import deque
 from contextlib import suppress
 from typing import NamedTuple, Protocol
 
@@ -26,11 +27,14 @@ from .errors import SysidError
 from .excitation import PERIOD_S
 from .recording import Recording
 
-#: The way to the first set-point: its speed in the fastest joint [rad/s], and how near [rad] and how slow [rad/s] the
-#: arm must be there within so long [s].
-APPROACH_RAD_S, THERE_RAD, STILL_RAD_S, ARRIVE_S = 0.25, 0.05, 0.02, 10.0
-#: Raw set-points expire after 0.2 s without a new one; a stream with a gap like this one [s] is no stream.
-LARGEST_GAP_S = 0.15
+#: The way to the first set-point: its speed in the fastest joint [rad/s], and how near [rad] the arm must be there
+#: within so long [s].
+APPROACH_RAD_S, THERE_RAD, ARRIVE_S = 0.25, 0.05, 10.0
+#: An arm rests that has stayed within STILL_RAD [rad], some counts of a sensor with noise, for STILL_S [s].
+STILL_RAD, STILL_S = 0.005, 1.0
+#: Raw set-points expire after 0.2 s without a new one; a stream with a gap like this one [s] is no stream. Those of
+#: position mode do not expire: its gap is what the arm may have left of its way.
+LARGEST_GAP_S, LARGEST_APPROACH_GAP_S = 0.15, 1.0
 _MARGIN_RAD = 0.05  # from the joints' limits
 _CHECKED_RAD = 0.05  # a way is looked at in steps like this one
 
@@ -140,7 +144,7 @@ def _follow(arm: RobotArm, seen: Seen, points: Array, raw: bool) -> list[tuple[S
     end = PERIOD_S * (len(points) - 1)
     there = PERIOD_S * np.arange(len(points))
     while True:
-        _require(seen, rows[-1][0].time_s if rows else begin)
+        _require(seen, rows[-1][0].time_s if rows else begin, LARGEST_GAP_S if raw else LARGEST_APPROACH_GAP_S)
         passed = seen.time_s - begin
         goal = np.array([np.interp(passed, there, joint) for joint in points.T])
         arm.command(goal, raw)
@@ -152,28 +156,30 @@ def _follow(arm: RobotArm, seen: Seen, points: Array, raw: bool) -> list[tuple[S
 
 def _settle(arm: RobotArm, seen: Seen, goal: Array) -> Seen:
     """Wait until the arm rests at `goal` (7,)."""
-    begin, last = seen.time_s, seen
+    begin, last = seen.time_s, deque([seen])
     while True:
         arm.command(goal, False)
         seen = arm.next()
-        _require(seen, last.time_s)
+        _require(seen, last[-1].time_s, LARGEST_APPROACH_GAP_S)
+        last.append(seen)
         off = np.abs(seen.position - goal)
-        if seen.time_s - last.time_s > 0.0:
-            speed = np.abs(seen.position - last.position).max() / (seen.time_s - last.time_s)
-            if off.max() < THERE_RAD and speed < STILL_RAD_S and seen.time_s - begin > 1.0:
+        if seen.time_s - last[0].time_s >= STILL_S:
+            moved = np.ptp([one.position for one in last], axis=0).max()
+            if off.max() < THERE_RAD and moved < STILL_RAD:
                 return seen
+            last.popleft()
         if seen.time_s - begin > ARRIVE_S:
             raise Stopped("the arm does not come to rest at its start: %s is %.3f rad off. Is something in its way?" % (
                 JOINTS[int(np.argmax(off))], off.max()))
-        last = seen
 
 
-def _require(seen: Seen, before_s: float) -> None:
+def _require(seen: Seen, before_s: float, largest_gap_s: float) -> None:
     if seen.trouble:
         raise Stopped(seen.trouble)
-    if not -1e-9 <= seen.time_s - before_s <= LARGEST_GAP_S:
-        raise Stopped("the robot's joint states went from %.3f to %.3f s; they must come at 10 Hz or more, from one "
-                      "robot" % (before_s, seen.time_s))
+    if not -1e-9 <= seen.time_s - before_s <= largest_gap_s:
+        raise Stopped("the robot's joint states went from %.3f to %.3f s, and at most %g s may lie between two. Is "
+                      "this machine busy with other work, or are there two robots?" % (
+                          before_s, seen.time_s, largest_gap_s))
 
 
 def resampled(rows: list[tuple[Seen, Array]], side: str) -> Recording:

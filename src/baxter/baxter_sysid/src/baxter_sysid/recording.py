@@ -14,6 +14,7 @@ from .errors import SysidError
 
 #: A replay begins with the arm's own speed if it moves faster than this [rad/s].
 MOVING = 0.05
+COUNT_RAD = 0.000383495  # a count of the robot's position sensors
 _AHEAD_ROWS = 9
 
 

@@ -4,6 +4,7 @@ body of `arm_body`. A second of it takes some milliseconds; the full simulator's
 """
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,34 +31,53 @@ class Motion(NamedTuple):
     effort: Array
 
 
-def set_points(commanded: Array, period_s: float, delay_s: float) -> Array:
+def set_points(commanded: Array, period_s: float, delay_s: float, jitter_s: float = 0.0) -> Array:
     """(ticks, n) [rad] set-points of each tick, from commands (rows, n) [rad] every period_s [s] that take delay_s [s]
-    to the joints.
+    to the joints, by the mean; each takes up to half of jitter_s [s] more or less, at random.
 
-    A raw set-point is reached a period after its command came, at an even pace. Before the first command the set-point
-    is there already.
+    A raw set-point is reached as long after its command came as that came after the one before, at an even pace. Before
+    the first command the set-point is there already.
     """
     rows = len(commanded)
-    ticks = round((rows - 1) * period_s / TICK_S)
-    time_s = TICK_S * (1.0 + np.arange(ticks)) - delay_s - period_s
-    there = period_s * np.arange(rows)
-    return np.stack([np.interp(time_s, there, joint) for joint in commanded.T], axis=1)
+    ticks = (rows - 1) * round(period_s / TICK_S)
+    time_s = TICK_S * (1.0 + np.arange(ticks))
+    came = delay_s + period_s * np.arange(rows)
+    if jitter_s > 0.0:
+        came += jitter_s * (np.random.default_rng(0).random(rows) - 0.5)
+    return _streamed(np.ascontiguousarray(commanded), came, period_s, time_s)
 
 
-def replay(body: ArmBody, known: ArmBody, numbers: Array, start: tuple[Array, Array], points: Array,
+@_compiled
+def _streamed(commanded: Array, came: Array, period_s: float, time_s: Array) -> Array:
+    points = np.empty((len(time_s), commanded.shape[1]))
+    begun, gap, row = commanded[0].copy(), period_s, 0  # where the set-point was when the newest command came
+    for tick in range(len(time_s)):
+        while row + 1 < len(came) and came[row + 1] <= time_s[tick]:
+            gone = min(max((came[row + 1] - came[row]) / gap, 0.0), 1.0)
+            begun += (commanded[row] - begun) * gone
+            gap = max(came[row + 1] - came[row], TICK_S)
+            row += 1
+        points[tick] = begun + (commanded[row] - begun) * min(max((time_s[tick] - came[row]) / gap, 0.0), 1.0)
+    return points
+
+
+def replay(body: ArmBody, known: ArmBody, numbers: Array, start: Sequence[Array], points: Array,
            period_s: float) -> Motion:
     """The motion of an arm along set-points.
 
     known: the arm as gravity compensation knows it; numbers: (k, n) of the actuators, in the order of
-    `actuators.NUMBERS`; start: position (n,) [rad] and velocity (n,) [rad/s]; points: of `set_points`. The first row is
-    the start.
+    `actuators.NUMBERS`; start: position (n,) [rad], velocity (n,) [rad/s] and, if not 0, the torque (n,) [Nm] that the
+    controllers' integrals have beside the load that they do not know, because friction carries it; points: of
+    `set_points`. The first row is the start.
     """
-    return Motion(*_replay(body, known, np.ascontiguousarray(numbers), start[0], start[1],
-                           np.ascontiguousarray(points), round(period_s / TICK_S)))
+    whole = np.zeros((3, len(start[0])))
+    whole[:len(start)] = start
+    return Motion(*_replay(body, known, np.ascontiguousarray(numbers), whole, np.ascontiguousarray(points),
+                           round(period_s / TICK_S)))
 
 
 @_compiled
-def _replay(body: ArmBody, known: ArmBody, numbers: Array, start: Array, velocity: Array, points: Array,
+def _replay(body: ArmBody, known: ArmBody, numbers: Array, begin: Array, points: Array,
             every: int) -> tuple[Array, Array, Array]:
     dt = TICK_S
     ticks, count = points.shape
@@ -69,6 +89,7 @@ def _replay(body: ArmBody, known: ArmBody, numbers: Array, start: Array, velocit
     turned, work, matrix, factor = (np.empty((count, 3, 3)), np.empty((count, 6)), np.empty((count, count)),
                                     np.empty((count, count)))
     gravity, own = np.empty(count), np.empty(count)
+    start, velocity, held = begin[0], begin[1], begin[2]
     links[0], links[1] = start, velocity
     positions[0] = start
     # It rested, or moved for long: the integral has what the controller does not know of the load.
@@ -80,7 +101,7 @@ def _replay(body: ArmBody, known: ArmBody, numbers: Array, start: Array, velocit
         begun[i] = True
         state[0, i] = start[i] + (own[i] + balance * (1.0 + numbers[16, i])) / numbers[0, i]
         state[1, i], state[2, i], state[4, i] = velocity[i], points[0, i], points[0, i]
-        state[3, i] = balance * numbers[16, i] + own[i] - gravity[i]
+        state[3, i] = balance * numbers[16, i] + own[i] - gravity[i] + held[i]
     for tick in range(ticks):
         turn_joints(body, links[0], turned)
         torques(known, turned, still, still, GRAVITY, work, gravity)

@@ -13,7 +13,7 @@ from baxter_core_msgs.msg import AssemblyState, CollisionAvoidanceState, Collisi
 from sensor_msgs.msg import JointState
 
 from baxter_model import SIDES, joint_names
-from baxter_model.readiness import STATES_KEPT, why_not_ready
+from baxter_model.readiness import STATES_KEPT, UNFOLD, why_not_ready
 from urdf_model import Robot, UrdfError, parse_urdf
 
 from .arm_body import Array
@@ -24,6 +24,8 @@ from .recording import Recording
 
 #: Within this [s, wall] joint states must come; at first, within the longer one.
 _SILENT_S, _START_S = 2.0, 20.0
+#: A robot has two publishers of joint states; what one tells again, so much [s] later than the other, is not news.
+_LATE_S = 0.5
 _COMMANDS = "robot/limb/%s/joint_command"
 
 
@@ -39,7 +41,8 @@ class RosArm:
         self._idle: str | None = None
         self._collides, self._near = False, ""
         self._publisher = rospy.Publisher(_COMMANDS % side, JointCommand, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber("robot/joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)
+        # Where arms and grippers have messages of their own, the last one in the queue is the grippers'.
+        rospy.Subscriber("robot/joint_states", JointState, self._on_joints, queue_size=STATES_KEPT, tcp_nodelay=True)
         rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=STATES_KEPT)
         limb = "robot/limb/%s/" % side
         rospy.Subscriber(limb + "collision_detection_state", CollisionDetectionState, self._on_collision, queue_size=1)
@@ -80,7 +83,8 @@ class RosArm:
         if self._collides:
             return "the %s arm reports a collision" % self.side
         if self._near:
-            return "collision avoidance reports that the %s arm is too near to %s" % (self.side, self._near)
+            return "collision avoidance reports that the %s arm is too near to %s; move the arms apart and away from " \
+                   "the body: %s" % (self.side, self._near, UNFOLD)
         return ""
 
     def _wait(self, condition: Callable[[], bool], within_s: float, what: str) -> None:
@@ -92,9 +96,12 @@ class RosArm:
 
     def _on_joints(self, message: JointState) -> None:
         with self._changed:
-            self._joints.update(zip(message.name, message.position, strict=False))
             if self._names[self.side][0] in message.name:
-                self._stamp_s, self._count = message.header.stamp.to_sec(), self._count + 1
+                stamp_s = message.header.stamp.to_sec()
+                if 0.0 <= self._stamp_s - stamp_s < _LATE_S:
+                    return
+                self._stamp_s, self._count = stamp_s, self._count + 1
+            self._joints.update(zip(message.name, message.position, strict=False))
             self._changed.notify_all()
 
     def _on_state(self, message: AssemblyState) -> None:

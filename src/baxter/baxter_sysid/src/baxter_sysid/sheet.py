@@ -9,10 +9,10 @@ from baxter_sim_hardware.arms.actuators import NUMBERS
 
 from .arm_body import Array
 from .fit import rms
-from .identify import Found
+from .identify import HELD, Found
+from .recording import COUNT_RAD
 from .replay import Motion
 
-COUNT_RAD = 0.000383495  # a count of the robot's position sensors
 _QUIET = 0.01  # [rad] errors below it have no cause worth naming
 _FAST = 0.05  # [rad/s]
 
@@ -31,7 +31,8 @@ def errors(found: Found) -> list[str]:
 def numbers(found: Found) -> list[str]:
     """Lines: the fitted numbers with their standard deviations, and what the recording does not determine."""
     lines = ["%s of %s: %.4g, +- %.2g" % (number, joint, value, deviation)
-             for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True)]
+             for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True)
+             if number != HELD]
     for number, joint in found.refused:
         damping = ("motor_damping", joint)
         if number == "proportional_gain" and damping in found.names:

@@ -14,7 +14,7 @@ from baxter_model import JOINTS, SIDES, joint_names
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.simulated import Which
 from baxter_sysid.excitation import PERIOD_S, motion
-from baxter_sysid.identify import DELAY, EXCESS, LOAD_M, MASS, Model, Settings, identify
+from baxter_sysid.identify import DELAY, EXCESS, JITTER_S, LOAD_M, MASS, Model, Settings, identify
 from baxter_sysid.recording import Recording
 from urdf_model import parse_urdf
 
@@ -64,7 +64,7 @@ def recorded(path, side, seed, noise, delay, mass):
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed, noise, delay, mass, sticky", [
-    (1, 0.0, (0.0, 0.0), 0.0, None), (2, 0.001, (0.0, 0.0), 0.0, None), (3, 0.0, (0.012, 0.015), 0.0, None),
+    (1, 0.0, (0.0, 0.0), 0.0, None), (2, 0.001, (0.0, 0.0), 0.0, None), (3, 0.0, (0.012, 0.012 + JITTER_S), 0.0, None),
     (4, 0.0, (0.0, 0.0), 0.8, None), (5, 0.0, (0.0, 0.0), 0.0, "e0")],
     ids=["plain", "more noise", "late messages", "a weight in the hand", "e0 is sticky"])
 def test_a_hidden_robot_is_found_again(tmp_path, seed, noise, delay, mass, sticky):
@@ -75,7 +75,7 @@ def test_a_hidden_robot_is_found_again(tmp_path, seed, noise, delay, mass, stick
     bare = parse_urdf(xacro.process_file(file, mappings={"%s_gripper" % one: "none" for one in SIDES}).toxml())
     rows = effects.read(effects.physical_robot())["lag"]
     found = identify(Model(bare, rows, recorded(path, side, seed, noise, delay, mass), (side,),
-                           Settings(load=bool(mass), delay=True, excess=not mass)))
+                           Settings(load=bool(mass), delay=True, excess=not mass, jitter_s=delay[1] - delay[0])))
     assert set(found.refused) == set()
     off = {}
     for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True):
@@ -84,10 +84,10 @@ def test_a_hidden_robot_is_found_again(tmp_path, seed, noise, delay, mass, stick
             off[number, joint] = value / truth - 1.0, deviation / truth
     print({name: "%.1f %% +- %.1f" % (100.0 * one, 100.0 * deviation) for name, (one, deviation) in off.items()})
     for name, (one, deviation) in off.items():
-        # With much noise a number is as uncertain as the sheet says.
-        assert abs(one) < max(RECOVERED, 3.0 * deviation if noise else 0.0), name
+        # With much noise or jitter a number is as uncertain as the sheet says.
+        assert abs(one) < max(RECOVERED, 3.0 * deviation if noise or delay[1] else 0.0), name
     assert found.value(DELAY) == pytest.approx(np.mean(delay), abs=0.001)
     if mass:
         assert found.value(MASS) == pytest.approx(mass, rel=RECOVERED)
     else:
-        assert found.value(EXCESS) == pytest.approx(0.11 if side == "right" else 0.0, abs=0.01)
+        assert found.value(EXCESS) == pytest.approx(0.11 if side == "right" else 0.0, abs=0.015)

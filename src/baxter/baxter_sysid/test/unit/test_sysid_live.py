@@ -19,9 +19,10 @@ def pose(name, side):
 class FollowingArm:
     """A robot whose joints close an eighth of the way to their set-points at each of its ticks."""
 
-    def __init__(self, position, period_s=PERIOD_S):
+    def __init__(self, position, period_s=PERIOD_S, noise_rad=0.0):
         self.time_s, self.position, self.goal, self.period_s = 7.0, position.copy(), position.copy(), period_s
         self.commands, self.events = [], {}
+        self.noise_rad, self.random = noise_rad, np.random.default_rng(0)
 
     def next(self):
         self.time_s += self.period_s
@@ -29,7 +30,7 @@ class FollowingArm:
         event = self.events.get(len(self.commands), "")
         if isinstance(event, BaseException):
             raise event
-        return Seen(self.time_s, self.position.copy(), event)
+        return Seen(self.time_s, self.position + self.noise_rad * self.random.standard_normal(7), event)
 
     def command(self, position, raw):
         self.commands.append((np.array(position), raw))
@@ -64,6 +65,25 @@ def test_the_arm_goes_to_the_first_set_point_slowly_and_follows_the_rest_raw(arm
     np.testing.assert_allclose(recording.commanded["left"], points, atol=1e-9)
     assert np.abs(recording.sensed["left"] - points).max() < 8 * np.abs(np.diff(points, axis=0)).max()
     recording.check("it")
+
+
+def test_a_sensor_with_noise_does_not_look_like_motion(points):
+    noisy = FollowingArm(points[0], noise_rad=5e-4)
+    record(noisy, straight(points[0], points[0]), points, "left")
+    assert noisy.time_s < 7.0 + PERIOD_S * len(points) + 2.0
+
+
+def test_a_gap_on_the_way_to_the_start_ends_nothing(arm, points):
+    way = straight(arm.position, points[0])
+    plain = arm.next
+
+    def late():
+        if len(arm.commands) == len(way) // 2:
+            arm.time_s += 2.0 * LARGEST_GAP_S
+        return plain()
+
+    arm.next = late
+    assert len(record(arm, way, points, "left").time_s) == len(points)
 
 
 def test_joint_states_at_other_rates_give_the_same_rows(points):
