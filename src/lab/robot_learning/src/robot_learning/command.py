@@ -31,7 +31,7 @@ from .training import Curve, TrainingSettings, train
 
 #: Seeds of demonstrations and of corrections begin here: those of the evaluation are below.
 FIRST_DEMONSTRATION, FIRST_CORRECTION, MAX_CORRECTIONS = 100_000, 10_000_000, 100_000
-DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 2, 50, 100, 1.0
+DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 0, 50, 100, 1.0
 POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
 #: How much differs with --randomised.
 RANDOMISED = Randomised(mass=0.5, friction=0.5)

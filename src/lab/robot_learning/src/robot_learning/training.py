@@ -28,7 +28,7 @@ class TrainingSettings:
 
     chunk: int = 4
     hidden: tuple[int, ...] = (256, 256, 256)
-    steps: int = 12000
+    steps: int = 6000
     batch: int = 256
     rate: float = 1e-3
     decay: float = 0.3
