@@ -28,7 +28,7 @@ platform_line() {
     name=$(in_release "$1" PRETTY_NAME)
     case "$(in_release "$1" ID) $(in_release "$1" VERSION_ID)" in
         "debian 12") verdict="supported and tested" ;;
-        "debian 13") verdict="tried, not in the regular tests" ;;
+        "debian 13") verdict="supported and tested" ;;
         "ubuntu 22.04") verdict="tried, not in the regular tests; ROS 1 has to come from Ubuntu's own packages" ;;
         *)
             verdict="unknown; the workspace needs apt, ROS 1 packages and Python $OLDEST_PYTHON or newer"

@@ -223,7 +223,8 @@ def test_failing_step_is_named_with_command_and_log(tmp_path):
     (copy / "tools" / "apt_packages.txt").write_text("no-such-package-anywhere\n")
     fake = tmp_path / "bin"
     fake.mkdir()
-    for name, body in {"apt-get": "echo 'E: the archive is on fire'; exit 100", "sudo": '[[ $1 == -v ]] || exec "$@"'}.items():
+    bodies = {"apt-get": "echo 'E: the archive is on fire'; exit 100", "sudo": '[[ $1 == -v ]] || exec "$@"'}
+    for name, body in bodies.items():
         (fake / name).write_text(f"#!/bin/bash\n{body}\n")
         (fake / name).chmod(0o755)
     setup = (copy / "tools" / "setup.bash").read_text()
