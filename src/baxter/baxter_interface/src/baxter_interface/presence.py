@@ -55,7 +55,7 @@ def _has_living_publisher(topic: str) -> bool:
     for node in nodes:
         try:
             address = urlparse(str(master.lookupNode(node)))
-            startup.connect(address.hostname, address.port)
+            startup.connect(address.hostname or "", address.port or 0)  # port 0: nobody answers
             return True
         except _NO_ANSWER:
             continue

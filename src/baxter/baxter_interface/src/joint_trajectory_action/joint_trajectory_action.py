@@ -247,7 +247,7 @@ class JointTrajectoryActionServer:
                 *self._motion.output.tolist(), [], rospy.Duration.from_sec(max(now_s - self._motion.begin_s, 0.0))))
 
     def _publish_feedback(self, goal, now_s: float, position: Any, velocity: np.ndarray) -> None:
-        if not self._server.feedback_pub.get_num_connections():
+        if self._server.feedback_pub is None or not self._server.feedback_pub.get_num_connections():
             return
         since = rospy.Duration.from_sec(max(now_s - self._motion.begin_s, 0.0))
         message = FollowJointTrajectoryFeedback(joint_names=self._names)

@@ -184,7 +184,7 @@ def _record(options: argparse.Namespace, store: Store) -> ClassRecord:
         kept = {**vars(earlier.options), **values}
         return ClassRecord.made(Options(**kept), earlier.students, earlier)
     values.setdefault("at_once", max(1, (os.cpu_count() or 1) // 2))
-    return ClassRecord.made(Options(**values), _students(options.who), earlier)
+    return ClassRecord.made(Options(**values), _students(options.who or ""), earlier)
 
 
 def _is_up(store: Store) -> bool:

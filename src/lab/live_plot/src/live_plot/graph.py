@@ -39,7 +39,8 @@ class Graph(pyqtgraph.PlotWidget):
             if times.size:
                 end_s = max(end_s, times[-1])
         if span_s is not None and end_s > begin_s:
-            self.setXRange(max(0.0, end_s - begin_s - span_s), max(end_s - begin_s, span_s), padding=0)
+            left, right = max(0.0, end_s - begin_s - span_s), max(end_s - begin_s, span_s)
+            self.setXRange(left, right, padding=0)  # pyright: ignore[reportCallIssue]
 
     def _match_lines(self, samples: dict[str, np.ndarray]) -> None:
         for label in [label for label in self._lines if label not in samples]:

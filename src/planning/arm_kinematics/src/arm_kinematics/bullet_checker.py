@@ -52,7 +52,7 @@ class BulletChecker:
     def of_robot(cls, robot: Robot, self_collision_pairs: Iterable[tuple[str, str]] | None = None,
                  margin_m: float = 0.0, find_mesh: Callable[[str], str | None] | None = None,
                  mesh_cuts: Mapping[str, ArrayLike] | None = None,
-                 warn: Callable[[str], object] = LOG.warning) -> BulletChecker:
+                 warn: Callable[[str], None] = LOG.warning) -> BulletChecker:
         """Return a checker with a separate world, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
 
         ``find_mesh``, ``warn``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.

@@ -11,7 +11,7 @@ _MANY = 100_000
 _HALVED_GRIDS = (256, 128, 64)
 
 
-def thin_out(vertices: np.ndarray, faces: np.ndarray, target: int) -> tuple[np.ndarray, np.ndarray]:
+def thin_out(vertices: np.ndarray, faces: np.ndarray, target: float) -> tuple[np.ndarray, np.ndarray]:
     """Return (vertices, faces) of about the same shape, at most ``target`` triangles, if possible.
 
     Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner are

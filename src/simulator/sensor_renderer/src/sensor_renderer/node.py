@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NoReturn, cast
 
 import rospkg
 import rospy
@@ -275,7 +275,7 @@ def main() -> NoReturn:
     rospy.on_shutdown(ending.set)
     path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
     with open(path, encoding="utf-8") as file:
-        drivers = yaml.safe_load(file)
+        drivers = cast("dict[str, str]", yaml.safe_load(file))
     node = SensorRenderer(make_renderer, drivers, _labels())
     node.run(lambda: ending.is_set() or rospy.is_shutdown())
     node.close()

@@ -6,6 +6,7 @@ import functools
 import pathlib
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import Any, cast
 
 from .names import SIDES
 
@@ -49,7 +50,7 @@ def physical_robot() -> Interface:
     import yaml
 
     with open(pathlib.Path(__file__).with_name("interface.yaml"), encoding="utf-8") as stream:
-        table = yaml.safe_load(stream)
+        table = cast("dict[str, Any]", yaml.safe_load(stream))
     published, listened, services, parameters = (
         both_sides(table[kind]) for kind in ("published", "listened", "services", "parameters"))
     return Interface(published, listened, services, parameters, tuple(table["frames"]),
