@@ -3,6 +3,7 @@
 """`./baxter.sh doctor`: print every finding and its fix; exit code 0 when nothing is wrong."""
 
 import os
+import signal
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +19,7 @@ QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "m
              "move_group": "move_group",
              "is_fresh": "reading the packages", "listeners": "the list of open ports",
              "other_masters": "other ROS masters", "deaf_nodes": "the nodes' ports",
-             "users_python": "your own Python"}
+             "users_python": "your own Python", "own_packages": "your packages"}
 
 
 def say_what_takes_long(names: Iterable[str]) -> None:
@@ -40,6 +41,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # a reader such as `head` may end first
     status = main()
     sys.stdout.flush()
     os._exit(status)  # a thread whose probe still hangs must not delay the exit

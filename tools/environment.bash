@@ -172,6 +172,17 @@ build_own() {
     if [[ ${1:-} == --strict ]]; then strict=yes && shift; fi
     now=$(own_fingerprint)
     if [[ -z $now || -f $state/own_done && $(<"$state/own_done") == "$now" ]]; then return 0; fi
+    mapfile -t folders < <(own_folders)
+    # Before anything else runs, for nothing else says it; its sentences do not stop a shell in which to mend it.
+    if ! [[ -f $state/own_sound && $(<"$state/own_sound") == "$now" ]]; then
+        if /usr/bin/python3 "$LAB_ROOT/tools/own_manifests.py" "$LAB_ROOT" "${folders[@]}" </dev/null; then
+            printf '%s\n' "$now" >"$state/own_sound"
+        else
+            printf '%s\n' "$now" >"$state/own_failed"
+            [[ -z $strict ]]
+            return
+        fi
+    fi
     if [[ -z $strict ]] && ! names_own "$@"; then
         case ${1:-} in rosrun | roslaunch | rosnode | rosservice | rosparam | rviz | roscore) return 0 ;; esac
         if [[ -f $state/own_failed && $(<"$state/own_failed") == "$now" ]]; then
@@ -189,7 +200,6 @@ build_own() {
         flock -n 8 || { echo "another shell is building a package of your own; waiting for it to finish" >&2; flock 8; }
         if [[ -f $state/own_done && $(<"$state/own_done") == "$now" ]]; then exec 8>&- && return 0; fi
     fi
-    mapfile -t folders < <(own_folders)
     (use_build && exec /usr/bin/python3 "$LAB_ROOT/tools/own_packages.py" "$LAB_ROOT" "${folders[@]}") >&2 8>&- </dev/null ||
         status=$?
     if [[ $status -eq 0 ]]; then printf '%s\n' "$now" >"$state/own_done"; else printf '%s\n' "$now" >"$state/own_failed"; fi

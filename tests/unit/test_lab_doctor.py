@@ -89,8 +89,16 @@ def test_healthy_lab_has_nothing_wrong(facts):
     assert [finding for finding in examine(facts) if finding.level is not Level.OK] == []
 
 
+def test_before_the_first_set_up_no_other_lab_is_offered():
+    facts = replace(HEALTHY_LAB, is_built=False, was_set_up=False, master=Master(error="refused"), topics=None,
+                    other_masters=[OtherMaster("http://localhost:12752", True)])
+    finding, = (one for one in examine(facts) if one.topic == "master")
+    assert finding.level is Level.NOTE and "12752" not in finding.what + finding.fix
+
+
 SICK = {
     # name: (facts, topic of the finding, text in what, text in fix)
+    "own package": (replace(HEALTHY_LAB, own_packages=["src/a has the name 'b'"]), "packages", "'b'", "mend"),
     "not built": (replace(HEALTHY_LAB, is_built=False), "build", "not built", "setup"),
     "set-up cut off": (
         replace(HEALTHY_LAB, is_fresh=False, set_up=SetUp("pip", is_running=False)), "build", "step 'pip'", "setup",
@@ -357,10 +365,10 @@ def test_a_workspace_that_was_never_set_up_has_one_fault():
 
 def test_a_set_up_that_runs_is_told_with_its_step_and_nothing_is_wrong():
     facts = replace(HEALTHY_LAB, is_built=False, is_fresh=None, python=None,
-                    set_up=SetUp("apt", "Unpacking numpy", True, "1 of 9", 40))
+                    set_up=SetUp("apt", "Unpacking numpy", True, "1 of 9", 40, "Debian packages"))
     finding, = (one for one in examine(facts) if one.level is not Level.OK)
     assert (finding.topic, finding.level) == ("build", Level.BUSY)
-    assert "step 'apt' (1 of 9, since 40 s)" in finding.what and "Unpacking numpy" in finding.what
+    assert "step 'Debian packages' (1 of 9, since 40 s)" in finding.what and "Unpacking numpy" in finding.what
     assert "apt.log" in finding.fix
 
 
@@ -381,9 +389,11 @@ def test_the_lock_tells_a_running_set_up_from_one_that_was_cut_off(tmp_path):
     with open(tmp_path / ".baxter/lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert set_up_at_work(tmp_path) == SetUp("apt", "Get: 2 \ufffd")
+        (tmp_path / ".baxter/logs/apt.log").write_bytes(b"# Debian packages\n")
+        assert set_up_at_work(tmp_path) == SetUp("apt")
         (tmp_path / ".baxter/progress").write_text(f"{int(time.time()) - 40}\t1 of 9\tDebian packages\n")
         found = set_up_at_work(tmp_path)
-        assert found.place == "1 of 9" and found.since_s >= 40
+        assert (found.place, found.title) == ("1 of 9", "Debian packages") and found.since_s >= 40
     assert set_up_at_work(tmp_path) == SetUp("apt", is_running=False)
 
 

@@ -130,7 +130,7 @@ PACKAGE = """<package format="2"><name>{0}</name><version>0.1.0</version><descri
 
 def catkin_make_leaves_the_lab_alone(workspace):
     """The lab's catkin_make in the workspace: what it builds itself, and what it leaves to catkin's own."""
-    for name in ("catkin_make", "environment.bash", "own_packages.py"):
+    for name in ("catkin_make", "environment.bash", "own_manifests.py", "own_packages.py"):
         shutil.copy(ROOT / "tools" / name, workspace / "tools" / name)
     state = workspace / ".baxter"
     (state / "build.stamp").touch()

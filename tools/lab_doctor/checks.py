@@ -51,7 +51,7 @@ def check_build(facts: Facts) -> Iterator[Finding]:
     if facts.set_up is not None and facts.set_up.is_running:
         place = f" ({facts.set_up.place}, since {facts.set_up.since_s} s)" if facts.set_up.place else ""
         line = facts.set_up.last_line or "it has just begun"
-        what = f"set-up is running, in step '{facts.set_up.step}'{place}: {line}"
+        what = f"set-up is running, in step '{facts.set_up.title or facts.set_up.step}'{place}: {line}"
         yield Finding("build", Level.BUSY, what, f"wait until it has ended; tail -f {log} shows what it does")
     elif facts.set_up is not None:
         what = f"the last set-up was cut off in step '{facts.set_up.step}' (log: {log})"
@@ -72,6 +72,11 @@ def check_build(facts: Facts) -> Iterator[Finding]:
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
     else:
         yield Finding("build", Level.OK, f"{facts.root} is built and up to date")
+
+
+def check_own_packages(facts: Facts) -> Iterator[Finding]:
+    for sentence in facts.own_packages:
+        yield Finding("packages", Level.WRONG, sentence.partition(". Mend")[0], "mend that file")
 
 
 def check_python(facts: Facts) -> Iterator[Finding]:
@@ -150,6 +155,8 @@ def check_master(facts: Facts) -> Iterator[Finding]:
     if "master" in facts.timed_out and is_loopback(master_host(facts)):
         what = f"a program listens at {uri} and has not answered"
         yield Finding("master", Level.BUSY, what, "a stopped or hung master, or a busy machine: try again")
+    elif is_loopback(master_host(facts)) and (facts.master is None or facts.master.error) and not facts.is_built:
+        yield Finding("master", Level.NOTE, f"{uri} does not answer: no lab runs yet", "first set up")
     elif facts.master is None:
         yield Finding("master", Level.WRONG, f"{uri} did not answer in time", _master_fix(facts))
     elif facts.master.error:
@@ -309,6 +316,7 @@ def check_display(facts: Facts) -> Iterator[Finding]:
 
 CHECKS = (
     check_build,
+    check_own_packages,
     check_python,
     check_network,
     check_master,

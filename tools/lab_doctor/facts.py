@@ -81,7 +81,7 @@ class PythonFacts:
 class SetUp:
     """A set-up that has not ended: its step, the last line of that step's log, and whether it runs or was cut off.
 
-    place: the step's, as "6 of 9"; since_s: the time since the step began.
+    place: the step's, as "6 of 9"; since_s: the time since the step began; title: what set-up calls it.
     """
 
     step: str
@@ -89,6 +89,7 @@ class SetUp:
     is_running: bool = True
     place: str = ""
     since_s: int = 0
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ class Facts:
     topics: Topics | None = None
     move_group: MoveGroup | None = None  # also None if no move_group runs
     is_built: bool = False
+    own_packages: list[str] = field(default_factory=list)  # sentences about their package.xml
     is_fresh: bool | None = None
     set_up: SetUp | None = None  # None: the last one ended, or there was none
     was_set_up: bool = True  # whether a set-up has been completed

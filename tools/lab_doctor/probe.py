@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import urlparse
 
 import master_calls
+import own_manifests
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import (
     Controller,
@@ -69,6 +70,7 @@ def gather(root: Path, variables: dict[str, str], say: Callable[[list[str]], obj
         "other_masters": lambda: find_masters(ros["ROS_MASTER_URI"]),
         "deaf_nodes": lambda: find_deaf_nodes(ros["ROS_MASTER_URI"]),
         "users_python": lambda: users_python(variables),
+        "own_packages": lambda: own_packages(root),
         **{f"address of {name}": lambda name=name: resolve(name) for name in hosts},
     }
     answers, timed_out = answer_all(questions, deadline_s, say)
@@ -82,6 +84,7 @@ def gather(root: Path, variables: dict[str, str], say: Callable[[list[str]], obj
         is_built=(root / "devel" / "setup.bash").is_file(),
         is_fresh=answers.get("is_fresh"),
         set_up=answers.get("set_up"),
+        own_packages=answers.get("own_packages") or [],
         was_set_up=(root / ".baxter" / "done").is_file(),
         failure=last_failure(root),
         python=answers.get("python"),
@@ -304,6 +307,14 @@ def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
                         "sensors": [Sensor(**one) for one in answer["sensors"]]})
 
 
+def own_packages(root: Path) -> list[str]:
+    """What is wrong with the package.xml of the user's own packages, in sentences."""
+    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; own_folders'
+    command = ["bash", "-c", script, "own", str(root)]
+    listed = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
+    return own_manifests.problems(root, listed.stdout.split())
+
+
 def is_fresh(root: Path) -> bool:
     """Whether the fingerprint of the last set-up is still valid, by baxter.sh's own function."""
     script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; [[ $(<"$1/.baxter/done") == "$(fingerprint)" ]]'
@@ -326,13 +337,13 @@ def set_up_at_work(root: Path) -> SetUp | None:
     return SetUp(step, is_running=False)
 
 
-def _progress(file: Path) -> tuple[str, int]:
-    """Place of the running step, and the time since it began [s]; ("", 0) if set-up has not written them."""
+def _progress(file: Path) -> tuple[str, int, str]:
+    """Place of the running step, the time since it began [s], its title; ("", 0, "") if set-up has not written them."""
     try:
-        began, place, _ = file.read_text().rstrip("\n").split("\t")
-        return place, max(0, int(time.time()) - int(began))
+        began, place, title = file.read_text().rstrip("\n").split("\t")
+        return place, max(0, int(time.time()) - int(began)), title
     except (OSError, ValueError):
-        return "", 0
+        return "", 0, ""
 
 
 def last_failure(root: Path) -> Failure | None:
@@ -348,7 +359,8 @@ def _last_line(log: Path) -> str:
         lines = log.read_bytes()[-LOG_TAIL_BYTES:].decode(errors="replace").splitlines()
     except OSError:
         return ""
-    return next((line.strip()[:LINE_LENGTH] for line in reversed(lines) if line.strip()), "")
+    # A log begins with a heading.
+    return next((line.strip()[:LINE_LENGTH] for line in reversed(lines) if line.strip() and line[0] != "#"), "")
 
 
 def ask_python() -> PythonFacts:
