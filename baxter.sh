@@ -193,7 +193,7 @@ main() {
     local mode=${1:-sim}
     [[ $# -gt 0 ]] && shift
     case $mode in
-        help | -h | --help | --version | doctor) ;;
+        help | -h | --help | --version | version | doctor) ;;
         *) refuse_sudo || exit ;;
     esac
     case $mode in
@@ -210,7 +210,7 @@ main() {
         help | -h | --help)
             usage
             ;;
-        --version)
+        --version | version)
             version
             ;;
         setup)
