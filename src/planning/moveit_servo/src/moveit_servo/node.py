@@ -50,6 +50,8 @@ _DESCRIPTION_TIMEOUT_S, _JOINTS_TIMEOUT_S = 60.0, 10.0
 _PARAMETERS_EVERY_S, _SCENE_EVERY_S, _REASON_EVERY_S = 1.0, 0.1, 0.25
 # A step covers at most this many periods: after a pause the motion goes on where it was.
 _MAX_PERIODS = 3.0
+# A joint that is said to move faster [rad/s, m/s] says nothing of use.
+_MAX_SPEED = 1e3
 _TOLD_EVERY_S = 5.0
 _AXES = ("x_translation", "y_translation", "z_translation", "x_rotation", "y_rotation", "z_rotation")
 # Private parameters that are no settings of the servo.
@@ -117,8 +119,12 @@ class ServoNode:
                 index = self.model.index.get(name)
                 if index is None or not math.isfinite(message.position[number]):
                     continue
-                self._q[index] = message.position[number]
-                self._velocity[index] = message.velocity[number] if moves else 0.0
+                speed = message.velocity[number] if moves else 0.0
+                if not abs(speed) < _MAX_SPEED:  # drivers that do not measure it send NaN
+                    rospy.logwarn_once("the velocity of joint %s comes as %g; such velocities count as 0"
+                                       % (name, speed))
+                    speed = 0.0
+                self._q[index], self._velocity[index] = message.position[number], speed
                 self._heard.add(name)
 
     def _on_twist(self, message: TwistStamped) -> None:
