@@ -202,6 +202,9 @@ class RosGraph:
             raise BridgeError("the ROS master does not answer: %s" % error) from None
 
 
+_OF_BYTES = ("_connection_header", "_buff", "_read")
+
+
 class Bytes(rospy.AnyMsg):
     """A message of any type, as it came, which reads itself when somebody asks for a field.
 
@@ -214,6 +217,14 @@ class Bytes(rospy.AnyMsg):
     def __init__(self) -> None:
         super().__init__()
         self._read = None
+
+    # Those of genpy.Message keep the slots of the class alone: what a copy, as RobotEnable makes, would have to read.
+    def __getstate__(self) -> list[Any]:
+        return [getattr(self, name, None) for name in _OF_BYTES]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        for name, value in zip(_OF_BYTES, state, strict=True):
+            setattr(self, name, value)
 
     def __getattr__(self, name: str) -> list[genpy.Message]:
         # Fields have no such names; copies and headers are asked for before there is anything to read.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A message that came as bytes reads itself for a callback that asks for its fields."""
+import copy
+import pickle
 from io import BytesIO
 
 import pytest
@@ -30,6 +32,12 @@ def test_fields_are_those_of_the_type_that_the_publisher_names():
     assert message.transforms == SENT.transforms
     assert message.transforms is message.transforms
     assert message._connection_header["callerid"] == "/talker"
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda message: pickle.loads(pickle.dumps(message))])
+def test_a_copy_reads_itself_too(copied):
+    message = copied(arrived())
+    assert message.transforms == SENT.transforms and message._connection_header["callerid"] == "/talker"
 
 
 def test_what_is_no_field_is_an_error():
