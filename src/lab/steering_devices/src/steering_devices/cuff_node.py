@@ -10,7 +10,7 @@ import rospy
 
 from baxter_model import SIDES
 from rospy_nodes.start import end_on_signals, limit_ports
-from steering_devices.hands import Hands
+from steering_devices.hands import hands_of
 from steering_devices.leader import Leader, topics_of
 
 _LOOK_S = 0.1
@@ -27,7 +27,7 @@ def main() -> None:
     end_on_signals()
     limit_ports()
     rospy.init_node("servo_cuff", disable_signals=True)
-    hands, buttons, heard = Hands(), Leader(), queue.Queue()
+    hands, buttons, heard = hands_of("servo_cuff", len(SIDES)), Leader(), queue.Queue()
     for topic, name in topics_of(SIDES).items():
         if not topic.endswith("joint_states"):
             rospy.Subscriber(topic, roslib.message.get_message_class(name), lambda message, topic=topic: heard.put(

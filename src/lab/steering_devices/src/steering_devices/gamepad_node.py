@@ -11,8 +11,8 @@ import rospy
 from sensor_msgs.msg import Joy
 
 from rospy_nodes.start import end_on_signals, limit_ports
-from steering_devices.hands import Hands
-from steering_devices.steering import Gamepad, LayoutError, Steering
+from steering_devices.hands import hands_of
+from steering_devices.steering import Gamepad, LayoutError, ParameterError, Steering, number
 
 _RATE_HZ = 50.0
 _DESCRIPTION = """Steer by a gamepad. Subscribes: joy. Publishes: twists to the servos, /steering/mark.
@@ -27,12 +27,15 @@ def main() -> None:
     end_on_signals()
     limit_ports()
     rospy.init_node("servo_gamepad", disable_signals=True)
-    hands, lock, newest = Hands(), threading.Lock(), [Steering(), -1e9]
+    hands, lock, newest = hands_of("servo_gamepad"), threading.Lock(), [Steering(), -1e9]
     try:
         pad = Gamepad(rospy.get_param("~layout", None), len(hands))
     except LayoutError as error:
         sys.exit("servo_gamepad: ~layout: %s" % error)
-    timeout = rospy.get_param("~joy_timeout", 0.25)
+    try:
+        timeout = number("~joy_timeout", rospy.get_param("~joy_timeout", 0.25), 0.0)
+    except ParameterError as error:
+        sys.exit("servo_gamepad: %s" % error)
 
     def on_joy(message: Joy) -> None:
         with lock:

@@ -2,6 +2,7 @@
 """Where steering goes: twists and joint velocities to servos, commands to grippers, marks to whoever records."""
 from __future__ import annotations
 
+import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -9,9 +10,12 @@ import numpy as np
 import rospy
 from control_msgs.msg import JointJog
 from geometry_msgs.msg import TwistStamped
+from rosgraph.names import is_legal_name
 from std_msgs.msg import Int8, String
 
 from baxter_interface import Gripper
+from baxter_model import SIDES
+from steering_devices.steering import ParameterError, number
 
 if TYPE_CHECKING:
     from steering_devices.steering import Steering
@@ -33,14 +37,37 @@ def _cached(name: str, default: Any) -> Any:
     return rospy.get_param_cached(name, default)
 
 
+def _words(name: str, default: list[str]) -> list[str]:
+    """A parameter that is a list of words, or a text of them. Raises ParameterError."""
+    value = _param(name, default)
+    words = value.split() if isinstance(value, str) else value
+    if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+        raise ParameterError("%s is %r; expected a list of names, or a text of them" % (name, value))
+    return list(words)
+
+
+def hands_of(node: str, count: int = 0) -> Hands:
+    """Return the Hands of a node named ``node``, which needs ``count`` of them (0: any). Parameters that cannot be used
+    end it."""
+    try:
+        hands = Hands()
+    except ParameterError as error:
+        sys.exit("%s: %s" % (node, error))
+    if count and len(hands) != count:
+        sys.exit("%s: ~servos must name the servos of the left and the right arm, got %d" % (node, len(hands)))
+    return hands
+
+
 class Hand:
     """One servo and its gripper. name: of the servo's node; reason: why it holds back, "" if it does not."""
 
     def __init__(self, name: str, gripper: str = "") -> None:
+        """Raises ParameterError."""
         self.name, self.reason, self.status = name, "", 0
         # A device may be started before the servo whose parameters these are.
         #: What 1 means, of a twist's two halves [m/s, rad/s].
-        self.speeds = float(_param("~linear_speed", 0.2)), float(_param("~angular_speed", 0.6))
+        self.speeds = tuple(number(name, _param(name, usual), 0.0) for name, usual in (
+            ("~linear_speed", 0.2), ("~angular_speed", 0.6)))
         self._stops, self._gripper_name, self._gripper, self._gripping = _MAX_STOPS, gripper, None, threading.Lock()
         self._twists = rospy.Publisher(name + "/delta_twist_cmds", TwistStamped, queue_size=1, tcp_nodelay=True)
         self._jogs = rospy.Publisher(name + "/delta_joint_cmds", JointJog, queue_size=1, tcp_nodelay=True)
@@ -110,10 +137,13 @@ class Hands:
     """All hands of a device. Parameters: ~servos, names of servos' nodes; ~grippers, of each Baxter's side or ""."""
 
     def __init__(self) -> None:
-        names = _param("~servos", ["servo_server"])
-        names = names.split() if isinstance(names, str) else list(names)
-        grippers = _param("~grippers", [])
-        grippers = grippers.split() if isinstance(grippers, str) else list(grippers)
+        """Raises ParameterError."""
+        names, grippers = _words("~servos", ["servo_server"]), _words("~grippers", [])
+        if not names or not all(map(is_legal_name, names)):
+            raise ParameterError("~servos is %r; expected names of servos' nodes" % (names,))
+        if len(grippers) > len(names) or not all(side in ("", *SIDES) for side in grippers):
+            raise ParameterError("~grippers is %r; expected for each of ~servos %s or \"\"" % (
+                grippers, ", ".join(SIDES)))
         grippers += [""] * (len(names) - len(grippers))
         self.hands = [Hand(rospy.resolve_name(name), gripper) for name, gripper in zip(names, grippers, strict=False)]
         self._marks = rospy.Publisher(MARK_TOPIC, String, queue_size=10)

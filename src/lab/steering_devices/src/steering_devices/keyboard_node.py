@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import curses
+import os
 import sys
 import time
 
 import rospy
 
 from rospy_nodes.start import limit_ports
-from steering_devices.hands import Hands
+from steering_devices.hands import Hands, hands_of
 from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
 
 _PERIOD_S, _DRAWN_EVERY_S = 0.02, 0.1
@@ -24,9 +26,14 @@ def main() -> None:
         rospy.myargv()[1:])
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         sys.exit("servo_keyboard: it reads the keys of a terminal; start it with rosrun in one")
+    try:
+        curses.setupterm(fd=1)
+    except curses.error:
+        sys.exit("servo_keyboard: the terminal '%s' is not known here; set TERM to one that is, as xterm"
+                 % os.environ.get("TERM", ""))
     limit_ports()
     rospy.init_node("servo_keyboard", disable_signals=True, anonymous=True)
-    hands = Hands()
+    hands = hands_of("servo_keyboard")
     try:
         curses.wrapper(_run, hands)
     except KeyboardInterrupt:
@@ -36,7 +43,8 @@ def main() -> None:
 
 
 def _run(screen: curses.window, hands: Hands) -> None:
-    curses.curs_set(0)
+    with contextlib.suppress(curses.error):  # a terminal that cannot hide its cursor
+        curses.curs_set(0)
     screen.nodelay(True)
     keyboard, drawn = Keyboard(len(hands)), -1e9
     while not rospy.is_shutdown():

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 
 from baxter_model import JOINTS, SIDES, mirrored
 from rospy_nodes.start import end_on_signals, limit_ports
-from steering_devices.hands import Hands
+from steering_devices.hands import hands_of
 from steering_devices.leader import Clutch, Leader
 from steering_devices.leader_sources import LeaderAddressError, follow, stamped
 
@@ -58,9 +58,7 @@ def main() -> None:
     end_on_signals()
     limit_ports()
     rospy.init_node("servo_leader", disable_signals=True)
-    hands, leader, measured, lock = Hands(), Leader(), {}, threading.Lock()
-    if len(hands) != len(SIDES):
-        sys.exit("servo_leader: ~servos must name the servos of the left and the right arm, got %d" % len(hands))
+    hands, leader, measured, lock = hands_of("servo_leader", len(SIDES)), Leader(), {}, threading.Lock()
     is_mirror = bool(rospy.get_param("~mirror", False))
     arms = [_Follower(side, is_mirror, hand) for side, hand in zip(SIDES, hands.hands, strict=True)]
 

@@ -10,7 +10,7 @@ import time
 import rospy
 
 from rospy_nodes.start import end_on_signals, limit_ports
-from steering_devices.hands import Hands
+from steering_devices.hands import Hands, hands_of
 from steering_devices.spacemouse import Cap, Device, DeviceLost
 from steering_devices.steering import Gamepad, LayoutError, Steering
 
@@ -28,7 +28,7 @@ def main() -> None:
     end_on_signals()
     limit_ports()
     rospy.init_node("servo_spacemouse", disable_signals=True)
-    hands = Hands()
+    hands = hands_of("servo_spacemouse")
     try:
         pad = Gamepad(rospy.get_param("~layout", None), len(hands))
     except LayoutError as error:

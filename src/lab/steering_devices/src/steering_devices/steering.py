@@ -17,6 +17,9 @@ _NO_BUTTON = "none"
 _HELD_S = 0.15
 _SPEEDS = (0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
 
+#: The greatest number that a parameter of a device may be.
+MOST = 100.0
+
 #: Key: (what it does on screen, row, sign).
 MOTIONS = {"w": ("forward", 0, 1.0), "s": ("back", 0, -1.0), "a": ("left", 1, 1.0), "d": ("right", 1, -1.0),
            "r": ("up", 2, 1.0), "f": ("down", 2, -1.0), "u": ("roll +", 3, 1.0), "o": ("roll -", 3, -1.0),
@@ -26,7 +29,11 @@ OTHER_KEYS = {"g": "open or close the gripper", "h": "the other hand", "t": "axe
               "x": "end"}
 
 
-class LayoutError(ValueError):
+class ParameterError(ValueError):
+    """A parameter of a device that cannot be used; the text names it, its value and what would be right."""
+
+
+class LayoutError(ParameterError):
     """A gamepad's layout that cannot be used, with the reason."""
 
 
@@ -145,11 +152,25 @@ class Gamepad:
 
 def _source(row: str, source: Any) -> tuple:
     if isinstance(source, dict) and "axis" in source:
-        return _index("axis of " + row, source["axis"]), float(source.get("scale", 1.0)), 0, 0
+        return _index("axis of " + row, source["axis"]), _scale(row, source), 0, 0
     if isinstance(source, dict) and isinstance(source.get("buttons"), list) and len(source["buttons"]) == 2:
         plus, minus = (_index("button of " + row, one) for one in source["buttons"])
-        return None, float(source.get("scale", 1.0)), plus, minus
+        return None, _scale(row, source), plus, minus
     raise LayoutError("%s is %r; expected {axis: number} or {buttons: [number, number]}" % (row, source))
+
+
+def _scale(row: str, source: dict) -> float:
+    try:
+        return number("scale of " + row, source.get("scale", 1.0), -MOST, MOST)
+    except ParameterError as error:
+        raise LayoutError(str(error)) from None
+
+
+def number(what: str, value: Any, least: float, most: float = MOST) -> float:
+    """Return ``value``, a number from ``least`` to ``most``. Raises ParameterError, which says ``what`` it is."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
+        raise ParameterError("%s is %r; expected a number from %g to %g" % (what, value, least, most))
+    return float(value)
 
 
 def _index(what: str, value: Any) -> int:

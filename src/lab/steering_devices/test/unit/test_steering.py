@@ -93,7 +93,10 @@ def test_buttons_count_once(kind):
                                     {"hold": 1, "motions": {"q": {"axis": 1}}},
                                     {"hold": 1, "motions": {"x": {"axis": "one"}}}, {"hold": -1, "motions": {}},
                                     {"hold": 1, "motions": {}, "dead_zone": 1.5},
-                                    {"hold": 1, "motions": {}, "dead_zone": True}])
+                                    {"hold": 1, "motions": {}, "dead_zone": True},
+                                    *({"hold": 1, "motions": {"x": {**source, "scale": scale}}}
+                                      for source in ({"axis": 1}, {"buttons": [1, 2]})
+                                      for scale in ("fast", None, float("nan"), 1e308, True))])
 def test_a_layout_that_cannot_be_used(layout):
     with pytest.raises(LayoutError):
         Gamepad(layout)

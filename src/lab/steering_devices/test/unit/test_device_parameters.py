@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parameters and terminals that a device cannot use end it with one sentence."""
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from steering_devices import gamepad_node, hands, keyboard_node
+
+NAN = float("nan")
+
+
+@pytest.fixture()
+def parameters(monkeypatch):
+    """The parameters of a node without ROS."""
+    values, nothing = {}, lambda *_, **__: None
+    ros = SimpleNamespace(get_param=values.get, resolve_name=str, Publisher=nothing, Subscriber=nothing,
+                          init_node=nothing, myargv=lambda: ["device"])
+    for module in (hands, gamepad_node, keyboard_node):
+        monkeypatch.setattr(module, "rospy", ros)
+    for module in (gamepad_node, keyboard_node):
+        monkeypatch.setattr(module, "limit_ports", nothing)
+    monkeypatch.setattr(gamepad_node, "end_on_signals", nothing)
+    return values
+
+
+def ended_by(main):
+    with pytest.raises(SystemExit) as end:
+        main()
+    return str(end.value)  # a text: the exit code is 1
+
+
+@pytest.mark.parametrize(("name", "value"), [
+    ("~servos", 5), ("~servos", ""), ("~servos", []), ("~servos", [1]), ("~servos", "left servo!"),
+    ("~linear_speed", "fast"), ("~linear_speed", NAN), ("~linear_speed", -1.0), ("~angular_speed", 1e308),
+    ("~angular_speed", None), ("~grippers", "middle"), ("~grippers", "left right"), ("~joy_timeout", NAN),
+    ("~joy_timeout", "long"), ("~layout", {"hold": 1, "motions": {"x": {"axis": 1, "scale": "fast"}}})])
+def test_a_parameter_that_cannot_be_used_is_named(parameters, name, value):
+    parameters["~layout"] = {"hold": 1, "motions": {}}
+    parameters[name] = value
+    assert ended_by(gamepad_node.main).startswith("servo_gamepad: " + name)
+
+
+def test_a_terminal_that_nobody_knows(parameters, monkeypatch):
+    monkeypatch.setenv("TERM", "nonsense")
+    for stream in ("stdin", "stdout"):
+        monkeypatch.setattr(sys, stream, SimpleNamespace(isatty=lambda: True))
+    text = ended_by(keyboard_node.main)
+    assert "'nonsense'" in text and "TERM" in text
