@@ -131,8 +131,12 @@ class GazeboBounds(unittest.TestCase):
     def test_descriptions(self):
         sdf = """<sdf version="1.6"><model name="m"><link name="l"><collision name="c"><geometry><box>
           <size>%s</size></box></geometry></collision></link></model></sdf>"""
-        for xml in (BOX % ("1", "1e30 1 1"), sdf % "1 1e30 1"):
-            self.refused(self.spawn_urdf_model("m", xml, "", Pose(), ""), "1e+30", "1e-09 to 10000 m", "link '")
+        absurd = BOX % ("1", "1e30 1 1")
+        self.refused(self.spawn_urdf_model("m", absurd, "", Pose(), ""), "1e+30", "1e-09 to 10000 m", "link '")
+        # sdformat accepts any size; here it is bounded, with a warning.
+        above = self.spawn_urdf_model("m", sdf % "1 1e30 1", "", Pose(Point(0, 0, 100), UPRIGHT), "")
+        self.assertTrue(above.success, above.status_message)
+        self.assertTrue(self.delete_model("m").success)
         self.refused(self.spawn_urdf_model("m", BOX % ("1e308", "1 1 1"), "", Pose(), ""), "0 to 1e+07 kg")
         self.all_is_well()
 
