@@ -153,8 +153,8 @@ class Hands:
 
     def send(self, steering: Steering) -> None:
         """Carry out a Steering; hands that it is not about come to rest."""
-        for number, hand in enumerate(self.hands):
-            hand.steer(steering.twist if number == steering.hand else np.zeros(6), steering.in_tool)
+        for index, hand in enumerate(self.hands):
+            hand.steer(steering.twist if index == steering.hand else np.zeros(6), steering.in_tool)
         if steering.gripper:
             self.hands[steering.hand].grip(steering.gripper)
         if steering.mark:
