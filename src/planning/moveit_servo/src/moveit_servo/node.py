@@ -40,7 +40,9 @@ from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
 from moveit_servo.settings import ServoSettings, SettingsError
 from moveit_servo.surroundings import Surroundings
+from moveit_servo.telling import Telling, kind_of
 from moveit_servo.warming import warm_up
+from rospy_fixes.ports.event_log import EventLog
 from rospy_fixes.ports.threads import ThreadFaults, lasting
 from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
@@ -52,7 +54,6 @@ _PARAMETERS_EVERY_S, _SCENE_EVERY_S, _REASON_EVERY_S = 1.0, 0.1, 0.25
 _MAX_PERIODS = 3.0
 # A joint that is said to move faster [rad/s, m/s] says nothing of use.
 _MAX_SPEED = 1e3
-_TOLD_EVERY_S = 5.0
 _AXES = ("x_translation", "y_translation", "z_translation", "x_rotation", "y_rotation", "z_rotation")
 # Private parameters that are no settings of the servo.
 _OTHER_PARAMETERS = {"robot_description", "monitored_planning_scene_topic", "planning_scene_monitor_options",
@@ -82,8 +83,8 @@ class ServoNode:
         self._heard: set[str] = set()
         self._indices = [model.index[name] for name in self.servo.joints]
         self._sent, self._halts, self._new_settings = False, 0, settings
-        self._said, self._rests = (Status.NO_WARNING, ""), True
-        self.monitor = SceneMonitor(model, lambda _, text: rospy.logwarn_throttle(_TOLD_EVERY_S, text),
+        self._telling, self._events, self._rests = Telling(), EventLog(rospy.logwarn), True
+        self.monitor = SceneMonitor(model, lambda _, error: self._events.add(kind_of(str(error)), str(error)),
                                     {"joint_state_topic": settings.joint_topic})
         self._prepare(self.monitor.scene())
         kind = message_type(settings.command_out_type)
@@ -131,28 +132,33 @@ class ServoNode:
         part = message.twist
         values = [getattr(vector, axis) for vector in (part.linear, part.angular) for axis in "xyz"]
         self._take(message.header, lambda frame, since: self.commands.take_twist(
-            values, frame, since, self.servo.settings))
+            values, frame, since, self.servo.settings), self.servo.settings.incoming_command_timeout)
 
     def _on_jog(self, message: JointJog) -> None:
         def take(_, since):
             foreign = self.commands.take_jog(message.joint_names, message.velocities, since, self.servo.settings)
             if foreign:
-                rospy.logwarn_throttle(_TOLD_EVERY_S, "joint commands name %s; the arm's joints are %s" % (
+                self._refuse("joint commands name %s; the arm's joints are %s" % (
                     ", ".join(foreign), ", ".join(self.servo.joints)))
-        self._take(message.header, take)
+        self._take(message.header, take, self.servo.settings.incoming_command_timeout)
 
     def _on_pose(self, message: PoseStamped) -> None:
         self._take(message.header, lambda frame, since: self.commands.take_pose(
-            matrix_of(message.pose, "target_pose"), frame, since))
+            matrix_of(message.pose, "target_pose"), frame, since),
+            self.servo.settings.target_pose_timeout or math.inf)
 
-    def _take(self, header: Any, take: Any) -> None:
-        """Give a command to ``commands``; log why one is ignored."""
+    def _refuse(self, text: str) -> None:
+        """Say that a command is not carried out, on the topics of the status and in the log."""
+        self._telling.refuse(text, time.monotonic())
+        self._events.add(kind_of(text), text)
+
+    def _take(self, header: Any, take: Any, timeout: float) -> None:
+        """Give a command to ``commands``, where it counts for ``timeout`` [s]; say why one is ignored."""
         arrived = rospy.get_time()
         since = sent_at(header.stamp.to_sec(), arrived)
-        if arrived - since >= self.servo.settings.incoming_command_timeout:
-            rospy.logwarn_throttle(_TOLD_EVERY_S, "a command has come %.2f s after its stamp, later than "
-                                   "incoming_command_timeout, %g s; do the clocks agree?" % (
-                                       arrived - since, self.servo.settings.incoming_command_timeout))
+        if arrived - since >= timeout:
+            self._refuse("a command has come %.2f s after its stamp, and counts for %g s; do the clocks agree?"
+                         % (arrived - since, timeout))
         frame = header.frame_id.lstrip("/")
         try:
             # What tf alone knows is looked up once for each command, which keeps it.
@@ -161,7 +167,7 @@ class ServoNode:
             with self._lock:
                 take(place, since)
         except (CommandIgnored, PlanningError) as error:
-            rospy.logwarn_throttle(_TOLD_EVERY_S, "%s; it is ignored" % error)
+            self._refuse("%s; it is ignored" % error)
         self._news.set()
 
     def _on_drift(self, request: Any) -> ChangeDriftDimensionsResponse:
@@ -173,7 +179,7 @@ class ServoNode:
         return ChangeControlDimensionsResponse(success=True)
 
     def _on_reset(self, _: Any) -> EmptyResponse:
-        self._said = (Status.NO_WARNING, "")  # nothing is ever latched here
+        self._telling = Telling()  # nothing is ever latched here
         return EmptyResponse()
 
     # -- steps ---------------------------------------------------------------------------------------------------
@@ -259,10 +265,9 @@ class ServoNode:
         if step.reached and not settings.target_pose_timeout:
             with self._lock:
                 self.commands.reached()
+        status = self._telling.take(step.status, step.reason, time.monotonic())
         if self._status.get_num_connections():
-            self._status.publish(Int8(int(step.status)))
-        if step.status is not self._said[0] or step.reason != self._said[1]:
-            self._said = (step.status, step.reason)
+            self._status.publish(Int8(int(status)))
         self._halts = self._halts + 1 if step.rests and not kind else 0
         self._sent |= bool(kind)
         if self._sent and (not settings.num_outgoing_halt_msgs_to_publish
@@ -348,7 +353,7 @@ class ServoNode:
         told = (None, "")
         while not ends():
             time.sleep(_REASON_EVERY_S)
-            status, reason = self._said
+            status, reason = self._telling.said
             if (status, reason) == told:
                 continue
             changed = status is not told[0]
@@ -357,7 +362,9 @@ class ServoNode:
                 reason += self._between()
             self._reason.publish(String(reason))
             if changed and reason:
-                rospy.logwarn_throttle(_TOLD_EVERY_S, "%s: %s" % (status.name.lower().replace("_", " "), reason))
+                text = "%s: %s" % (status.name.lower().replace("_", " "), reason)
+                text = reason if status is Status.INVALID else text  # a refusal has been logged
+                self._events.add(kind_of(text), text)
 
     def _between(self) -> str:
         scene = self.monitor.scene()

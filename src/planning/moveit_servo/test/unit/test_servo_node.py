@@ -5,13 +5,19 @@ import threading
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
+import rospy
+from control_msgs.msg import JointJog
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist, TwistStamped, Vector3
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
+from motion_planning.errors import PlanningError
 from moveit_servo import node as module
 from moveit_servo.node import ServoNode
+from moveit_servo.servo import Status
 from moveit_servo.settings import ARRAY, ServoSettings
+from moveit_servo.telling import Telling, kind_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from steered_arms import planar_model  # noqa: E402
@@ -37,10 +43,17 @@ class Topic:
 def node(monkeypatch):
     """The node of the planar arm, whose threads have ended; ``log``: its lines."""
     log, nothing = [], lambda *_, **__: None
+
+    def say(text, *parts):
+        log.append(text % parts if parts else text)
+
+    def tf_frame(name):
+        raise PlanningError("there is no frame '%s'" % name)
     monkeypatch.setattr(module, "rospy", SimpleNamespace(
         Publisher=Topic, Subscriber=nothing, Service=nothing, get_param=lambda name, default: default,
-        get_time=lambda: 5.0, is_shutdown=lambda: True, logwarn=log.append, logwarn_once=log.append))
-    monkeypatch.setattr(module, "SceneMonitor", lambda *_: SimpleNamespace(scene=nothing))
+        get_time=lambda: 5.0, is_shutdown=lambda: True, logwarn=say, logwarn_once=say,
+        logwarn_throttle=lambda _, text: say(text)))
+    monkeypatch.setattr(module, "SceneMonitor", lambda *_: SimpleNamespace(scene=nothing, tf_frame=tf_frame))
     monkeypatch.setattr(module, "sphere_model_of", nothing)
     monkeypatch.setattr(module, "ConvexParts", nothing)
     monkeypatch.setattr(ServoNode, "_prepare", nothing)
@@ -77,3 +90,60 @@ def test_an_arm_at_rest_does_not_wait_for_its_step(monkeypatch, rests):
     settings = ServoSettings(move_group_name="arm", command_out_topic="out", publish_period=PERIOD_S)
     assert node._wait_until(clock.now + PERIOD_S, settings) is rests
     assert clock.now == pytest.approx(5.0 if rests else 5.0 + PERIOD_S)
+
+
+NAN = float("nan")
+BENT = [0.3, 0.6, 0.6]
+
+
+def twist(x, frame="", stamp=0.0):
+    return TwistStamped(Header(frame_id=frame, stamp=rospy.Time(stamp)), Twist(linear=Vector3(x, 0.0, 0.0)))
+
+
+def pose(x, frame="base", w=1.0):
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, 0.0, 0.0), Quaternion(w=w)))
+
+
+def bend(node):
+    node._on_joints(JointState(name=["turn0", "turn1", "turn2"], position=BENT))
+
+
+def steps(node, count=1):
+    """Make steps with an arm that follows."""
+    for _ in range(count):
+        node._step(5.0, PERIOD_S)
+        if node._out.sent:
+            node._q[:] = node._out.sent[-1].data
+
+
+def test_what_is_refused_is_the_status_and_each_kind_is_logged(node):
+    refused = [
+        (node._on_twist, twist(0.1, "nowhere"), "nowhere"), (node._on_twist, twist(NAN), "not finite"),
+        (node._on_twist, twist(0.1, stamp=1.0), "4.00 s after"), (node._on_pose, pose(0.5, w=3.0), "length 3"),
+        (node._on_pose, pose(NAN), "position"),
+        (node._on_jog, JointJog(joint_names=["other"], velocities=[1.0]), "other"),
+        (node._on_jog, JointJog(joint_names=["turn0", "turn1"], velocities=[1.0]), "2 names but 1")]
+    for number, (take, message, word) in enumerate(refused, 1):
+        for _ in range(3):
+            take(message)
+            steps(node)
+        assert node._status.sent[-1].data == Status.INVALID
+        assert len(node.log) == number and word in node.log[-1] and node._telling.said[1] == node.log[-1]
+
+
+
+
+
+
+
+
+
+def test_a_reason_stays_until_it_is_read():
+    telling, fine = Telling(), (Status.NO_WARNING, "")
+    assert telling.take(Status.JOINT_BOUND, "a limit", 1.0) is Status.JOINT_BOUND
+    assert telling.take(*fine, 1.01) is Status.NO_WARNING and telling.said == (Status.JOINT_BOUND, "a limit")
+    assert telling.take(*fine, 1.51) is Status.NO_WARNING and telling.said == fine
+    telling.refuse("no", 2.0)
+    assert telling.take(*fine, 2.9) is Status.INVALID and telling.said == (Status.INVALID, "no")
+    assert telling.take(*fine, 3.01) is Status.NO_WARNING
+    assert kind_of("4.2e-3 s, [nan, -1.0] of left_w1") == kind_of("7 s, [2, inf] of left_w1") != kind_of("of left_w2")
