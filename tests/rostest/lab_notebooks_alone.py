@@ -13,7 +13,20 @@ import uuid
 
 import cv2
 import numpy as np
-from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROBOT, ROOT, WATCHING, faults_of, is_blank, prepare, tool
+from notebook_runs import (
+    CELL_TIMEOUT_S,
+    LEARNING,
+    MOVING,
+    OWN_LAB,
+    ROBOT,
+    ROOT,
+    ROUNDS,
+    WATCHING,
+    faults_of,
+    is_blank,
+    prepare,
+    tool,
+)
 
 from lab_testing.waiting import wait_until
 from lab_tests import processes
@@ -31,7 +44,7 @@ class LabNotebooksAloneTest(unittest.TestCase):
 
     def test_no_error_and_no_blank_picture_and_no_process_left(self):
         run_id = uuid.uuid4().hex
-        faults = faults_of(*([name] for name in OWN_LAB), environment=lambda: {
+        faults = faults_of(*([name] for name in (*OWN_LAB, *(LEARNING if ROUNDS > 1 else ()))), environment=lambda: {
             **os.environ, MARKER: run_id, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
             "ROS_HOSTNAME": "localhost"})
         self.assertEqual(faults, [], "\n".join(faults))
@@ -44,7 +57,8 @@ class LabNotebooksAloneTest(unittest.TestCase):
         self.assertFalse(is_blank(cv2.imencode(".png", pixels)[1].tobytes()))
 
     def test_no_notebook_is_left_out(self):
-        self.assertEqual(sorted(path.stem for path in tool.notebooks()), sorted([*WATCHING, *MOVING, *OWN_LAB, *ROBOT]))
+        self.assertEqual(sorted(path.stem for path in tool.notebooks()),
+                         sorted([*WATCHING, *MOVING, *OWN_LAB, *LEARNING, *ROBOT]))
 
     def test_jupyter_starts_a_kernel_and_ctrl_c_leaves_nothing(self):
         run_id = uuid.uuid4().hex

@@ -27,7 +27,9 @@ ROUNDS = int(os.environ.get("LAB_NOTEBOOK_ROUNDS", "1"))
 # Those that leave Baxter's arms alone, those that move them, and those that need none or start their own.
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
-OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning", "steering", "teach_it")
+OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning", "steering")
+# It computes for a minute: only where the notebooks are run twice.
+LEARNING = ("teach_it",)
 # The one that starts the physical robot's profile, and takes minutes.
 ROBOT = ("8_before_the_real_robot",)
 # The pictures of docs/labs.md, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib
