@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from moveit_servo.settings import ServoSettings
 
 
-#: Of a command: a link or the model's frame by its name, "" where the settings say; or a pose (4, 4) in the latter.
+#: Of a twist: a link or the model's frame by its name, "" where the settings say; or a pose (4, 4) in the latter.
 Frame = str | np.ndarray
+# Any number may come. More than this [m, rad or per s] is taken for as much: no robot is faster or reaches further, and
+# sums and squares stay finite; a part of a twist or of joint velocities that is less than the second is none.
+_MOST, _LEAST = 1e3, 1e-9
 
 
 class CommandIgnored(ValueError):
@@ -58,7 +61,7 @@ class Commands:
                 raise CommandIgnored("a twist has a component beyond -1 to 1: %s; command_in_type is %s"
                                      % (twist.tolist(), UNITLESS))
             twist *= np.repeat((settings.linear_scale, settings.rotational_scale), 3)
-        twist = np.where(self.control, twist, 0.0)
+        twist = _bounded(np.where(self.control, twist, 0.0))
         self._twist = _Newest(since, twist if twist.any() else None, frame)
 
     def take_jog(self, names: Any, velocities: Any, since: float, settings: ServoSettings) -> list[str]:
@@ -74,16 +77,16 @@ class Commands:
         wanted, foreign = np.zeros(len(self.joints)), []
         for name, value in zip(names, values, strict=False):
             if name in self.joints:
-                wanted[self.joints.index(name)] = scale * value
+                wanted[self.joints.index(name)] = value
             else:
                 foreign.append(name)
         # A command without a known joint is one, too: MoveIt publishes set-points for it.
-        self._jog = _Newest(since, wanted if values.any() else None)
+        self._jog = _Newest(since, scale * _bounded(wanted) if values.any() else None)
         return foreign
 
-    def take_pose(self, pose: np.ndarray, frame: Frame, since: float) -> None:
-        """A pose (4, 4) of the tip in ``frame``."""
-        self._pose = _Newest(since, pose, frame)
+    def take_pose(self, pose: np.ndarray, since: float) -> None:
+        """A pose (4, 4) of the tip in the model's frame."""
+        self._pose = _Newest(since, pose)
 
     def newest(self, now: float, settings: ServoSettings) -> tuple[str, Any, Frame]:
         """Return (kind, value, frame) of the command in force at ``now`` [s]: "twist", "joints" or "pose"; "" if there
@@ -93,12 +96,12 @@ class Commands:
                                       ("pose", self._pose, settings.target_pose_timeout or np.inf)):
             if newest.value is not None and now - newest.since < timeout:
                 if kind != "pose":
-                    self._pose = _Newest()  # a hand on the stick ends a pursuit
+                    self.forget_pose()  # a hand on the stick ends a pursuit
                 return kind, newest.value, newest.frame
         return "", None, ""
 
-    def reached(self) -> None:
-        """A pose that need not be sent again has been reached."""
+    def forget_pose(self) -> None:
+        """Pursue no pose any longer."""
         self._pose = _Newest()
 
     def clear(self) -> None:
@@ -110,3 +113,18 @@ def sent_at(stamp: float, arrived: float) -> float:
     """The time [s] from which a command counts, by its ``stamp`` (0: none) and when it ``arrived``: a stamp in the
     future, of a clock that is ahead, must not keep an arm moving."""
     return min(stamp, arrived) if stamp > 0.0 else arrived
+
+
+def bounded_pose(pose: np.ndarray) -> np.ndarray:
+    """Return ``pose`` (4, 4), not further away than any robot reaches, in the same direction."""
+    pose = pose.copy()
+    pose[:3, 3] = _bounded(pose[:3, 3])
+    return pose
+
+
+def _bounded(values: np.ndarray) -> np.ndarray:
+    """``values``, all finite, made smaller by one factor if need be; without those that are next to nothing."""
+    greatest = np.abs(values).max(initial=0.0)
+    if greatest > _MOST:
+        values = values * (_MOST / greatest)
+    return np.where(np.abs(values) < _LEAST, 0.0, values)

@@ -34,7 +34,7 @@ from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 from moveit_ros_move_group.monitor import SceneMonitor
-from moveit_servo.commands import CommandIgnored, Commands, Frame, sent_at
+from moveit_servo.commands import CommandIgnored, Commands, Frame, bounded_pose, sent_at
 from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
@@ -143,9 +143,13 @@ class ServoNode:
         self._take(message.header, take, self.servo.settings.incoming_command_timeout)
 
     def _on_pose(self, message: PoseStamped) -> None:
-        self._take(message.header, lambda frame, since: self.commands.take_pose(
-            matrix_of(message.pose, "target_pose"), frame, since),
-            self.servo.settings.target_pose_timeout or math.inf)
+        def take(frame, since):
+            # The one before ends; from now on the target stands still, also one that is told from the moving hand.
+            self.commands.forget_pose()
+            pose = bounded_pose(matrix_of(message.pose, "target_pose"))
+            axes = self._axes(frame if len(frame) else self.servo.settings.planning_frame, self._q)
+            self.commands.take_pose(axes @ pose, since)
+        self._take(message.header, take, self.servo.settings.target_pose_timeout or math.inf)
 
     def _refuse(self, text: str) -> None:
         """Say that a command is not carried out, on the topics of the status and in the log."""
@@ -264,7 +268,7 @@ class ServoNode:
         self._rests = step.rests
         if step.reached and not settings.target_pose_timeout:
             with self._lock:
-                self.commands.reached()
+                self.commands.forget_pose()
         status = self._telling.take(step.status, step.reason, time.monotonic())
         if self._status.get_num_connections():
             self._status.publish(Int8(int(status)))
@@ -281,8 +285,7 @@ class ServoNode:
             return Command(joints=value)
         axes = self._axes(settings.planning_frame, q)[:3, :3]
         if kind == "pose":
-            return Command(pose=self._axes(frame if len(frame) else settings.planning_frame, q) @ value, axes=axes,
-                           drift=self.commands.drift)
+            return Command(pose=value, axes=axes, drift=self.commands.drift)
         frame = frame if len(frame) else settings.robot_link_command_frame or settings.planning_frame
         turn = axes.T @ self._axes(frame, q)[:3, :3]
         return Command(twist=np.concatenate([turn @ value[:3], turn @ value[3:]]), drift=self.commands.drift, axes=axes)

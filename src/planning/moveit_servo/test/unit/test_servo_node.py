@@ -2,9 +2,11 @@
 """The node without ROS: when it makes a step, what it takes from messages and what it says of them."""
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rospy
 from control_msgs.msg import JointJog
@@ -16,7 +18,7 @@ from motion_planning.errors import PlanningError
 from moveit_servo import node as module
 from moveit_servo.node import ServoNode
 from moveit_servo.servo import Status
-from moveit_servo.settings import ARRAY, ServoSettings
+from moveit_servo.settings import ARRAY, UNITLESS, ServoSettings
 from moveit_servo.telling import Telling, kind_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -131,6 +133,33 @@ def test_what_is_refused_is_the_status_and_each_kind_is_logged(node):
         assert len(node.log) == number and word in node.log[-1] and node._telling.said[1] == node.log[-1]
 
 
+@pytest.mark.parametrize("size", [5e-324, 1e-160, 1e-12, 1.0, 1e9, 1e155, 1e300, 1.7e308])
+@pytest.mark.parametrize("unit", [SETTINGS.command_in_type, UNITLESS])
+def test_no_finite_command_is_an_error(node, size, unit):
+    node.servo.settings = node._new_settings = replace(SETTINGS, command_in_type=unit, joint_scale=1e3)
+    bend(node)
+    row = Vector3(size, -size, size)
+    messages = [(node._on_twist, TwistStamped(Header(frame_id="tip"), Twist(row, row))),
+                (node._on_jog, JointJog(joint_names=["turn0", "turn1"], velocities=[size, -size])),
+                (node._on_pose, PoseStamped(Header(frame_id="tip"), Pose(Point(size, -size, size), Quaternion(w=1.0))))]
+    with np.errstate(over="raise", invalid="raise"):
+        for take, message in messages:
+            node._begin_again()
+            for _ in range(30):  # longer than a way takes to settle
+                take(message)
+                steps(node)
+            assert all(np.isfinite(one.data).all() for one in node._out.sent)
+
+
+def test_a_target_told_from_the_hand_does_not_move_with_it(node):
+    bend(node)
+    begin = node.servo.pose(node._q)
+    node._on_pose(pose(-0.05, "tip"))
+    steps(node, 500)
+    moved = np.linalg.inv(begin) @ node.servo.pose(node._q)
+    assert moved[:3, 3] == pytest.approx([-0.05, 0.0, 0.0], abs=0.002)
+    node._on_pose(pose(0.2, w=3.0))
+    assert not node.commands.newest(5.0, SETTINGS)[0], "a bad pose ends the one before"
 
 
 

@@ -85,7 +85,7 @@ def test_units_scale_and_control_dimensions():
 
 def test_commands_grow_old_and_twists_go_first():
     taken = commands()
-    taken.take_pose(np.eye(4), "base", 1.0)
+    taken.take_pose(np.eye(4), 1.0)
     assert taken.newest(1.2, SPEEDS)[0] == "pose"
     taken.take_jog(["a"], [0.5], 1.2, SPEEDS)
     taken.take_twist((0.1, 0, 0, 0, 0, 0), "", 1.2, SPEEDS)
@@ -93,7 +93,7 @@ def test_commands_grow_old_and_twists_go_first():
     taken.take_twist((0,) * 6, "", 1.25, SPEEDS)
     assert taken.newest(1.25, SPEEDS)[0] == "joints"
     assert taken.newest(1.31, SPEEDS)[0] == ""  # the pose has been given up
-    taken.take_pose(np.eye(4), "base", 2.0)
+    taken.take_pose(np.eye(4), 2.0)
     assert taken.newest(2.0 + SPEEDS.target_pose_timeout, SPEEDS)[0] == ""
 
 
