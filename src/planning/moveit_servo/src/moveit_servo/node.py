@@ -38,7 +38,7 @@ from moveit_servo.commands import CommandIgnored, Commands, Frame, bounded_pose,
 from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of, message_type
 from moveit_servo.servo import Command, Servo, Status
-from moveit_servo.settings import ServoSettings, SettingsError
+from moveit_servo.settings import ServoSettings, SettingsError, at_run_time
 from moveit_servo.surroundings import Surroundings
 from moveit_servo.telling import Telling, kind_of
 from moveit_servo.warming import warm_up
@@ -82,7 +82,7 @@ class ServoNode:
         self._q, self._velocity = model.default_state().q.copy(), np.zeros(len(model.variables))
         self._heard: set[str] = set()
         self._indices = [model.index[name] for name in self.servo.joints]
-        self._sent, self._halts, self._new_settings = False, 0, settings
+        self._sent, self._halts, self._new_settings, self._begun_with = False, 0, settings, settings
         self._telling, self._events, self._rests = Telling(), EventLog(rospy.logwarn), True
         self.monitor = SceneMonitor(model, lambda _, error: self._events.add(kind_of(str(error)), str(error)),
                                     {"joint_state_topic": settings.joint_topic})
@@ -220,7 +220,9 @@ class ServoNode:
         due = last
         while not ends():
             settings = self.servo.settings
-            due = max(due + settings.publish_period, rospy.get_time() - settings.publish_period)
+            period, now = settings.publish_period, rospy.get_time()
+            # A period that has become shorter counts at once.
+            due = min(max(due + period, now - period), now + period)
             begins = self._wait_until(due, settings)
             now = rospy.get_time()
             if now < last:
@@ -337,15 +339,17 @@ class ServoNode:
 
     def _watch_parameters(self, ends: Callable[[], bool]) -> None:
         """Take changed parameters over; those that need new connections need a restart, too."""
-        before = None
+        before = ""
         while not ends():
             time.sleep(_PARAMETERS_EVERY_S)
             try:
                 values = rospy.get_param("~", {})
-                if values == before:
+                if repr(values) == before:  # NaN does not equal itself
                     continue
-                before = values
-                self._new_settings = settings_of(values, self.model)
+                before = repr(values)
+                self._new_settings, later = at_run_time(settings_of(values, self.model), self._begun_with)
+                for text in later:
+                    self._events.add(text, "%s takes effect at the next start" % text)
             except SettingsError as error:
                 rospy.logwarn("the parameters stay as they were: %s", error)
             except OSError:  # no master at the moment

@@ -144,6 +144,11 @@ class Servo:
         elif said is not None:
             said = np.full(len(self.joints), float(said))
         bounds, turns = self.model.bounds[self._indices], self.model.continuous[self._indices]
+        half = np.where(turns, np.inf, 0.5 * (bounds[:, 1] - bounds[:, 0]))
+        narrow = int(half.argmin())
+        if settings.joint_limit_margin >= half[narrow]:
+            raise SettingsError("joint_limit_margin is %g; expected less than %g, half the range of joint %s"
+                                % (settings.joint_limit_margin, half[narrow], self.joints[narrow]))
         return stoppable(np.where(turns, -np.inf, bounds[:, 0]), np.where(turns, np.inf, bounds[:, 1]),
                          self.model.velocity[self._indices], said, settings.stopping_time)
 

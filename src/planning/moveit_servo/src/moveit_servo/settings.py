@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 TRAJECTORY, ARRAY = "trajectory_msgs/JointTrajectory", "std_msgs/Float64MultiArray"
@@ -16,6 +16,22 @@ _CHOICES = {"command_in_type": (UNITLESS, SPEED_UNITS), "command_out_type": (TRA
             "collision_check_type": (THRESHOLD_DISTANCE, STOP_DISTANCE)}
 _OLD_NAMES = {"warning_topic": ("status_topic",), "collision_proximity_threshold": (
     "self_collision_proximity_threshold", "scene_collision_proximity_threshold")}
+# Read at the start alone: connections and the group's tables are made by them.
+_AT_START = ("move_group_name", "command_out_type", "command_out_topic", "cartesian_command_in_topic",
+             "joint_command_in_topic", "joint_topic", "status_topic", "mesh_cuts")
+# Least and greatest value with which an arm can be steered. A period of 0.1 s is as long as a command counts: with a
+# longer one the arm would lurch. What is beyond those of the others leaves an arm at rest, or away from its target.
+_RANGES = {
+    "publish_period": (0.0005, 0.1), "stopping_time": (0.01, 10.0), "collision_check_rate": (1e-3, math.inf),
+    **dict.fromkeys((
+        "num_outgoing_halt_msgs_to_publish", "lower_singularity_threshold", "hard_stop_singularity_threshold",
+        "joint_limit_margin", "low_pass_filter_coeff", "self_collision_proximity_threshold",
+        "incoming_command_timeout", "scene_collision_proximity_threshold", "target_pose_timeout",
+        "min_allowable_collision_distance", "windup_limit"), (0.0, math.inf)), "command_lead": (0.0, 10.0),
+    **dict.fromkeys(("linear_scale", "rotational_scale", "joint_scale"), (-1e3, 1e3)),
+    **dict.fromkeys(("%s_%s_gain" % (axis, kind) for axis in ("x", "y", "z", "angular")
+                     for kind in ("proportional", "integral", "derivative")), (0.0, 1e3))}
+_ACCELERATIONS = (0.01, 1e5)
 
 
 class SettingsError(ValueError):
@@ -118,14 +134,8 @@ class ServoSettings:
     def _contradictions(self) -> list[str]:
         wrong = ["%s is %r; expected %s" % (name, getattr(self, name), " or ".join(map(repr, choices)))
                  for name, choices in _CHOICES.items() if getattr(self, name) not in choices]
-        wrong += ["%s is %g; expected more than 0" % (name, getattr(self, name)) for name in (
-            "publish_period", "stopping_time", "collision_check_rate") if not getattr(self, name) > 0.0]
-        wrong += ["%s is %g; expected 0 or more" % (name, getattr(self, name)) for name in (
-            "num_outgoing_halt_msgs_to_publish", "lower_singularity_threshold", "hard_stop_singularity_threshold",
-            "joint_limit_margin", "low_pass_filter_coeff", "self_collision_proximity_threshold",
-            "incoming_command_timeout", "scene_collision_proximity_threshold", "target_pose_timeout", "command_lead",
-            "min_allowable_collision_distance")
-            if getattr(self, name) < 0]
+        wrong += ["%s is %g; expected %s" % (name, getattr(self, name), _range(least, most))
+                  for name, (least, most) in _RANGES.items() if not least <= getattr(self, name) <= most]
         if self.hard_stop_singularity_threshold < self.lower_singularity_threshold:
             wrong.append("hard_stop_singularity_threshold is %g, below lower_singularity_threshold, %g" % (
                 self.hard_stop_singularity_threshold, self.lower_singularity_threshold))
@@ -139,12 +149,26 @@ class ServoSettings:
         return wrong
 
 
+def at_run_time(settings: ServoSettings, begun_with: ServoSettings) -> tuple[ServoSettings, list[str]]:
+    """Return what of new ``settings`` can be taken over by a servo that has ``begun_with`` others, and for each other
+    change a text, "name 'value'"."""
+    later = [name for name in _AT_START if getattr(settings, name) != getattr(begun_with, name)]
+    return (replace(settings, **{name: getattr(begun_with, name) for name in later}),
+            ["%s '%s'" % (name, getattr(settings, name)) for name in later])
+
+
+def _range(least: float, most: float) -> str:
+    return "%g or more" % least if math.isinf(most) else "%g to %g" % (least, most)
+
+
 def _converted(name: str, value: Any, one: Any) -> Any:
     kind = one.type
     if kind == "Any":
         numbers = value.values() if isinstance(value, dict) else [] if value is None else [value]
-        if not all(_is_number(number) and number > 0.0 for number in numbers):
-            raise SettingsError("%s is %r; expected a number more than 0, or one of each joint" % (name, value))
+        least, most = _ACCELERATIONS
+        if not all(_is_number(number) and least <= number <= most for number in numbers):
+            raise SettingsError("%s is %r; expected a number, %s, or one of each joint"
+                                % (name, value, _range(least, most)))
         return value
     if kind == "bool" and isinstance(value, bool) or kind == "str" and isinstance(value, str):
         return value

@@ -2,6 +2,7 @@
 """The node without ROS: when it makes a step, what it takes from messages and what it says of them."""
 import sys
 import threading
+import xmlrpc.client
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,7 @@ from motion_planning.errors import PlanningError
 from moveit_servo import node as module
 from moveit_servo.node import ServoNode
 from moveit_servo.servo import Status
-from moveit_servo.settings import ARRAY, UNITLESS, ServoSettings
+from moveit_servo.settings import ARRAY, TRAJECTORY, UNITLESS, ServoSettings, SettingsError
 from moveit_servo.telling import Telling, kind_of
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -162,9 +163,48 @@ def test_a_target_told_from_the_hand_does_not_move_with_it(node):
     assert not node.commands.newest(5.0, SETTINGS)[0], "a bad pose ends the one before"
 
 
+def test_steps_are_due_a_period_ahead_at_most(node, monkeypatch):
+    now, ahead = [5.0], []
+
+    def wait(due, _):  # a command comes each millisecond to an arm that moves, in low_latency_mode
+        ahead.append(due - now[0])
+        now[0] += 0.001
+        return False
+
+    monkeypatch.setattr(module.rospy, "get_time", lambda: now[0])
+    monkeypatch.setattr(node, "_wait_until", wait)
+    node._steps(lambda: len(ahead) > 20)
+    assert max(ahead) <= PERIOD_S + 1e-9
 
 
+def watched(node, monkeypatch, **parameters):
+    """The log after three looks at ``parameters``."""
+    looks = iter([False] * 3 + [True])
+    values = {"move_group_name": "arm", "command_out_topic": "out", "command_out_type": ARRAY, **parameters}
+    monkeypatch.setattr(module, "time", SimpleNamespace(sleep=lambda _: None, monotonic=lambda: 1.0))
+    text = xmlrpc.client.dumps((values,))  # each time other objects, as from the master
+    monkeypatch.setattr(module.rospy, "get_param", lambda *_: xmlrpc.client.loads(text)[0][0])
+    node._watch_parameters(lambda: next(looks))
+    return node.log
 
+
+def test_a_parameter_that_is_no_number_is_refused_once(node, monkeypatch):
+    line, = watched(node, monkeypatch, incoming_command_timeout=NAN)
+    assert "incoming_command_timeout is nan" in line
+
+
+def test_what_is_read_at_the_start_stays_and_that_is_said(node, monkeypatch):
+    lines = watched(node, monkeypatch, command_out_type=TRAJECTORY, move_group_name="other", publish_period=0.02)
+    assert len(lines) == 2 and all(line.endswith("takes effect at the next start") for line in lines)
+    bend(node)
+    node._on_twist(twist(0.1))
+    steps(node, 2)
+    assert node.servo.settings.publish_period == 0.02 and node._out.sent[-1].data
+
+
+def test_a_margin_without_room_is_refused_by_the_joints_name(node):
+    with pytest.raises(SettingsError, match="joint_limit_margin is 2.5.*2.5, half.*turn0"):
+        node.servo.settings = replace(SETTINGS, joint_limit_margin=2.5)
 
 
 def test_a_reason_stays_until_it_is_read():

@@ -47,7 +47,9 @@ def test_old_names_and_unknown_ones():
     ("command_in_type", "speed"), ("command_out_type", "std_msgs/Float64"), ("publish_joint_velocities", True),
     ("publish_joint_positions", False), ("collision_check_type", "none"), ("use_gazebo", "yes"),
     ("self_collision_proximity_threshold", -1), ("command_out_topic", ""), ("max_acceleration", {"joint_1": -2}),
-    ("stopping_time", float("nan")), ("scale", 3)])
+    ("stopping_time", float("nan")), ("scale", 3), ("publish_period", 1e-9), ("publish_period", 30),
+    ("stopping_time", 1e-9), ("stopping_time", 60), ("max_acceleration", 1e-300), ("x_proportional_gain", -5),
+    ("angular_integral_gain", -1), ("z_derivative_gain", 1e308), ("command_lead", 1e308)])
 def test_what_cannot_be_used_is_named_with_its_value(name, value):
     with pytest.raises(SettingsError) as caught:
         ServoSettings.from_mapping({**MOVEIT, name: value})
