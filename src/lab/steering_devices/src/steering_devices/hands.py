@@ -111,7 +111,8 @@ class Hand:
         """Send {joint: velocity [rad/s]}; all zero: the joints come to rest."""
         scale = 1.0
         if _cached(self.name + "/command_in_type", "") == UNITLESS:
-            scale = float(_cached(self.name + "/scale/joint", 1.0))
+            # With 0 the servo makes no motion of anything.
+            scale = float(_cached(self.name + "/scale/joint", 1.0)) or 1.0
         message = JointJog(joint_names=list(velocities), velocities=[value / scale for value in velocities.values()])
         message.header.stamp = rospy.Time.now()
         self._jogs.publish(message)
