@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Helpers of programs that give way are not even slower than these."""
+import os
 import subprocess
 import sys
 
@@ -20,4 +21,5 @@ def test_what_a_user_waits_for_does_not_inherit_a_low_priority():
     for leads in (False, True):
         done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True,
                               start_new_session=leads)
-        assert done.stdout.split() == ["10", "5", "13"]
+        # The tests may have a niceness of their own, and 19 is the greatest.
+        assert done.stdout.split() == [str(min(os.nice(0) + step, 19)) for step in (10, 5, 13)]
