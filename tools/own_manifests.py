@@ -20,14 +20,17 @@ OVERLAY = "overlay"
 
 def manifests(folder: Path) -> Iterator[Path]:
     """The package.xml files below a folder that catkin sees."""
+    seen: set[str] = set()
     for place, folders, files in os.walk(folder, followlinks=True):
-        if "CATKIN_IGNORE" in files:
+        real = os.path.realpath(place)
+        if "CATKIN_IGNORE" in files or real in seen:  # a link may lead to a folder above it
             folders[:] = []
-        elif "package.xml" in files:
+        elif os.path.isfile(os.path.join(place, "package.xml")):  # a pipe would never end
             folders[:] = []
             yield Path(place) / "package.xml"
         else:
             folders[:] = sorted(name for name in folders if not name.startswith("."))
+        seen.add(real)
 
 
 def problems(root: Path, own: Iterable[str]) -> list[str]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is said of the package.xml of a user's own packages, before a command of ROS fails by them."""
 
+import os
 import subprocess
 
 import pytest
@@ -30,6 +31,15 @@ def test_a_file_that_is_no_xml_is_named_with_its_line_and_how_to_leave_it_out(ro
     assert "src/mine/package.xml" in sentence and "line 3" in sentence and "touch src/mine/CATKIN_IGNORE" in sentence
     (broken.parent / "CATKIN_IGNORE").touch()
     assert own_manifests.problems(root, ["mine"]) == []
+
+
+def test_links_that_lead_back_and_pipes_end(root):
+    for name in ("once", "twice"):
+        (root / "src/mine" / name).symlink_to(root / "src")
+    (root / "src/mine/package.xml").unlink()
+    os.mkfifo(root / "src/mine/package.xml")
+    found = list(own_manifests.manifests(root / "src/mine"))
+    assert len(found) == len({path.resolve() for path in found}) == 2
 
 
 def test_a_name_that_another_package_has_is_named_with_it(root):
