@@ -9,7 +9,7 @@ import rospy
 import tf2_ros
 
 from baxter_interface import startup
-from baxter_interface.patience import Condition
+from baxter_interface.waiting import Condition
 from command_line.options import did_you_mean
 from rf_lab2.poses import homogeneous_matrix, rotation_matrix
 

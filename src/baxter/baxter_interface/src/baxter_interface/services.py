@@ -10,7 +10,7 @@ import rosgraph
 import rospy
 
 from . import startup
-from .patience import others_than
+from .waiting import others_than
 
 
 class ServiceUnavailable(OSError, rospy.ROSException):

@@ -22,7 +22,7 @@ from command_line.waiting_line import WaitingLine
 from master_calls.simulator_start import StartWatch
 from rospy_nodes.start import limit_ports
 
-from .patience import Condition, others_than, wait_in_order
+from .waiting import Condition, others_than, wait_in_order
 
 #: (name, its nodes) of topics or services.
 Registered = list[tuple[str, list[str]]]

@@ -9,7 +9,7 @@ import pytest
 SOURCE = pathlib.Path(__file__).parents[2] / "src"
 ROS = ("rospy", "rosgraph", "baxter_core_msgs", "sensor_msgs", "std_msgs", "genpy")
 CORES = ("baxter_interface.joint_motion", "baxter_interface.joint_checks", "baxter_interface.version_check",
-         "baxter_interface.patience", "baxter_interface.wheel", "baxter_interface.gripper_types",
+         "baxter_interface.waiting", "baxter_interface.wheel", "baxter_interface.gripper_types",
          "baxter_interface.settings", "baxter_dataflow.waiting",
          "baxter_dataflow.signals", "baxter_interface.parameter_tables", "baxter_control.pid",
          "joint_trajectory_action.arm_motion", "joint_trajectory_action.bezier")

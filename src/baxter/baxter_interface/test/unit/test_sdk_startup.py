@@ -7,7 +7,7 @@ import pytest
 
 from baxter_interface import startup
 from baxter_interface.io_channel import present_name
-from baxter_interface.patience import others_than
+from baxter_interface.waiting import others_than
 
 
 class Publisher:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baxter_dataflow.waiting import LoopStopwatch, Stopwatch, Ticker, wait_on
-from baxter_interface.patience import Condition, wait_in_order
+from baxter_interface.waiting import Condition, wait_in_order
 
 
 class FakeClock:

@@ -13,7 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from baxter_dataflow.waiting import Stopwatch
 from baxter_interface import startup
-from baxter_interface.patience import FIRST_NOTICE_S
+from baxter_interface.waiting import FIRST_NOTICE_S
 
 from .interpolator import ACTION_NAME
 from .streamer import BaxterTrajStreamer

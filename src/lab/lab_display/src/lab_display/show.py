@@ -20,7 +20,7 @@ from cv_bridge import CvBridge
 from sensor_msgs.msg import Image, JointState
 
 from baxter_interface import startup
-from baxter_interface.patience import Condition, wait_in_order
+from baxter_interface.waiting import Condition, wait_in_order
 from live_plot.recording import Recording
 from urdf_model import Robot, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid

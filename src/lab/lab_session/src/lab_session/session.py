@@ -19,7 +19,7 @@ import rospkg
 import rospy
 
 from baxter_interface import startup
-from baxter_interface.patience import Condition, wait_in_order
+from baxter_interface.waiting import Condition, wait_in_order
 from lab_web import page_files
 from processes import keeper
 from processes.ports import free_port
