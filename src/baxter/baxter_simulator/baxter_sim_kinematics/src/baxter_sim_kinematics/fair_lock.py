@@ -6,7 +6,7 @@ import collections
 import threading
 
 
-class Turns:
+class FairLock:
     """A lock, as a context manager, which threads get in the order of their requests.
 
     Python's own lock usually goes to the thread that has just released it: a loop over ten thousand poses would keep
@@ -18,7 +18,7 @@ class Turns:
         self._is_taken = False
         self._gates = collections.deque()
 
-    def __enter__(self) -> Turns:
+    def __enter__(self) -> FairLock:
         with self._lock:
             if not self._is_taken:
                 self._is_taken = True
