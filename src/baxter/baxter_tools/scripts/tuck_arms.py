@@ -9,7 +9,7 @@ import rospy
 
 from baxter_interface import Head
 from baxter_interface.programs import EnabledRobot, ProgramFailed, run
-from baxter_tools.folding import Arms, Folding, own_collision_avoidance
+from baxter_tools.tucking import Arms, Tucking, own_collision_avoidance
 
 HEAD_SPEED = 0.5
 
@@ -33,10 +33,10 @@ def look_ahead() -> None:
 
 def fold(pose: str) -> None:
     arms = Arms()
-    folding = Folding(arms.names)
+    tucking = Tucking(arms.names)
     with own_collision_avoidance() as too_near, EnabledRobot() as robot:
         look_ahead()
-        way = folding.way(arms.angles(), pose)
+        way = tucking.way(arms.angles(), pose)
         rospy.loginfo("moving the arms to the pose %r (stretches of the way: %d)", pose, len(way) - 1)
         arms.follow(way, robot.is_enabled)
         rospy.loginfo("the arms are %s", pose)

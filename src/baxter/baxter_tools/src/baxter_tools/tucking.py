@@ -87,7 +87,7 @@ class Arms:
                          interrupted=PUT_ELSEWHERE if self._resets() != resets else "")
 
 
-class Folding:
+class Tucking:
     """Paths for the arms to named poses: "tucked", "untucked".
 
     Reads the robot's description from the parameter server. Raises ProgramFailed if there is none.
