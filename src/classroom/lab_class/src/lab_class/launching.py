@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from lab_class.store import HOME
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from processes import isolation, ports, system_calls
-from rf_checks import hidden
+from rf_checks import hidden_paths
 from rf_checks.handout import STUBBED, emptied_notebook, stub
 from world_picture.results import READY, cache_folder, ready_for
 
@@ -26,7 +26,7 @@ SCRATCH_BYTES = 512 << 20
 #: Most processes and threads of a lab at a time.
 TASKS = 4096
 #: Paths below the workspace that no lab shows: the judge's solutions, the history, other people's notebooks and logs.
-HIDDEN = (*hidden.SOLVED, ".baxter/jupyter", ".baxter/logs", ".baxter/labs")
+HIDDEN = (*hidden_paths.SOLVED, ".baxter/jupyter", ".baxter/logs", ".baxter/labs")
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from baxter_model import SIDES
 from baxter_model.readiness import UNFOLD
-from rf_checks import slips
+from rf_checks import mistakes
 from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
 from rf_checks.recording import RECORD_S, Fault
 
@@ -199,7 +199,7 @@ def crashed(run: Run) -> Fault | None:
     where = " in line %d" % line if line else ""
     said = last[-1][:300] if last else "unknown"
     if "'Quaternion' object is not subscriptable" in said:
-        said += "; " + slips.SHEET_QUERY
+        said += "; " + mistakes.SHEET_QUERY
     return Fault("crashed", "the program ended with an error%s: %s" % (where, said))
 
 
@@ -211,7 +211,7 @@ def _about_motion(run: Run, sides: tuple[str]) -> Fault | None:
     recording = run.recording
     if not sides or not recording.records:
         return None
-    slip = slips.command_slip(recording.commands())
+    slip = mistakes.command_slip(recording.commands())
     if slip:
         return Fault(*slip)
     moved = {side: path_length(recording.arm(side)) > 0.1 for side in SIDES}

@@ -29,7 +29,7 @@ from baxter_model import SIDES
 from processes import isolation
 from processes.family import children_of, direct_children, is_running, with_parent
 from processes.ports import free_port
-from rf_checks import hidden
+from rf_checks import hidden_paths
 from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, changes_the_world
@@ -280,7 +280,7 @@ class Lab:
             environment = {**environment, **variables}
             binds = [*ready, *isolation.caches(os.environ, self._folder / "caches")]
             command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
-                                          hidden.SOLVED, not isolation.has_own_network()), *command]
+                                          hidden_paths.SOLVED, not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:
             # It ends with the judge in any case.
             self._processes.append(subprocess.Popen(with_parent(command, "INT"), env=environment,

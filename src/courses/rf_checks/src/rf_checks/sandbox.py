@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 import rospy_fixes
 from processes import isolation, system_calls, usage
 from processes.family import children_of, direct_children, is_running, memory_exceeds, with_parent
-from rf_checks import hidden, submission
+from rf_checks import hidden_paths, submission
 
 CPU_S = 120
 #: Limit of address space for each process; numpy alone reserves much.
@@ -115,7 +115,7 @@ class Student:
             binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
             if startup is not None:
                 binds.append((startup.folder, _STARTUP_FOLDER, False))
-            unseen = (*hidden.SOLVED, *hidden.JUDGE, *(startup.hidden if startup else ()))
+            unseen = (*hidden_paths.SOLVED, *hidden_paths.JUDGE, *(startup.hidden if startup else ()))
             enter = isolation.command(environment, binds, unseen, not isolation.has_own_network(), options)
             own.update(isolation.environment_of(environment))
         else:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from baxter_model import SIDES, joint_names, poses
-from rf_checks import measures, slips
+from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
 
@@ -61,7 +61,7 @@ def pose_matrix(point: Sequence[float], quaternion_xyzw: ArrayLike) -> np.ndarra
     """(4, 4) of a position [m] and a quaternion x y z w of any length."""
     matrix = np.eye(4)
     x, y, z, w = quaternion_xyzw
-    matrix[:3, :3], matrix[:3, 3] = slips.rotation_of(w, x, y, z), point
+    matrix[:3, :3], matrix[:3, 3] = mistakes.rotation_of(w, x, y, z), point
     return matrix
 
 
@@ -118,7 +118,7 @@ class RotateGripper:
         axis, angle = call.expected
         start = pose_matrix(LAB_POINT, LAB_QUATERNION)
         target = start.copy()
-        target[:3, :3] = start[:3, :3] @ slips.about(axis, angle)
+        target[:3, :3] = start[:3, :3] @ mistakes.about(axis, angle)
         return start, target
 
     def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
@@ -146,7 +146,7 @@ class RotateGripper:
                 return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; the pose of this "
                              "exercise is given in `base` (header.frame_id)" % frame)
             pose = pose_matrix(xyz, xyzw)
-            if measures.pose_error(pose, start)[0] < slips.NEAR_M:
+            if measures.pose_error(pose, start)[0] < mistakes.NEAR_M:
                 fault = self._rotation_fault(pose, start, target, axis, angle)
                 if fault and fault.key != "not_turned":
                     return fault
@@ -167,12 +167,12 @@ class RotateGripper:
     def _rotation_fault(self, pose: np.ndarray, start: np.ndarray, target: np.ndarray, axis: str,
                         angle: float) -> Fault | None:
         rotation = pose[:3, :3]
-        if slips.is_near(rotation, target[:3, :3]) or slips.is_near(rotation, start[:3, :3]):
+        if mistakes.is_near(rotation, target[:3, :3]) or mistakes.is_near(rotation, start[:3, :3]):
             return None
-        for key, sentence, wrong in slips.wrong_rotations(start[:3, :3], axis, angle):
-            if slips.is_near(rotation, wrong):
+        for key, sentence, wrong in mistakes.wrong_rotations(start[:3, :3], axis, angle):
+            if mistakes.is_near(rotation, wrong):
                 if key == "quaternion_order":
-                    sentence += "; " + slips.SHEET_ROTATE
+                    sentence += "; " + mistakes.SHEET_ROTATE
                 return Fault(key, sentence)
         return None
 
@@ -182,18 +182,18 @@ class RotateGripper:
             return None
         reached = robot.gripper("left", run.recording)
         distance, turned = measures.pose_error(reached, target)
-        if distance < slips.NEAR_M and turned < slips.NEAR_RAD:
+        if distance < mistakes.NEAR_M and turned < mistakes.NEAR_RAD:
             return None
         joints = run.recording.joints_at(-1)
         for frame in ("left_hand", "left_wrist", "left_gripper_base"):
-            if measures.pose_error(robot.frame(frame, joints), target)[0] < slips.NEAR_M:
+            if measures.pose_error(robot.frame(frame, joints), target)[0] < mistakes.NEAR_M:
                 return Fault("wrong_frame", "at the end `%s` is where `left_gripper` was to be: the IK service "
                              "commands `left_gripper`, and so must the pose be one of that frame" % frame)
-        if distance < slips.NEAR_M:
+        if distance < mistakes.NEAR_M:
             fault = self._rotation_fault(reached, start, target, axis, angle)
             if fault:
                 return fault
-            if slips.is_near(reached[:3, :3], start[:3, :3]):
+            if mistakes.is_near(reached[:3, :3], start[:3, :3]):
                 return Fault("not_turned", "the gripper is at the lab's pose, but it was not turned about its %s axis "
                              "by %.0f degrees" % (axis, math.degrees(angle)))
         return None

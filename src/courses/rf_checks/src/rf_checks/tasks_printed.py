@@ -15,7 +15,7 @@ import numpy as np
 
 from baxter_model import SIDES
 from command_line.options import counted
-from rf_checks import measures, slips
+from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
@@ -113,7 +113,7 @@ class TfListener:
             return Fault("too_many", "the matrix of %s -> %s was printed, but others after it: the last %d that are "
                          "printed count, one for each pair; print no others" % (*missing[0], len(call.expected)))
         for matrix in unused if missing else ():
-            slip = slips.matrix_slip(matrix, robot, joints, missing, FRAMES)
+            slip = mistakes.matrix_slip(matrix, robot, joints, missing, FRAMES)
             if slip:
                 return Fault(*slip)
         if missing and unused:
@@ -139,7 +139,7 @@ class Unreachable:
 
     def calls(self, rng: Generator) -> list[Call]:
         down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
-        turned = slips.quaternion_of(down @ slips.about("y", -np.pi / 2))
+        turned = mistakes.quaternion_of(down @ mistakes.about("y", -np.pi / 2))
         kinds = ((LAB_POINT, LAB_QUATERNION), ((1.5, 0.6, 0.2), (0.0, 1.0, 0.0, 0.0)), ((0.6, 0.3, 0.3), turned))
         calls = []
         for point, quaternion in kinds:
@@ -191,7 +191,7 @@ class Unreachable:
                 return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; these poses are in "
                              "`base`" % frame)
             wanted = np.array(call.expected[3:])
-            if np.allclose(xyz, call.expected[:3], atol=1e-3) and not slips.is_near(
+            if np.allclose(xyz, call.expected[:3], atol=1e-3) and not mistakes.is_near(
                     pose_matrix(xyz, xyzw)[:3, :3], pose_matrix(xyz, wanted)[:3, :3]):
                 return Fault("quaternion_order", "the IK service was asked for another orientation than the one given: "
                              "the arguments are x y z w, as in ROS")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rf_checks import measures, slips
+from rf_checks import measures, mistakes
 
 TIMES = np.arange(0.0, 10.0, 0.01)
 
@@ -35,10 +35,10 @@ def test_the_joint_that_is_off_its_goal_is_named():
 @pytest.mark.parametrize("axis", "xyz")
 @pytest.mark.parametrize("angle", [0.0, 0.3, -1.2, math.pi / 2, 3.0, -math.pi])
 def test_rotations_and_quaternions_agree(axis, angle):
-    rotation = slips.about(axis, angle)
-    x, y, z, w = slips.quaternion_of(rotation)
-    assert np.allclose(slips.rotation_of(w, x, y, z), rotation, atol=1e-9)
-    assert slips.rotation_angle(rotation) == pytest.approx(abs(angle), abs=1e-9)
+    rotation = mistakes.about(axis, angle)
+    x, y, z, w = mistakes.quaternion_of(rotation)
+    assert np.allclose(mistakes.rotation_of(w, x, y, z), rotation, atol=1e-9)
+    assert mistakes.rotation_angle(rotation) == pytest.approx(abs(angle), abs=1e-9)
     expected = math.sin(angle / 2.0) * (1.0 if math.cos(angle / 2.0) >= 0.0 else -1.0)
     assert abs("xyz".index(axis) - int(np.argmax(np.abs((x, y, z))))) == 0 or angle == 0.0
     assert abs((x, y, z)["xyz".index(axis)]) == pytest.approx(abs(expected), abs=1e-9)
@@ -100,25 +100,25 @@ def test_a_square_wave_is_less_of_a_sine():
     assert measures.fit_sine(TIMES, wave(0.08, 0.5, lambda phase: np.sign(np.sin(phase)))).r_squared < 0.9
 
 
-START = slips.rotation_of(0.052, -0.381, 0.923, -0.015)
+START = mistakes.rotation_of(0.052, -0.381, 0.923, -0.015)
 
 
 @pytest.mark.parametrize("axis", "xyz")
 def test_slips_of_a_rotation_differ_from_what_is_right_and_from_each_other(axis):
     angle = math.pi / 2
-    right = START @ slips.about(axis, angle)
-    wrong = slips.wrong_rotations(START, axis, angle)
+    right = START @ mistakes.about(axis, angle)
+    wrong = mistakes.wrong_rotations(START, axis, angle)
     keys = {key for key, _, _ in wrong}
     assert keys == {"quaternion_order", "degrees", "wrong_axis", "wrong_direction", "not_turned"}
     for key, _, rotation in wrong:
         assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9), key
-        assert not slips.is_near(rotation, right), key
+        assert not mistakes.is_near(rotation, right), key
 
 
 def test_a_quaternion_read_in_the_wrong_order_is_recognised():
-    x, y, z, w = slips.quaternion_of(START)
-    assert slips.is_xyzw_taken_as_wxyz(slips.rotation_of(x, y, z, w), START)
-    assert not slips.is_xyzw_taken_as_wxyz(START, START)
+    x, y, z, w = mistakes.quaternion_of(START)
+    assert mistakes.is_xyzw_taken_as_wxyz(mistakes.rotation_of(x, y, z, w), START)
+    assert not mistakes.is_xyzw_taken_as_wxyz(START, START)
 
 
 NOTES = ["right_s0", "right_e1", "right_e1", "right_w0", "right_w1", "right_w1"]
@@ -130,10 +130,10 @@ NOTES = ["right_s0", "right_e1", "right_e1", "right_w0", "right_w1", "right_w1"]
     (["left_s0", "left_s1"], [45.0, -30.0], "degrees", ["left_s0", "45.0", "radians"]),
 ])
 def test_slips_of_a_command_are_named(names, values, key, words):
-    found, sentence = slips.command_slip([("right", 1, ["right_s0"], [0.2]), ("right", 1, names, values)])
+    found, sentence = mistakes.command_slip([("right", 1, ["right_s0"], [0.2]), ("right", 1, names, values)])
     assert found == key
     assert all(word in sentence for word in words)
 
 
 def test_a_right_command_has_no_slip():
-    assert slips.command_slip([("right", 1, ["right_s0", "right_s1"], [3.0, -2.0])]) is None
+    assert mistakes.command_slip([("right", 1, ["right_s0", "right_s1"], [3.0, -2.0])]) is None

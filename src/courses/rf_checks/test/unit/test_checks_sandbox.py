@@ -9,7 +9,7 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from processes import family, isolation
-from rf_checks import hidden, pacing, sandbox
+from rf_checks import hidden_paths, pacing, sandbox
 from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
 
 # What a sandbox's home has where the workspace is below a folder of the same name.
@@ -22,7 +22,7 @@ WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), r
 def starter(tmp_path, monkeypatch):
     """A function that starts a program (text), with walls if its `has_walls` is set to True; ended afterwards."""
     workspace = tmp_path / "workspace"
-    for name in (*hidden.SOLVED, *hidden.JUDGE):
+    for name in (*hidden_paths.SOLVED, *hidden_paths.JUDGE):
         path = workspace / name
         if path.suffix == ".py":
             path.parent.mkdir(parents=True, exist_ok=True)

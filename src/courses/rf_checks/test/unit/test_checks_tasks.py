@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baxter_model import SIDES, joint_names, poses
-from rf_checks import slips, tasks, tasks_printed
+from rf_checks import mistakes, tasks, tasks_printed
 from rf_checks.exercises import EXERCISES
 from rf_checks.lab import robot_description
 from rf_checks.recording import Recording, Run
@@ -50,7 +50,7 @@ def graded(task, call, run, robot):
 
 def rotated(robot, rotation):
     """Postures that lead from neutral to the lab's point in an orientation (3, 3)."""
-    return NEUTRAL, robot.solve("left", POINT, slips.quaternion_of(rotation))
+    return NEUTRAL, robot.solve("left", POINT, mistakes.quaternion_of(rotation))
 
 
 def calls(task, seed=3):
@@ -62,7 +62,7 @@ def test_a_gripper_that_is_turned_gets_all_points(robot, index):
     task = tasks.RotateGripper()
     call = calls(task)[index]
     axis, angle = call.expected
-    target = tasks.pose_matrix(POINT, QUATERNION)[:3, :3] @ slips.about(axis, angle)
+    target = tasks.pose_matrix(POINT, QUATERNION)[:3, :3] @ mistakes.about(axis, angle)
     run = Run(list(call.arguments), trace(left=rotated(robot, target)), exit_code=0)
     assert graded(task, call, run, robot) == (pytest.approx(100.0), None)
 
@@ -84,8 +84,8 @@ def test_a_request_for_a_wrong_rotation_is_told_though_the_arm_cannot_follow(rob
     task = tasks.RotateGripper()
     call = calls(task)[0]
     start = tasks.pose_matrix(POINT, QUATERNION)[:3, :3]
-    wrong = next(rotation for found, _, rotation in slips.wrong_rotations(start, *call.expected) if found == key)
-    ik = [["left", "base", list(POINT), slips.quaternion_of(wrong).tolist(), 1]]
+    wrong = next(rotation for found, _, rotation in mistakes.wrong_rotations(start, *call.expected) if found == key)
+    ik = [["left", "base", list(POINT), mistakes.quaternion_of(wrong).tolist(), 1]]
     run = Run([], trace(left=rotated(robot, start), ik=ik), exit_code=0)
     assert graded(task, call, run, robot)[1] == key
 
@@ -134,8 +134,8 @@ PAIR = tasks.Call(("base", "left_hand"), {}, 10.0, (("base", "left_hand"),))
     (np.linalg.inv, 0.0, "wrong_frame"),
     (lambda true: np.eye(4), 0.0, "identity"),
     (lambda true: np.block([[true[:3, :3].T, true[:3, 3:]], [true[3:]]]), 0.0, "transposed"),
-    (lambda true: np.block([[slips.rotation_of(*slips.quaternion_of(true[:3, :3])), true[:3, 3:]], [true[3:]]]), 0.0,
-     "quaternion_order"),
+    (lambda true: np.block([[mistakes.rotation_of(*mistakes.quaternion_of(true[:3, :3])), true[:3, 3:]], [true[3:]]]),
+     0.0, "quaternion_order"),
     (lambda true: true + np.array([[0, 0, 0, 0.2], *np.zeros((3, 4))]), 0.0, "wrong_numbers"),
 ])
 def test_printed_matrices_are_graded(robot, change, points, key):
@@ -150,7 +150,7 @@ def test_printed_matrices_are_graded(robot, change, points, key):
 def test_another_pairs_matrix_with_the_sheets_slip_is_told_both(robot, pair):
     recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
     matrix = robot.between(*pair, recording.joints_at(-1))
-    matrix[:3, :3] = slips.rotation_of(*slips.quaternion_of(matrix[:3, :3]))
+    matrix[:3, :3] = mistakes.rotation_of(*mistakes.quaternion_of(matrix[:3, :3]))
     fault = tasks_printed.TfListener().slip(PAIR, Run([], recording, output=str(matrix.tolist())), robot)
     assert fault.key == "quaternion_order"
     assert all(words in fault.sentence for words in ("%s -> %s" % pair, "base -> left_hand", "quat = (q.x")), fault
@@ -160,9 +160,9 @@ def test_degrees_are_told_by_the_farthest_command():
     def commands(*angles):
         return [("right", 1, ["right_s0", "right_s1"], [0.1, angle]) for angle in angles]
 
-    assert slips.command_slip(commands(0.5, 7.0, 57.3, 20.0)) == slips.command_slip(commands(9.0, 57.3))
-    assert "right_s1 was commanded to 57.3" in slips.command_slip(commands(7.0, 57.3))[1]
-    assert slips.command_slip(commands(3.0)) is None
+    assert mistakes.command_slip(commands(0.5, 7.0, 57.3, 20.0)) == mistakes.command_slip(commands(9.0, 57.3))
+    assert "right_s1 was commanded to 57.3" in mistakes.command_slip(commands(7.0, 57.3))[1]
+    assert mistakes.command_slip(commands(3.0)) is None
 
 
 def test_another_pairs_matrix_is_named(robot):
