@@ -11,22 +11,22 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from lab_web.errands import Errands
+    from lab_web.task_queue import TaskQueue
 
 
 class Buttons:
-    """``switch(action, name, steps)``: "press", "release" or "turn"; it may wait, and raises RobotError. ``errands``:
-    :class:`lab_web.errands.Errands` for these alone. ``pressed(names)`` is told which buttons the robot has pressed:
-    before a press, and after a release.
+    """``switch(action, name, steps)``: "press", "release" or "turn"; it may wait, and raises RobotError. ``tasks``:
+    :class:`lab_web.task_queue.TaskQueue` for these alone. ``pressed(names)`` is told which buttons the robot has
+    pressed: before a press, and after a release.
     """
 
-    def __init__(self, switch: Callable[[str, str, int], object], errands: Errands,
+    def __init__(self, switch: Callable[[str, str, int], object], tasks: TaskQueue,
                  pressed: Callable[[set[str]], object] = lambda names: None) -> None:
         self._switch = switch
-        self._errands = errands
+        self._tasks = tasks
         self._lock = threading.Lock()
         self._held = set()
-        # Of the errands' thread alone.
+        # Of the tasks' thread alone.
         self._pressed = set()
         self._tell_pressed = pressed
 
@@ -37,20 +37,20 @@ class Buttons:
             raise RobotError("\"pressed\" is %r; true or false is expected" % (pressed,))
         with self._lock:
             (self._held.add if pressed else self._held.discard)(name)
-            self._errands.add(client, self._switch_button, "press" if pressed else "release", name)
+            self._tasks.add(client, self._switch_button, "press" if pressed else "release", name)
 
     def turn(self, client: int, operation: dict[str, Any]) -> None:
         """An operation "turn" of a page: ``name`` of a wheel, ``steps``. Raises RobotError."""
         name, steps = _name(operation), operation.get("steps")
         if isinstance(steps, bool) or not isinstance(steps, int) or abs(steps) > 255:
             raise RobotError("a wheel is turned by a whole number of steps, up to 255, not by %r" % (steps,))
-        self._errands.add(client, self._switch, "turn", name, steps)
+        self._tasks.add(client, self._switch, "turn", name, steps)
 
     def release_all(self) -> None:
         """Release what is held: its page has stopped the robot, fallen silent, gone, or lost the control."""
         with self._lock:
             for name in self._held:
-                self._errands.add(None, self._switch_button, "release", name)
+                self._tasks.add(None, self._switch_button, "release", name)
             self._held.clear()
 
     def _switch_button(self, action: str, name: str) -> None:

@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 
     from baxter_conformance.comparison import Finding, Seen
     from baxter_model.interface import Interface
-    from lab_web.errands import Errands
+    from lab_web.task_queue import TaskQueue
 
 
 class Comparison:
-    """``findings()`` returns baxter_conformance's findings, takes some seconds, and raises RobotError; ``errands``:
-    :class:`lab_web.errands.Errands`, of this class alone; ``changed(state)`` tells all pages; ``clock()``: now
+    """``findings()`` returns baxter_conformance's findings, takes some seconds, and raises RobotError; ``tasks``:
+    :class:`lab_web.task_queue.TaskQueue`, of this class alone; ``changed(state)`` tells all pages; ``clock()``: now
     [s since 1970].
     """
 
-    def __init__(self, findings: Callable[[], list[Finding]], errands: Errands,
+    def __init__(self, findings: Callable[[], list[Finding]], tasks: TaskQueue,
                  changed: Callable[[dict[str, Any]], object], clock: Callable[[], float]) -> None:
         self._findings = findings
-        self._errands = errands
+        self._tasks = tasks
         self._changed = changed
         self._clock = clock
         # The last result stays in sight while the robot is compared again.
@@ -37,7 +37,7 @@ class Comparison:
         """Compare, unless that is under way; all pages are told. Does not wait."""
         if not self._state["is_running"]:
             self._share(is_running=True)
-            self._errands.add(client, self._compare)
+            self._tasks.add(client, self._compare)
 
     def _compare(self) -> None:
         result = {}

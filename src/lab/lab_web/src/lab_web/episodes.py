@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from typing import Any, BinaryIO
 
-    from lab_web.errands import Errands
+    from lab_web.task_queue import TaskQueue
 
 #: What the recorder may put into an episode beside the joints.
 CAMERAS = ("head", "left_hand", "right_hand")
@@ -67,13 +67,13 @@ class Process:
 class Episodes:
     """folder: of the set, whose first episode decides on its camera; start(task, camera, said, ended): begins to record
     and returns what has `end` and `join`, camera "" for none; mark(what): tells the recorder one of MARKS, and raises
-    RobotError; errands: :class:`lab_web.errands.Errands`; changed(state): tells all pages.
+    RobotError; tasks: :class:`lab_web.task_queue.TaskQueue`; changed(state): tells all pages.
     """
 
     def __init__(self, folder: Path, start: Callable[[str, str, Callable[[str], object], Callable[[], object]], Any],
-                 mark: Callable[[str], object], errands: Errands, changed: Callable[[dict[str, Any]], object]) -> None:
+                 mark: Callable[[str], object], tasks: TaskQueue, changed: Callable[[dict[str, Any]], object]) -> None:
         self.folder = folder
-        self._start, self._mark, self._errands, self._changed = start, mark, errands, changed
+        self._start, self._mark, self._tasks, self._changed = start, mark, tasks, changed
         self._lock = threading.Lock()
         self._recorder, self._said, self._version = None, "", 0
         self._list: dict[str, Any] = {"episodes": [], "camera": "", "rate": 0}
@@ -99,7 +99,7 @@ class Episodes:
             number = operation.get("number")
             if not isinstance(number, int) or self._recorder is not None:
                 raise RobotError("an episode is deleted by its number, while nothing is recorded")
-            self._errands.add(client, self._delete, number)
+            self._tasks.add(client, self._delete, number)
         else:
             raise RobotError("%r is nothing to do with episodes" % (do,))
 
@@ -194,7 +194,7 @@ def command(folder: Path, task: str, camera: str) -> list[str]:
             *(["--cameras", camera] if camera else ())]
 
 
-def of_workspace(workspace: Path, mark: Callable[[str], object], errands: Errands,
+def of_workspace(workspace: Path, mark: Callable[[str], object], tasks: TaskQueue,
                  changed: Callable[[dict[str, Any]], object]) -> Episodes:
     """The episodes in a workspace, or, beside an install space, in the user's own folder; as for `Episodes`."""
     folder = (workspace / ".baxter" if (workspace / "src").is_dir() else Path.home() / "baxter_lab") / "episodes"
@@ -202,4 +202,4 @@ def of_workspace(workspace: Path, mark: Callable[[str], object], errands: Errand
     def start(task: str, camera: str, said: Callable[[str], object], ended: Callable[[], object]) -> Process:
         return Process(command(folder, task, camera), said, ended)
 
-    return Episodes(folder, start, mark, errands, changed)
+    return Episodes(folder, start, mark, tasks, changed)

@@ -31,7 +31,6 @@ from lab_web.buttons import Buttons
 from lab_web.certificate import CertificateError, certificate
 from lab_web.comparison import Comparison, findings_of
 from lab_web.episodes import Episodes, of_workspace
-from lab_web.errands import Errands
 from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
@@ -40,19 +39,20 @@ from lab_web.loops import attended
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
 from lab_web.overlay import Overlay
-from lab_web.parts import SCREEN_TOPIC, Parts
+from lab_web.overlay_topics import OverlayTopics
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
+from lab_web.robot_parts import SCREEN_TOPIC, Parts
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, episode_routes, routes, upload_routes
 from lab_web.servos import Servos
-from lab_web.sights import Sights
 from lab_web.sim_clock import LINGER_S, SimClock
 from lab_web.simulation import Simulation
 from lab_web.steering import Steering
 from lab_web.steering import operation as steer_operation
+from lab_web.task_queue import TaskQueue
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from master_calls.simulator_start import SimulatorDied, StartWatch
@@ -285,7 +285,7 @@ class _Equipment(NamedTuple):
     simulation: Simulation
     recorder: Recorder
     guard: ReleaseGuard
-    sights: Sights
+    overlay_topics: OverlayTopics
     servos: Servos
     episodes: Episodes
     loops: dict
@@ -296,15 +296,15 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
     lab = pages.lab
     hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
     lab.add("reach", hands.ask, needs_control=False)
-    sights = Sights(lambda: hands.base(pages.picture))
-    overlay = Overlay(sights, pages.show, pages.answer, pages.tell)
+    overlay_topics = OverlayTopics(lambda: hands.base(pages.picture))
+    overlay = Overlay(overlay_topics, pages.show, pages.answer, pages.tell)
     lab.add("watch", overlay.watch, needs_control=False, for_viewers=True)
     pages.when_closed = overlay.forget
     parts = Parts()
-    errands, switches, plans, comparisons, edits = (Errands(pages.tell, faults) for _ in range(5))
+    tasks, switches, plans, comparisons, edits = (TaskQueue(pages.tell, faults) for _ in range(5))
     guard = ReleaseGuard()
     buttons = Buttons(parts.switch, switches, guard.pressed)
-    simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
+    simulation = Simulation(tasks, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
                             lambda state: pages.share("simulation", state))
     lab.when_lost(buttons.release_all)
     planning = Planning(lab, robot, MoveGroup(), plans, pages.answer)
@@ -329,10 +329,10 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
-    return _Equipment(hands, simulation, recorder, guard, sights, servos, episodes, {
+    return _Equipment(hands, simulation, recorder, guard, overlay_topics, servos, episodes, {
         **{name: attended(pages.present, loop) for name, loop in (
             ("the arms", lab.run), ("the 3D view", partial(_follow, pages)), ("points and frames", overlay.run),
-            ("the hands", hands.run), ("errands", errands.run), ("plans", plans.run),
+            ("the hands", hands.run), ("tasks", tasks.run), ("plans", plans.run),
             ("comparison", comparisons.run), ("episodes", edits.run))},
         # Those of a page that has gone are released after that.
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
@@ -444,7 +444,7 @@ def _watch(robot: Baxter, equipment: _Equipment, pages: Pages, is_needed: Callab
         # The master may end between the two lines.
         with contextlib.suppress(OSError, rospy.ROSException, rosgraph.MasterException):
             robot.look_after()
-            equipment.sights.look_after()
+            equipment.overlay_topics.look_after()
             description = robot.read_description()
             if description is not None:
                 equipment.hands.know(description, ARM_LINKS, rospy.logwarn)

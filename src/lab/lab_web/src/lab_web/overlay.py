@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from sensor_msgs.msg import PointCloud2
 
-    from lab_web.sights import Sights
+    from lab_web.overlay_topics import OverlayTopics
 
 #: Period of frames [s], and the shortest time between two clouds of a topic [s].
 FRAMES_S, CLOUD_S = 0.2, 0.2
@@ -34,7 +34,7 @@ class Overlay:
     error to a page.
     """
 
-    def __init__(self, graph: Sights, show: Callable[[int, bytes], object],
+    def __init__(self, graph: OverlayTopics, show: Callable[[int, bytes], object],
                  answer: Callable[[int, dict[str, Any]], object], told: Callable[[int, str, str], object],
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._graph = graph

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from typing import Any
 
-    from lab_web.errands import Errands
     from lab_web.lab import Lab
     from lab_web.motion import Limits
     from lab_web.move_group import MoveGroup
     from lab_web.robot import Baxter
+    from lab_web.task_queue import TaskQueue
 
 #: A plan is played from samples so far apart [s].
 SAMPLE_S = 0.02
@@ -73,16 +73,16 @@ def tape_of(plan: Plan) -> Tape:
 
 class Planning:
     """``planner``: ``plan(targets)`` waits for a Plan to ``targets`` {joint: [rad]}, and raises PlanFailed;
-    ``cancel()`` ends that, from any thread. ``errands``: :class:`lab_web.errands.Errands` for this alone;
+    ``cancel()`` ends that, from any thread. ``tasks``: :class:`lab_web.task_queue.TaskQueue` for this alone;
     ``answer(client, operation)``.
     """
 
-    def __init__(self, lab: Lab, robot: Baxter, planner: MoveGroup, errands: Errands,
+    def __init__(self, lab: Lab, robot: Baxter, planner: MoveGroup, tasks: TaskQueue,
                  answer: Callable[[int, dict[str, Any]], object]) -> None:
         self._lab = lab
         self._robot = robot
         self._planner = planner
-        self._errands = errands
+        self._tasks = tasks
         self._answer = answer
         self._wanted = None
 
@@ -101,7 +101,7 @@ class Planning:
         Motion(self._robot.limits).aim(targets, self._robot.measured())
         self.cancel()
         self._wanted = wanted = object()
-        self._errands.add(client, self._plan_and_go, client, dict(targets), wanted)
+        self._tasks.add(client, self._plan_and_go, client, dict(targets), wanted)
 
     def cancel(self) -> None:
         """The robot is stopped, or the page has lost the control: nothing moves when there is a plan."""

@@ -66,7 +66,7 @@ def release(names: Iterable[str]) -> None:
     import rospy
     from bullet_sim_msgs.srv import Press
 
-    from lab_web.parts import PRESS_SERVICE
+    from lab_web.robot_parts import PRESS_SERVICE
     proxy = rospy.ServiceProxy(PRESS_SERVICE, Press)
     for name in names:
         try:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from lab_web.errands import Errands
+    from lab_web.task_queue import TaskQueue
 
 # Services that do not answer: the simulator is just ending.
 _TIMEOUT_S = 5.0
@@ -31,13 +31,13 @@ _NOT_OFFERED = ("ground_plane", "sun")
 
 
 class Simulation:
-    """``errands``: :class:`lab_web.errands.Errands`; ``bodies()``: {name: whether it is a robot}; ``answer(client,
+    """``tasks``: :class:`lab_web.task_queue.TaskQueue`; ``bodies()``: {name: whether it is a robot}; ``answer(client,
     operation)``; ``changed({"paused": ...})``.
     """
 
-    def __init__(self, errands: Errands, bodies: Callable[[], dict[str, bool]],
+    def __init__(self, tasks: TaskQueue, bodies: Callable[[], dict[str, bool]],
                  answer: Callable[[int, dict[str, Any]], object], changed: Callable[[dict[str, Any]], object]) -> None:
-        self._errands = errands
+        self._tasks = tasks
         self._bodies = bodies
         self._answer = answer
         self._changed = changed
@@ -68,22 +68,22 @@ class Simulation:
         do = operation.get("do")
         if do != "step" and (not isinstance(do, str) or do not in _SERVICES):
             raise RobotError("a simulation can %s, step, not %r" % (", ".join(_SERVICES), do))
-        self._errands.add(client, self._do, do)
+        self._tasks.add(client, self._do, do)
 
     def spawn(self, client: int, operation: dict[str, Any]) -> None:
         """Add one of ``things``, by its ``name``, above the table's place. Raises RobotError."""
         thing = operation.get("name")
         if thing not in self.things:
             raise RobotError("there is no object %r to add; there are %s" % (thing, ", ".join(self.things)))
-        self._errands.add(client, self._spawn, thing)
+        self._tasks.add(client, self._spawn, thing)
 
     def delete(self, client: int, operation: dict[str, Any]) -> None:
         """Delete the object ``name``. Raises RobotError."""
-        self._errands.add(client, self._delete, self._object(operation))
+        self._tasks.add(client, self._delete, self._object(operation))
 
     def grab(self, client: int, operation: dict[str, Any]) -> None:
         """Answer where the object ``name`` is: ``position`` [m] and ``orientation`` in the world. Raises RobotError."""
-        self._errands.add(client, self._grab, client, self._object(operation))
+        self._tasks.add(client, self._grab, client, self._object(operation))
 
     def put(self, _client: int, operation: dict[str, Any]) -> None:
         """Put the object ``name`` at ``position``, ``orientation`` in the world, at rest. Raises RobotError."""

@@ -16,7 +16,6 @@ from tornado import web, websocket
 from lab_testing.waiting import wait_until
 from lab_web.buttons import Buttons
 from lab_web.episodes import Episodes
-from lab_web.errands import Errands
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.motion import Limits
@@ -25,6 +24,7 @@ from lab_web.scene import SceneFollower
 from lab_web.serving import Pages, episode_routes, routes, upload_routes
 from lab_web.steering import Steering
 from lab_web.steering import operation as steer_operation
+from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
 from urdf_model import parse_urdf
 from web_bridge.access import Access
@@ -181,8 +181,8 @@ class Server:
                       self.pages.answer)
         description = parse_urdf(URDF, source="robot")
         hands.know(description, {side: ("base", side + "_gripper") for side in SIDES}, pytest.fail)
-        errands = Errands(self.pages.tell, Faults(SimpleNamespace(error=pytest.fail)))
-        buttons = Buttons(self.robot.switch, errands)
+        tasks = TaskQueue(self.pages.tell, Faults(SimpleNamespace(error=pytest.fail)))
+        buttons = Buttons(self.robot.switch, tasks)
         self.lab.when_lost(buttons.release_all)
         self.servos = {side: Servo() for side in SIDES}
         steering = Steering(lambda: self.servos, lambda side: None, hands.pose)
@@ -190,7 +190,7 @@ class Server:
         self.marks = []
         self.lab.add("mark", lambda client, asked: self.marks.append(asked["mark"]))
         self.episode_recorder = EpisodeRecorder()
-        self.episodes = Episodes(folder / "episodes", self.episode_recorder.start, self.marks.append, errands,
+        self.episodes = Episodes(folder / "episodes", self.episode_recorder.start, self.marks.append, tasks,
                                  lambda state: self.pages.share("episodes", state))
         self.lab.add("episodes", self.episodes.ask, needs_control=False)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
@@ -224,7 +224,7 @@ class Server:
         self._serving = Serving(self.loop, application, 0, "127.0.0.1")
         self.address = "http://127.0.0.1:%d/?token=" % self._serving.port
         self._threads = [threading.Thread(target=target, args=(self._ended.is_set,))
-                         for target in (self.lab.run, hands.run, errands.run, self._run)]
+                         for target in (self.lab.run, hands.run, tasks.run, self._run)]
         for thread in self._threads:
             thread.start()
 

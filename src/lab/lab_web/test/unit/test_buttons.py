@@ -7,8 +7,8 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from lab_web.buttons import Buttons
-from lab_web.errands import Errands
 from lab_web.lab import RobotError
+from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
 
 
@@ -30,10 +30,10 @@ class Served:
     def __init__(self):
         self.robot, self.told, self._ended = Robot(), [], threading.Event()
         self.log = []
-        errands = Errands(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=self.log.append)))
+        tasks = TaskQueue(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=self.log.append)))
         self.pressed = []
-        self.buttons = Buttons(self.robot.switch, errands, lambda names: self.pressed.append(sorted(names)))
-        self._thread = threading.Thread(target=errands.run, args=(self._ended.is_set, self.buttons.release_all))
+        self.buttons = Buttons(self.robot.switch, tasks, lambda names: self.pressed.append(sorted(names)))
+        self._thread = threading.Thread(target=tasks.run, args=(self._ended.is_set, self.buttons.release_all))
         self._thread.start()
 
     def end(self):

@@ -13,7 +13,7 @@ FINDINGS = [Finding("/robot", "/robot/state", Verdict.MET, True),
             Finding("services", "/own", Verdict.MISSING, False, "n")]
 
 
-class Errands:
+class TaskQueue:
     """Work that waits until the test does it."""
 
     def __init__(self):
@@ -24,8 +24,8 @@ class Errands:
 
 
 @pytest.fixture
-def errands():
-    return Errands()
+def tasks():
+    return TaskQueue()
 
 
 def test_what_is_missing_and_what_is_different_is_shown_but_for_what_nobody_can_use():
@@ -35,29 +35,29 @@ def test_what_is_missing_and_what_is_different_is_shown_but_for_what_nobody_can_
                    {"name": "/s", "verdict": "other", "reason": "type a"}]}
 
 
-def test_a_comparison_under_way_is_not_begun_again_and_its_result_stays(errands):
+def test_a_comparison_under_way_is_not_begun_again_and_its_result_stays(tasks):
     told = []
-    comparison = Comparison(lambda: FINDINGS, errands, told.append, lambda: 12.5)
+    comparison = Comparison(lambda: FINDINGS, tasks, told.append, lambda: 12.5)
     for client in (7, 8):
         comparison.ask(client, {})
-    assert told == [{"is_running": True}] and [client for client, _ in errands.waiting] == [7]
-    errands.waiting.pop()[1]()
+    assert told == [{"is_running": True}] and [client for client, _ in tasks.waiting] == [7]
+    tasks.waiting.pop()[1]()
     assert told[-1] == {"is_running": False, **shown_of(FINDINGS), "when_s": 12.5}
     comparison.ask(8, {})
     assert told[-1] == {"is_running": True, **shown_of(FINDINGS), "when_s": 12.5}
 
 
-def test_a_comparison_that_failed_can_be_tried_again(errands):
+def test_a_comparison_that_failed_can_be_tried_again(tasks):
     def findings():
         raise RobotError("gone")
     told = []
-    comparison = Comparison(findings, errands, told.append, lambda: 0.0)
+    comparison = Comparison(findings, tasks, told.append, lambda: 0.0)
     comparison.ask(7, {})
     with pytest.raises(RobotError, match="gone"):
-        errands.waiting.pop()[1]()
+        tasks.waiting.pop()[1]()
     assert told[-1] == {"is_running": False}
     comparison.ask(7, {})
-    assert len(errands.waiting) == 1
+    assert len(tasks.waiting) == 1
 
 
 def test_findings_are_those_of_the_command():

@@ -10,8 +10,8 @@ from demonstrations.frames import ACTION, Schema, numbers
 from demonstrations.writing import SetWriter
 from lab_testing.waiting import wait_until
 from lab_web.episodes import Episodes, Process, command
-from lab_web.errands import Errands
 from lab_web.lab import RobotError
+from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
 
 START = {"do": "start", "task": "Pick up the block."}
@@ -22,14 +22,14 @@ def made(tmp_path):
     """Episodes with a recorder of the test's own."""
     made = SimpleNamespace(started=[], marks=[], states=[], told=[])
     faults = Faults(SimpleNamespace(error=pytest.fail))
-    made.errands = Errands(lambda client, code, text: made.told.append(text), faults)
+    made.tasks = TaskQueue(lambda client, code, text: made.told.append(text), faults)
 
     def start(task, camera, said, ended):
         made.started.append((task, camera))
         made.said = said
         return SimpleNamespace(end=ended, join=lambda: None)
 
-    made.episodes = Episodes(tmp_path / "set", start, made.marks.append, made.errands, made.states.append)
+    made.episodes = Episodes(tmp_path / "set", start, made.marks.append, made.tasks, made.states.append)
     return made
 
 
@@ -51,7 +51,7 @@ def test_a_recording_begins_is_marked_and_ends(made):
     made.episodes.ask(1, {"do": "stop"})
     assert not made.states[-1]["running"]
     made.episodes.ask(1, {"do": "delete", "number": 0})
-    made.errands.run(lambda: True)
+    made.tasks.run(lambda: True)
     assert len(made.states[-1]["episodes"]) == 1 and made.states[-1]["version"] > state["version"]
 
 
@@ -60,7 +60,7 @@ def test_the_first_episode_decides_on_the_camera(made, monkeypatch):
     monkeypatch.setattr("lab_web.episodes.editing.listed", lambda folder: (
         [Listed(0, 4, True)], ("observation.images.left_hand",), 10))
     made.episodes.ask(1, {"do": "delete", "number": 7})  # it looks again
-    made.errands.run(lambda: True)
+    made.tasks.run(lambda: True)
     made.episodes.ask(1, {**START, "camera": "head"})
     assert made.started == [("Pick up the block.", "left_hand")]
 
@@ -87,7 +87,7 @@ def test_nothing_is_deleted_or_begun_twice_while_something_is_recorded(made):
 def test_an_episode_that_is_not_there_is_told_and_so_is_a_broken_set(made):
     write(made.episodes.folder)
     made.episodes.ask(3, {"do": "delete", "number": 7})
-    made.errands.run(lambda: True)
+    made.tasks.run(lambda: True)
     assert "episodes 0 to 1, not 7" in made.told[0] and len(made.states[-1]["episodes"]) == 2
     (made.episodes.folder / "meta" / "info.json").write_text("{")
     made.episodes.ask(1, START)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from lab_testing.waiting import wait_until
-from lab_web.errands import Errands
 from lab_web.lab import Lab
 from lab_web.motion import Limits
 from lab_web.planning import SAMPLE_S, Plan, PlanFailed, Planning, tape_of
+from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
 
 START = {"left_s0": 0.0, "left_s1": 0.5}
@@ -69,12 +69,12 @@ class Served:
         self.robot, self.told, self.answers = Robot(), [], []
         self.planner = Planner(self.robot)
         self.lab = Lab(self.robot, lambda: None, lambda *told: self.told.append(told), silence_s=60.0)
-        errands = Errands(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=pytest.fail)))
-        planning = Planning(self.lab, self.robot, self.planner, errands, lambda _, answer: self.answers.append(answer))
+        tasks = TaskQueue(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=pytest.fail)))
+        planning = Planning(self.lab, self.robot, self.planner, tasks, lambda _, answer: self.answers.append(answer))
         self.lab.add("plan", planning.plan)
         self.lab.when_lost(planning.cancel, when_silent=False)
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=errands.run, args=(self._ended.is_set,))
+        self._thread = threading.Thread(target=tasks.run, args=(self._ended.is_set,))
         self._thread.start()
         self.do("take")
 

@@ -24,7 +24,7 @@ _CLOUD = "sensor_msgs/PointCloud2"
 _NAMES_S, _IDLE_S = 2.0, 5.0
 
 
-class Sights:
+class OverlayTopics:
     """Listens to tf while somebody asks. ``base()``: see :mod:`lab_web.overlay`."""
 
     def __init__(self, base: Callable[[], np.ndarray | None]) -> None:

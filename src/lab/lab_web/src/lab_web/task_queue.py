@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from loop_ros.faults import Faults
 
 
-class Errands:
+class TaskQueue:
     """``told(client, code, text)``; ``faults`` (:class:`loop_ros.faults.Faults`) notes errors that nobody foresaw."""
 
     def __init__(self, told: Callable[[int | None, str, str], object], faults: Faults) -> None:
