@@ -28,6 +28,9 @@ def test_a_run_takes_the_place_of_the_systems_last_one_and_leaves_those_by_hand(
     rows = run.put(rows, run.row_of(debian, "200", 4.5, "0.0 mm", "9 passed, 0 failed"))
     assert len(rows) == len(by_hand) + 1 and all(row in rows for row in by_hand)
     assert rows[0]["set-up"] == "200 s" and "--tests bookworm" in rows[0]["command"]
+    rows = run.put(rows, run.row_of(debian, "180", 3.0, "0.0 mm", ""))
+    rows = run.put(rows, run.row_of(debian, "170", 3.0, "0.0 mm", ""))
+    assert [row["set-up"] for row in rows[:2]] == ["170 s", "200 s"], "what the tests showed stays"
     rows = run.put(rows, run.row_of(ubuntu, "300", 5, "0.0 mm", ""))
     pages.write_rows(tmp_path / "platforms.csv", rows)
     assert len(pages.rows_of(tmp_path / "platforms.csv")) == len(rows)
