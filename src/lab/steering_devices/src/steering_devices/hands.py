@@ -34,7 +34,14 @@ def _param(name: str, default: Any) -> Any:
 
 
 def _cached(name: str, default: Any) -> Any:
-    return rospy.get_param_cached(name, default)
+    """A parameter of a servo, which may change; where it is not of the default's type, or the master has ended, the
+    default: a servo keeps to what it could use, and a device must go on."""
+    try:
+        value = rospy.get_param_cached(name, default)
+    except OSError:
+        return default
+    is_one = isinstance(value, type(default)) or isinstance(default, float) and isinstance(value, int)
+    return value if is_one and not isinstance(value, bool) else default
 
 
 def _words(name: str, default: list[str]) -> list[str]:
@@ -112,7 +119,7 @@ class Hand:
         scale = 1.0
         if _cached(self.name + "/command_in_type", "") == UNITLESS:
             # With 0 the servo makes no motion of anything.
-            scale = float(_cached(self.name + "/scale/joint", 1.0)) or 1.0
+            scale = _cached(self.name + "/scale/joint", 1.0) or 1.0
         message = JointJog(joint_names=list(velocities), velocities=[value / scale for value in velocities.values()])
         message.header.stamp = rospy.Time.now()
         self._jogs.publish(message)

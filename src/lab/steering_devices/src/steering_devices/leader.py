@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from baxter_model import SIDES
+
 #: Of the messages that a leader is followed by: topic -> type; "%s" stands for the side.
 TOPICS = {"/robot/joint_states": "sensor_msgs/JointState",
           "/robot/digital_io/%s_lower_cuff/state": "baxter_core_msgs/DigitalIOState",
@@ -18,6 +20,7 @@ TOPICS = {"/robot/joint_states": "sensor_msgs/JointState",
           "/robot/navigators/%s_navigator/state": "baxter_core_msgs/NavigatorState"}
 #: Buttons of a navigator (the wheel, back, the Rethink button) and their marks.
 NAVIGATOR_MARKS = ("success", "failure", "again")
+_BUTTONS = {"upper_button": "open", "lower_button": "close", "lower_cuff": "lower_cuff"}
 # A leader that is silent for so long has let go [s]. A joint that moves so far between two looks is not followed [rad].
 _SILENT_S, _MAX_STRIDE_RAD = 0.15, 0.3
 # Rate at which the follower catches up [1/s].
@@ -48,12 +51,13 @@ class Leader:
             self.position.update(found)
             if found:
                 self._heard = now
+        elif side not in SIDES:
+            return
         elif part == "navigator":
             for mark, is_down in zip(NAVIGATOR_MARKS, message["buttons"], strict=False):
                 self._press(side, mark, bool(is_down))
-        elif part:
-            what = {"upper_button": "open", "lower_button": "close"}.get(part, part)
-            self._press(side, what, message["state"] == 1)
+        elif part in _BUTTONS:
+            self._press(side, _BUTTONS[part], message["state"] == 1)
 
     def _press(self, side: str, what: str, is_down: bool) -> None:
         if is_down and not self._down.get((side, what)):

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parameters and terminals that a device cannot use end it with one sentence."""
+import io
 import sys
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import rospy
 
 from steering_devices import gamepad_node, hands, keyboard_node
 
@@ -39,6 +42,34 @@ def test_a_parameter_that_cannot_be_used_is_named(parameters, name, value):
     parameters["~layout"] = {"hold": 1, "motions": {}}
     parameters[name] = value
     assert ended_by(gamepad_node.main).startswith("servo_gamepad: " + name)
+
+
+class Sent(list):
+    """A publisher; what was published."""
+
+    def __init__(self, *_, **__):
+        super().__init__()
+
+    publish = list.append
+
+
+@pytest.mark.parametrize("bad", [5, ["x"], {}, True, OSError("no master")])
+def test_a_servo_whose_parameters_are_none_is_steered(parameters, monkeypatch, bad):
+    def cached(name, default):
+        if isinstance(bad, OSError):
+            raise bad
+        return "unitless" if name.endswith("in_type") else bad
+    monkeypatch.setattr(hands.rospy, "get_param_cached", cached, raising=False)
+    monkeypatch.setattr(hands.rospy, "Publisher", Sent)
+    monkeypatch.setattr(hands.rospy, "Time", rospy.Time, raising=False)
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(1.0))
+    hand = hands.Hand("servo")
+    hand.steer(np.full(6, 0.5), in_tool=True)
+    hand.jog({"turn": 0.5})
+    twist, jog = hand._twists[0], hand._jogs[0]
+    twist.serialize(io.BytesIO())
+    jog.serialize(io.BytesIO())
+    assert twist.header.frame_id == "" and jog.velocities == [0.1 if bad == 5 else 0.5]
 
 
 def test_a_terminal_that_nobody_knows(parameters, monkeypatch):

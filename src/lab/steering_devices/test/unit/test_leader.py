@@ -49,6 +49,14 @@ def test_a_leap_of_the_leader_is_not_followed_until_it_lets_go():
     assert led(clutch, np.linspace(1.5, 1.6, 20)[:, None], (0.0,))[-1] > 0.05
 
 
+@pytest.mark.parametrize("name", ["digital_io/torso_upper_button", "digital_io/left_itb_button0",
+                                  "navigators/neck_navigator"])
+def test_what_is_no_button_of_a_cuff_presses_nothing(name):
+    leader = Leader()
+    leader.take("/robot/%s/state" % name, {"state": 1, "buttons": [True]}, 10.0)
+    assert leader.presses() == []
+
+
 def test_a_leader_holds_as_long_as_it_is_heard_and_its_cuff_is_squeezed():
     leader = Leader()
     leader.take("/robot/joint_states", {"name": ["left_s0", "left_s1"], "position": [0.5, None]}, 10.0)
