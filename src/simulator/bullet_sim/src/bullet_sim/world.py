@@ -11,7 +11,7 @@ import numpy as np
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
-from .builder import Blueprint, build, is_wheel, link_collisions
+from .builder import Blueprint, build, is_wheel, join_patches, link_collisions
 from .contact import Contact
 from .errors import LOG, BulletSimError, within
 from .hanging import Hanging
@@ -195,6 +195,7 @@ class World:
             if mended:
                 self._warn("model '%s': %s" % (name, mended))
             merged = merge_fixed(robot, held=held)
+        join_patches(merged)
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         asked = list(self_collision_pairs) or self_colliding(merged)
         pairs = [pair for pair in asked if all(merged.frames[link].link not in rough for link in pair)]
