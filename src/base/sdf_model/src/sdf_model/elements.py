@@ -190,7 +190,34 @@ WITHOUT_EFFECT = (
                 "logical_camera": None, "magnetometer": None, "rfid": None, "rfidtag": None, "transceiver": None},
      _PLUGINS_NOISE),
 )
+_SCAN = "samples resolution min_angle max_angle"
+#: Parent -> numbers and flags in it that its reader here does not look at, or not for each kind of parent.
+_NUMBERS = {
+    "world/physics": "max_contacts",
+    "world/physics/ode/solver": "min_step_size island_threads thread_position_correction",
+    "world/frame": "pose",
+    "world/state": "sim_time wall_time real_time iterations",
+    "world/state/model/joint": "angle",
+    "world/state/model/link": "pose acceleration wrench",
+    "actor/script": "loop delay_start auto_start",
+    "model/frame": "pose",
+    "link": "must_be_base_link",
+    "collision": "max_contacts",
+    "geometry/heightmap": "use_terrain_paging sampling",
+    "joint": "gearbox_ratio thread_pitch",
+    "joint/physics": "provide_feedback",
+    "joint/physics/ode": "provide_feedback",
+    "sensor": "always_on update_rate visualize enable_metrics pose",
+    "sensor/camera": "pose horizontal_fov",
+    "sensor/camera/image": "width height",
+    "sensor/camera/clip": "near far",
+    "sensor/camera/noise": "mean stddev",
+    "sensor/camera/distortion": "k1 k2 k3 p1 p2 center",
+    **{"sensor/%s/%s" % (ray, part): names for ray in ("ray", "lidar") for part, names in (
+        ("scan/horizontal", _SCAN), ("scan/vertical", _SCAN), ("range", "min max resolution"), ("noise", "stddev"))},
+}
 #: Where a path begins.
 SCOPES = ("world", "model", "link", "joint", "collision", "visual", "sensor", "light", "geometry", "surface",
           "material", "axis", "axis2", "actor")
-TABLE = ElementTable((HONOURED, HARMLESS), WITHOUT_EFFECT, SCOPES)
+TABLE = ElementTable((HONOURED, HARMLESS), WITHOUT_EFFECT, SCOPES,
+                     ["%s/%s" % (path, name) for path, names in _NUMBERS.items() for name in names.split()])

@@ -87,6 +87,21 @@ def test_what_has_an_effect_in_gazebo_alone_is_named_with_its_line(inside, named
         assert ("not known" in warning) == (named == "foo")
 
 
+@pytest.mark.parametrize("link, named", [
+    ("<link name='l'><collision name='c'><max_contacts>many</max_contacts></collision></link>", ["max_contacts"]),
+    ("<link name='l'><collision name='c'><max_contacts>4</max_contacts></collision></link>", []),
+    (LINK % "<contact><ode><min_depth>deep</min_depth></ode></contact>", ["min_depth"]),
+    ("<link name='l'><must_be_base_link>perhaps</must_be_base_link></link>", ["must_be_base_link"]),
+    ("<link name='l'><must_be_base_link>True</must_be_base_link></link>", []),
+    ("<link name='l'><sensor name='s' type='ray'><ray><scan><horizontal><samples>all</samples></horizontal></scan>"
+     "</ray><always_on/></sensor></link>", ["samples"]),
+    ("<link name='l'><sensor name='s' type='ray'><always_on>yes</always_on><update_rate>10 Hz</update_rate></sensor>"
+     "</link>", ["always_on", "update_rate"])])
+def test_a_text_that_is_no_number_is_named_where_nobody_reads_it(link, named):
+    warning = parse_sdf_model("<sdf version='1.6'><model name='m'>\n%s</model></sdf>" % link, "m.sdf").warning
+    assert re.findall(r"(\w+_\w+|samples) \(m.sdf line [23]\)", warning) == named
+
+
 def test_a_world_says_it_once_for_all_its_models(tmp_path):
     path = tmp_path / "a.world"
     path.write_text("""<sdf version="1.6"><world name="w"><wind><linear_velocity>1 0 0</linear_velocity></wind>

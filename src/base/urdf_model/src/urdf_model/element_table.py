@@ -3,10 +3,16 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 _FLAGS = {"true": "1", "false": "0"}
+# As Gazebo's readers do, which take what a word begins with.
+_LEADING_NUMBER = re.compile(r"[-+]?(\d|\.\d|inf|nan)")
+#: Why a number that nobody reads is named.
+NO_NUMBER = "not all of this text is numbers"
 
 
 class Row(NamedTuple):
@@ -37,12 +43,15 @@ class ElementTable:
 
     ``known``: mappings of a path to the names of the elements in it, with blanks between them, that are honoured or
     need not be. ``without_effect``: rows of (path, {name: harmless texts or None}, reason). The elements on the way to
-    a path are honoured. Only elements of which the table has a child are looked into.
+    a path are honoured. Only elements of which the table has a child are looked into. ``numbers``: paths of elements
+    that nobody reads, but that hold numbers or flags; another text in them is named.
     """
 
     def __init__(self, known: Iterable[Mapping[str, str]],
-                 without_effect: Iterable[tuple[str, Mapping[str, str | None], str]], scopes: Iterable[str] = ()):
+                 without_effect: Iterable[tuple[str, Mapping[str, str | None], str]], scopes: Iterable[str] = (),
+                 numbers: Iterable[str] = ()):
         self.scopes = frozenset(scopes)
+        self.numbers = frozenset(numbers)
         self.rows: dict[str, Row] = {}
         for path, names in ((path, names) for mapping in known for path, names in mapping.items()):
             self._add_way(path)
@@ -68,6 +77,8 @@ class ElementTable:
                 yield Idle(child.tag, child.sourceline, "", True)
             elif not row.reason:
                 inside = "%s/%s" % (path, child.tag)
+                if inside in self.numbers and not _holds_numbers(content(child)):
+                    yield Idle(child.tag, child.sourceline, NO_NUMBER, False)
                 if child.tag in self.scopes and inside not in self.parents:
                     inside = child.tag
                 if inside in self.parents:
@@ -139,10 +150,15 @@ def _is(text, harmless, parent):
 
 
 def _number(text):
+    """The number in ``text``; NaN, which is neither more nor less than any, where there is none; 0 for nothing."""
     try:
-        return float(text)
+        return float(text or 0.0)
     except ValueError:
-        return 0.0
+        return math.nan
+
+
+def _holds_numbers(text):
+    return all(word in _FLAGS or _LEADING_NUMBER.match(word) for word in text.lower().split())
 
 
 def _same(text, other):

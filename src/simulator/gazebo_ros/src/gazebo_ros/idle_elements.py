@@ -44,7 +44,7 @@ WITHOUT_EFFECT = (
     ("joint", {"stopCfm": "0", "stopErp": "0.2"}, _STOPS),
     ("joint", {"fudgeFactor": "0"}, "the solver is Bullet's, not ODE's"),
 )
-URDF = ElementTable([KNOWN], WITHOUT_EFFECT)
+URDF = ElementTable([KNOWN], WITHOUT_EFFECT, numbers=("link/maxContacts", "link/collision/max_contacts"))
 
 
 def idle_elements(robot: Robot, source: str) -> str:
