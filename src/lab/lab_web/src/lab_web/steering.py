@@ -153,7 +153,7 @@ def operation(lab: Lab, steering: Steering, servos: Callable[[], dict[str, Servo
         there = servos()
         for side in (*twists, *led):
             if side not in there or not there[side].is_there:
-                raise RobotError("nothing steers the %s hand; start the servos: %s" % (side, _START))
+                raise RobotError("nothing steers the %s hand; start the servos: %s" % (side[:20], _START))
         lab.start(client, lambda _limits, _measured: steering.aim(twists, asked.get("tool") is True, led),
                   is_stream=True)
     return serve
@@ -174,8 +174,11 @@ def _twists_of(asked: dict) -> dict[str, np.ndarray]:
 def _led_of(asked: dict) -> dict[str, Led]:
     led = asked.get("led", {})
     try:
-        return {side: Led(float(one["number"]), pose_from_quaternion(one["shift"], one["turn"]))
-                for side, one in led.items()}
+        found = {side: Led(float(one["number"]), pose_from_quaternion(one["shift"], one["turn"]))
+                 for side, one in led.items()}
+        if not all(math.isfinite(one.number) for one in found.values()):  # NaN would be another grip each time
+            raise ValueError("a number is not finite")
+        return found
     except (AttributeError, KeyError, TypeError, ValueError, OverflowError, KinematicsError) as error:
         raise RobotError("\"led\" must be an object of sides with number, shift (3) and turn (4) each: %s"
                          % str(error)[:100]) from None

@@ -103,6 +103,7 @@ def test_an_arm_that_does_not_follow_is_explained_once(hall):
     (None, "must be an object"), ({"left": [1, 0]}, "six numbers"), ({"left": [2, 0, 0, 0, 0, 0]}, "six numbers"),
     ({"left": [float("nan")] * 6}, "six numbers"), ({"left": [True] * 6}, "six numbers"),
     ({"left": ["1"] * 6}, "six numbers"), ({"left": [10 ** 400] * 6}, "six numbers"),
+    ({"t" * 10**4: UP}, "nothing steers the tttttttttttttttttttt hand"),
     ({"tail": UP}, "nothing steers the tail hand; start the servos: roslaunch moveit_servo baxter_servo.launch")])
 def test_what_cannot_be_steered_is_refused_with_the_reason(hall, hands, said):
     hall.lab.serve(1, True, {"op": "steer", "hands": hands})
@@ -170,7 +171,7 @@ def test_a_hand_that_is_led_rests_when_nothing_comes(hall):
 
 @pytest.mark.parametrize("bad", [[], {"left": 1}, {"left": {}}, {"left": led(number="x")}, {"left": led(shift=(1, 2))},
                                  {"left": led(turn=(0, 0, 0, 0))}, {"left": led(shift=(float("nan"), 0, 0))},
-                                 {"left": led(number=10**400)}])
+                                 {"left": led(number=10**400)}, {"left": led(number=float("nan"))}])
 def test_what_leads_nowhere_is_refused(hall, bad):
     before = len(hall.told)
     hall.lab.serve(1, True, {"op": "steer", "hands": {}, "led": bad})
