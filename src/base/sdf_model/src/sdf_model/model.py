@@ -297,11 +297,15 @@ def _moved(parts: Parts, prefix: str, origin: np.ndarray) -> Parts:
 
 
 def _sensors_and_lights(document: Document, link: etree._Element, name: str) -> list[etree._Element]:
-    """Return the <sensor> and <light> elements of a link or joint as a <gazebo> element that refers to it, the way a
-    URDF has them."""
+    """Return the <sensor> and <light> elements of a link or joint, and its <visual>s with plugins, as a <gazebo>
+    element that refers to it, the way a URDF has them."""
     for light in link.iterchildren("light"):
         read_light(document, light, np.eye(4))  # complains here, where file and line are known
     found = link.findall("sensor") + link.findall("light")
+    for visual in link.iterchildren("visual"):
+        if visual.find("plugin") is not None:
+            found.append(etree.Element("visual", name=visual.get("name", "")))
+            found[-1].extend([copy.deepcopy(plugin) for plugin in visual.findall("plugin")])
     if not found:
         return []
     holder = etree.Element("gazebo", reference=name)

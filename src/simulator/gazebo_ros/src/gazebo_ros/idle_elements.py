@@ -24,6 +24,7 @@ KNOWN = {
     "link": "mu mu1 fdir1 kp kd maxVel selfCollide self_collide dampingFactor "
             "turnGravityOff gravity material sensor light plugin canonicalBody "
             "maxContacts",
+    "link/visual": "plugin",
     "link/collision": "max_contacts",
     "link/collision/surface/friction/ode": "mu fdir1",
     "link/collision/surface/contact": "collide_bitmask",
@@ -37,7 +38,8 @@ WITHOUT_EFFECT = (
     ("link", {"minDepth": sdf.KEPT_DEPTH}, sdf.WHOLE_DEPTH),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),
-    ("link", {"visual": None}, _NOT_IN_A_URDF),
+    ("link/visual", dict.fromkeys(("pose", "geometry", "material", "transparency", "laser_retro", "cast_shadows",
+                                   "visibility_flags", "meta")), _NOT_IN_A_URDF),
     ("link/collision", {"laser_retro": "0"}, "intensities of lasers are 0"),
     *(("link/collision/" + path, names, reason) for path, names, reason in sdf.WITHOUT_EFFECT
       if path.startswith("surface")),

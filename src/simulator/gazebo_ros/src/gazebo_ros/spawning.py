@@ -309,7 +309,8 @@ class Spawner:
 
     def _plugins(self, name, robot, spawn_namespace):
         found, sensors, options, unknown = [], [], {}, Counter()
-        for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn)):
+        for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn),
+                        *urdf_extras.visual_plugins(robot)):
             filename = element.get("filename") or ""
             plugin_class = self._library.plugins.find(filename)
             if plugin_class is None:

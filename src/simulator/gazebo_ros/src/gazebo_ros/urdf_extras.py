@@ -51,6 +51,21 @@ def sensor_plugins(robot: Robot, warn: Callable[[str], object]) -> list[Any]:
     return found
 
 
+def visual_plugins(robot: Robot) -> list[Any]:
+    """The ``<plugin>`` elements of the ``<visual>`` elements of links."""
+    return [plugin for gazebo in robot.gazebo if gazebo.get("reference") in robot.links
+            for plugin in gazebo.findall("visual/plugin")]
+
+
+def visual_of(plugin: Any) -> tuple[str | None, str | None]:
+    """The link of a plugin in a ``<visual>``, None outside of one, and the visual's name, None in a URDF: there it is
+    in all visuals of the link."""
+    visual = plugin.getparent()
+    if visual is None or visual.tag != "visual":
+        return None, None
+    return visual.getparent().get("reference"), visual.get("name")
+
+
 def sensor_of(plugin: Any) -> tuple[Any, str | None]:
     """The ``<sensor>`` that a plugin element stands in and the name of its link or joint; ``(None, None)`` outside of
     one."""

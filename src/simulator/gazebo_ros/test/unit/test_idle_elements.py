@@ -92,7 +92,7 @@ def test_what_has_its_effect_or_none_in_gazebo_is_no_news(block):
     ('<gazebo reference="a"><mu1 value="0.5"/><mu2 value="0.1"/></gazebo>', ["mu2"]),
     ('<gazebo reference="a"><minDepth>deep</minDepth><maxContacts>ten</maxContacts></gazebo>',
      ["minDepth", "maxContacts"]),
-    ('<gazebo reference="a"><visual><material/></visual></gazebo>', ["visual"]),
+    ('<gazebo reference="a"><visual><material/></visual></gazebo>', ["material"]),
     ('<gazebo reference="a"><collision><surface><friction><ode><mu>0.1</mu><mu2>2</mu2></ode></friction></surface>'
      "</collision></gazebo>", ["mu2"]),
     ('<gazebo><joint name="k" type="revolute"/><bar/></gazebo>', ["bar"]),
