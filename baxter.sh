@@ -116,6 +116,7 @@ declare -A PROGRAMS=(
 run_program() {
     local mode=$1 command
     shift
+    if ! asks_only "$mode" "$@"; then refuse_words "$mode" "$@" || exit; fi
     if ! asks_only "$mode" "$@" || has_earlier_build; then use_container "$mode" "$@" || exit; fi
     read -ra command <<<"${PROGRAMS[$mode]}"
     if asks_only "$mode" "$@"; then
@@ -129,8 +130,9 @@ run_program() {
         bring_up_to_date || exit
     elif [[ $mode == conformance && ${1:--} != -* && $1 != localhost ]]; then
         use_robot "$1" || exit
-        shift
         bring_up_to_date || exit
+        use_robot "$1" || exit # set-up may have brought what finds the route
+        shift
     else
         if [[ $mode == conformance && ${1:-} == localhost ]]; then shift; fi
         bring_up_to_date || exit
@@ -176,6 +178,22 @@ asks_only() {
         case $mode:$word in *:-h | *:--help | check:--list | check:--start | check:--start=*) return 0 ;; esac
     done
     return 1
+}
+
+# refuse_words MODE WORD…: what the mode's program would refuse after set-up, where a Python is there to read its source.
+refuse_words() {
+    if [[ -x /usr/bin/python3 && $(uname -s) != Darwin ]]; then
+        /usr/bin/python3 -I "$LAB_ROOT/tools/arguments.py" "$LAB_ROOT" "$@" </dev/null
+    fi
+}
+
+# refuse_missing [COMMAND…]: a path that names nothing, and nothing that set-up makes
+refuse_missing() {
+    if [[ ${1:-} != */* || -e $1 ]]; then return; fi
+    case $(realpath -m -- "$1") in
+        "$LAB_ROOT"/.*/* | "$LAB_ROOT"/build/* | "$LAB_ROOT"/devel/* | "$LAB_ROOT"/install/* | "$LAB_ROOT"/src_overlay/*) ;;
+        *) echo "baxter.sh: there is no program $1" >&2 && return 127 ;;
+    esac
 }
 
 # With sudo, set-up and simulator would leave files of root in the user's own workspace, which then cannot be written.
@@ -252,6 +270,7 @@ main() {
             local public=
             case ${1:-} in --public | --public=*) public=${1#--} && shift ;; esac
             refuse_option "$@" || exit
+            refuse_missing "$@" || exit
             use_container sim ${public:+"--$public"} "$@" || exit
             bring_up_to_date "$@" || exit
             if [[ -z $public ]]; then
@@ -280,8 +299,10 @@ main() {
             fi
             if asks_only host "${1:-}"; then help_of HOST && exit; fi
             refuse_option "$@" || exit
+            refuse_missing "$@" || exit
             use_container "$mode" "$@" || exit
             bring_up_to_date "$@" || exit
+            use_robot "$mode" || exit # set-up may have brought what finds the route
             use_build || exit
             enter "$@"
             ;;

@@ -77,6 +77,8 @@ use_robot() {
     if [[ -n ${ROS_IP:-}${ROS_HOSTNAME:-} ]]; then
         return 0
     fi
+    # Before the first set-up of a minimal system there is no ip; the caller asks again after it.
+    command -v ip >/dev/null || return 0
     source_address=$(ip -4 route get "$address" 2>/dev/null | sed -n 's/.* src \([0-9.]*\).*/\1/p')
     if [[ -z $source_address ]]; then
         echo "baxter.sh: no route to $host ($address). Connect to the robot's network, or set ROS_IP yourself." >&2

@@ -203,6 +203,16 @@ step_pip() {
     stamp "$key"
 }
 
+# While pip copies files it prints nothing for minutes: say how far it is, and what came last.
+activity_pip() {
+    local packages last
+    [[ $(tail -n 1 "$step_log") != *Collecting* && $(tail -n 1 "$step_log") != *Downloading* ]] || return
+    mapfile -t packages < <(find "$VENV"/lib/python3*/site-packages -maxdepth 1 -name '*.dist-info' -printf '%T@ %f\n' | sort -n)
+    [[ ${#packages[@]} -gt 1 ]] || return
+    last=${packages[-1]#* }
+    echo "${#packages[@]} packages are there, the last one ${last%.dist-info}"
+}
+
 # PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
 link_xacro() {
     if [[ -f src/base/xacro/xacro && ! $VENV/bin/xacro -ef src/base/xacro/xacro ]]; then
@@ -243,7 +253,6 @@ step_overlay() {
     local file hidden
     if was_cut_off overlay; then run drop_cut_off_clones "$LAB_ROOT"; fi
     for file in ${overlay_files[@]+"${overlay_files[@]}"}; do
-        [[ -f $file ]] || refuse "there is no file $file; rosinstall/ has those that come with the workspace"
         command -v vcs >/dev/null ||
             refuse "this system has no vcstool, which reads $file; clone what it lists into $LAB_ROOT/src_overlay yourself"
         run import_overlay "$LAB_ROOT" "$file"
@@ -373,11 +382,14 @@ usage="Usage: ./baxter.sh setup [--with FILE.rosinstall]… [STEP…], where a S
 overlay_files=() chosen=()
 while [[ $# -gt 0 ]]; do
     case $1 in
-        --with=*) overlay_files+=("$(cd "$CALLED_FROM" && realpath -m "${1#--with=}")") ;;
-        --with)
-            [[ $# -gt 1 ]] || { echo "--with needs a file. $usage" >&2; exit 2; }
-            overlay_files+=("$(cd "$CALLED_FROM" && realpath -m "$2")")
-            shift
+        --with | --with=*)
+            if [[ $1 == --with ]]; then
+                [[ $# -gt 1 ]] || { echo "--with needs a file. $usage" >&2; exit 2; }
+                set -- "--with=$2" "${@:3}"
+            fi
+            overlay_files+=("$(cd "$CALLED_FROM" && realpath -m "${1#--with=}")")
+            [[ -f ${overlay_files[-1]} ]] ||
+                { echo "there is no file ${overlay_files[-1]}; rosinstall/ has those that come with the workspace" >&2; exit 2; }
             ;;
         *)
             [[ " ${STEPS[*]} " == *" $1 "* ]] || { echo "unknown argument '$1'. $usage" >&2; exit 2; }
@@ -414,7 +426,6 @@ echo "Setting up $LAB_ROOT"
 platform_line /etc/os-release "$NOETIC" "$(uname -m)"
 for index in "${!STEPS[@]}"; do
     [[ ${#chosen[@]} -eq 0 || " ${chosen[*]} " == *" ${STEPS[index]} "* ]] || continue
-    step_started=$SECONDS
     start_step "${STEPS[index]}"
     printf '[%d/%d] %s …\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}"
     "step_$step_name"

@@ -5,7 +5,9 @@
 LOGS=$STATE/logs
 # Below this free space [kB] the disk counts as full.
 FULL_BELOW_KB=4096
-step_name="" step_log="" note="" watcher=""
+# Without a terminal a step that takes longer than this [s] says what it does, again and again.
+LIFE_S=60
+step_name="" step_log="" note="" watcher="" step_started=0
 # The step in which the run before this one was killed or ran out of disk; "?" if that could not be recorded.
 cut_off_step=""
 
@@ -49,7 +51,7 @@ was_cut_off() { [[ $cut_off_step == "$1" || $cut_off_step == "?" ]]; }
 
 # start_step NAME
 start_step() {
-    step_name=$1 step_log=$LOGS/$1.log note=""
+    step_name=$1 step_log=$LOGS/$1.log note="" step_started=$SECONDS
     # An interrupted step stays marked until it has succeeded.
     if [[ -z $cut_off_step ]]; then write "$STATE/at_work" "$step_name"; fi
     write "$step_log" "# ${TITLES[$step_name]}, $(date)"
@@ -79,10 +81,8 @@ write() {
 run() {
     printf '\n$ %s\n' "$*" >>"$step_log"
     local status=0
-    if [[ -t 1 ]]; then
-        watch_log &
-        watcher=$!
-    fi
+    watch_log &
+    watcher=$!
     "$@" >>"$step_log" 2>&1 </dev/null || status=$?
     stop_watching
     if [[ $status -ne 0 ]]; then
@@ -90,14 +90,29 @@ run() {
     fi
 }
 
-# Show the last line of the log on the terminal: a user is waiting.
+# What the step does now: the last line of its log; a step may define its own.
+activity() {
+    if declare -F "activity_$step_name" >/dev/null && "activity_$step_name"; then return; fi
+    tail -n 1 "$step_log" | tr -d '\r' | cut -c 1-300
+}
+
+# A user is waiting: show on the terminal what is done now, elsewhere a line each minute.
 watch_log() {
     exec 9>&-
-    trap 'exit 0' TERM
-    local columns
+    local columns pause="" told=$SECONDS
+    trap 'kill $pause 2>/dev/null; exit 0' TERM
     columns=$(tput cols 2>/dev/null || echo 80)
-    while sleep 0.5 && kill -0 $$; do
-        printf '\r\033[K      %.*s' $((columns - 8)) "$(tail -n 1 "$step_log" | tr -d '\r' | cut -c 1-300)"
+    while kill -0 $$ 2>/dev/null; do
+        # Nobody waits for a pipe that a left-over sleep holds open; `wait` ends at once where `sleep` would not.
+        sleep 0.5 >/dev/null 2>&1 &
+        pause=$!
+        wait "$pause"
+        if [[ -t 1 ]]; then
+            printf '\r\033[K      %.*s' $((columns - 8)) "$((SECONDS - step_started)) s: $(activity)"
+        elif [[ $((SECONDS - told)) -ge $LIFE_S ]]; then
+            printf '      %d s: %.150s\n' $((SECONDS - step_started)) "$(activity)"
+            told=$SECONDS
+        fi
     done
 }
 
@@ -106,7 +121,7 @@ stop_watching() {
     kill "$watcher" 2>/dev/null
     wait "$watcher" 2>/dev/null
     watcher=""
-    printf '\r\033[K'
+    if [[ -t 1 ]]; then printf '\r\033[K'; fi
 }
 
 # fail STATUS COMMAND

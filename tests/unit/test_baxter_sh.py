@@ -368,8 +368,8 @@ def workspace(tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     (tmp_path / ".venv/bin/python3").chmod(0o755)
-    for name in ("environment", "platform", "container"):
-        shutil.copy(ROOT / "tools" / f"{name}.bash", tmp_path / "tools")
+    for name in ("environment.bash", "platform.bash", "container.bash", "arguments.py"):
+        shutil.copy(ROOT / "tools" / name, tmp_path / "tools")
     return tmp_path
 
 
@@ -382,6 +382,91 @@ def test_a_skeleton_does_not_wait_for_a_set_up(workspace, words, is_set_up):
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.split() == words
     assert (workspace / "was_set_up").exists() == is_set_up
+
+
+@pytest.fixture(scope="module")
+def fresh_clone(tmp_path_factory):
+    """A workspace with all sources and without a build; its set-up leaves a mark and fails."""
+    root = tmp_path_factory.mktemp("clone") / "ws"
+    copy_of_tools(root)
+    shutil.rmtree(root / "src")
+    (root / "src").symlink_to(ROOT / "src")
+    (root / "tests").symlink_to(ROOT / "tests")
+    (root / "tools/setup.bash").write_text('touch "$LAB_ROOT/was_set_up"; exit 7\n')
+    (root / "wave.py").write_text("")
+    return root
+
+
+REFUSED = {
+    "check": "which program", "check lab2": "your Python file", "check lab2 nowhere.py": "nowhere.py is not there",
+    "check lab2 .": "is no file", "check wave.py": "LAB [EXERCISE] PROGRAM", "check lab3 wave.py": "did you mean lab2?",
+    "check wave wave.py": "an exercise of lab2", "check lab2 wav wave.py": "did you mean wave?",
+    "check lab2 wave.py --sed 3": "did you mean --seed?", "check lab2 wave.py --seed x": "a whole number from 0",
+    "check lab2 wave.py --profile real": "robot", "check cwru wave wave.py": "no exercise 'wave'",
+    "grade": "which folder", "grade nowhere": "no folder or archive nowhere", "grade . lab4": "did you mean lab2?",
+    "grade . lab2 wav": "did you mean wave?", "grade . --workers 0": "from 1",
+    "labs": "up, list", "labs downn": "did you mean down?", "labs up nowhere.csv": "nowhere.csv",
+    "learn": "Reach", "learn Lift": "TwoArmLift", "learn --judge nowhere.npz": "no nowhere.npz",
+    "batch": "--list", "batch ik": "--seeds", "batch ikk --seeds 0:3": "did you mean ik?",
+    "batch ik --seeds": "--seeds", "batch-node": "--listen", "batch-node --listen 10.0.0.1": "--head",
+    "batch-node --head --address a:1 --listen b": "--head",
+    "bench plannig": "did you mean planning?", "bench fidelity --recording nowhere.csv": "nowhere.csv",
+    "sysid": "--arm left", "sysid nowhere.csv": "nowhere.csv", "sysid --arm both": "one arm at a time",
+    "notebook wavng": "did you mean 7_waving?", "notebook --port x": "--port", "web --prt 80": "did you mean --port?",
+    "conformance --tmeout 3": "did you mean --timeout?", "conformance --timeout 0": "above 0",
+    "test nowhere": "'nowhere' is not a package", "test --repeat x": "--repeat",
+    "sim ./nowhere.py": "no program ./nowhere.py", "10.0.0.1 ./nowhere.py": "no program ./nowhere.py",
+}
+ACCEPTED = (
+    "check lab2 wave.py", "check lab2 wave wave.py --seed 3", "check --seed=3 lab2 wave.py", "check cwru wave.py --tru",
+    "grade .", "grade . lab2 wave --out x", "grade --version", "labs up 3 --port 8000", "labs up --public", "labs down",
+    "labs --folder x list", "labs renew all", "learn Reach --steps 3", "learn --judge wave.py", "batch ik --seeds 0:3",
+    "batch a.b:C --seeds 1", "batch ik --seeds 0:3 --set a=1 --set b=2", "batch-node --head --listen 10.0.0.1", "bench",
+    "bench ik --quick", "bench --list", "sysid wave.py --arm both", "sysid --arm left --out a.yaml", "notebook",
+    "notebook 7_waving", "notebook --list", "web", "web --port 80 __name:=page", "web --no-notebook", "conformance",
+    "conformance localhost --json x", "test", "test bullet_sim -k foo --lf", "test --busy",
+    "test --busy=30 test_words.py", "test --busy bullet_sim", "test --changed", "test torture", "test -x --repeat 3",
+    "sim python3 nowhere.py", "sim", "sim devel/lib/x", "sim bash -c ./nowhere",
+)
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_what_can_be_judged_without_a_set_up_is_refused_before_it(fresh_clone, words):
+    done = baxter(*words.split(), script=fresh_clone / "baxter.sh", cwd=fresh_clone)
+    assert REFUSED[words] in done.stderr and done.returncode == (127 if "./nowhere.py" in words else 2), done
+    assert not (fresh_clone / "was_set_up").exists()
+    assert done.stdout == "" and len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("words", ACCEPTED)
+def test_what_may_be_right_is_not_refused_before_a_set_up(fresh_clone, words):
+    done = baxter(*words.split(), script=fresh_clone / "baxter.sh", cwd=fresh_clone)
+    assert (fresh_clone / "was_set_up").exists() and done.returncode == 7, done
+    (fresh_clone / "was_set_up").unlink()
+
+
+def test_the_words_of_every_mode_with_a_program_are_judged():
+    """A mode or a source that has moved would otherwise be judged by its program alone, without a word."""
+    script = f"""import sys; sys.argv[1:] = [{str(ROOT)!r}]; sys.path.insert(0, {str(ROOT / "tools")!r})
+import arguments
+print(*arguments.DECLARED)
+for mode in arguments.DECLARED:
+    arguments.parser_of(mode, arguments.source_of(arguments.DECLARED[mode]))
+arguments.exercises(), arguments.tasks(), arguments.named(arguments.source_of(arguments.JOBS), "JOBS")"""
+    done = subprocess.run(["/usr/bin/python3", "-I", "-S", "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    text = re.search(r"^declare -A PROGRAMS=\($(.*?)^\)$", (ROOT / "baxter.sh").read_text(), re.M | re.S)[1]
+    assert set(done.stdout.split()) == set(re.findall(r"^ +\[([a-z-]+)\]=", text, re.M))
+
+
+def test_a_robot_is_looked_for_before_a_set_up_also_where_nothing_finds_routes_yet(variables_after, tmp_path):
+    """A minimal Debian has no ip; the first set-up installs it."""
+    (tmp_path / "ip").unlink()
+    (tmp_path / "awk").symlink_to("/usr/bin/awk")
+    (tmp_path / "env").symlink_to("/usr/bin/env")
+    script = f'source "{ROOT}/tools/environment.bash"; use_robot baxter.local && echo "$ROS_MASTER_URI"'
+    done = subprocess.run(["/bin/bash", "-c", script], env={"PATH": str(tmp_path)}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, ROBOT["ROS_MASTER_URI"] + "\n", "")
 
 
 def test_the_doctor_of_a_fresh_clone_names_the_missing_set_up_and_no_variables(tmp_path):

@@ -52,8 +52,17 @@ def test_the_dev_container_is_a_stage_with_its_user_and_forwards_the_page():
         assert (ROOT / command.split()[0]).exists()
 
 
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory):
+    """A folder with the programs of this machine but its engines, of which a test has its own."""
+    folder = tmp_path_factory.mktemp("programs")
+    for name in {name for place in ("/bin", "/usr/bin") for name in os.listdir(place)} - {"podman", "docker"}:
+        (folder / name).symlink_to(shutil.which(name, path="/usr/bin:/bin") or f"/usr/bin/{name}")
+    return folder
+
+
 @pytest.fixture
-def machine(tmp_path):
+def machine(tmp_path, programs):
     """(workspace, folder of engines, environment): a machine whose PATH has a fake podman."""
     workspace, engines, home = tmp_path / "ws", tmp_path / "bin", tmp_path / "home"
     for folder in (engines, home, workspace / "docker"):
@@ -63,7 +72,7 @@ def machine(tmp_path):
     shutil.copy(ROOT / "docker" / "Dockerfile", workspace / "docker")
     add_engine(engines, "podman")
     (engines / "then").write_text("exit 0\n")
-    return workspace, engines, {"PATH": f"{engines}:/usr/bin:/bin", "HOME": str(home), "BAXTER_CONTAINER": "1"}
+    return workspace, engines, {"PATH": f"{engines}:{programs}", "HOME": str(home), "BAXTER_CONTAINER": "1"}
 
 
 def add_engine(folder, name):

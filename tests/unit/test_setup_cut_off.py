@@ -6,6 +6,7 @@ The commands of the steps are fakes here, which can hang half-way or fail; test_
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 from pathlib import Path
@@ -231,13 +232,42 @@ def test_the_command_xacro_follows_ours_to_another_folder(workspace):
 
 
 def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
-    root, _ = workspace
-    (root / "theirs.rosinstall").rename(root / "elsewhere")
+    root, fakes = workspace
+    (fakes / "free").write_text("1000")
     status, said = finish(start(root))
-    assert status == 1 and "cannot continue in step 'other people's packages': there is no file" in said
-    (root / "elsewhere").rename(root / "theirs.rosinstall")
+    assert status == 1 and "cannot continue in step 'Debian packages': too little disk" in said
+    (fakes / "free").write_text("100000000")
     status, said = finish(start(root))
     assert status == 0 and "cut off" not in said, said
+
+
+def test_a_list_of_packages_that_is_not_there_is_told_before_the_first_step(workspace):
+    root, _ = workspace
+    (root / "theirs.rosinstall").unlink()
+    status, said = finish(start(root))
+    assert status == 2 and f"there is no file {root}/theirs.rosinstall" in said and "[1/" not in said
+
+
+@pytest.mark.parametrize("step", ["pip", "build"])
+def test_without_a_terminal_a_long_step_says_what_it_does(workspace, step):
+    root, fakes = workspace
+    script = root / "tools/setup_run.bash"
+    assert "\nLIFE_S=60\n" in script.read_text()
+    script.write_text(script.read_text().replace("\nLIFE_S=60\n", "\nLIFE_S=1\n"))
+    half = 'mkdir "$site/"{a-1,b-2}.dist-info; echo Installing collected packages: a, b, c'
+    stand_in = (fakes / "python3").read_text()
+    (fakes / "python3").write_text(stand_in.replace('install"*) touch "$site/half"', f'install"*) {half}'))
+    (fakes / "hang").write_text(COMMANDS[step])
+    process = start(root)
+    wait_for(fakes / "hanging", process)
+    line = ""
+    while not (told := re.fullmatch(r"  +\d+ s: (.+)\n", line)):
+        line = process.stdout.readline()
+        assert line, "set-up ended without a word about the step"
+    os.killpg(process.pid, signal.SIGINT)
+    finish(process)
+    assert step != "pip" or re.match(r"2 packages are there, the last one [ab]-\d", told[1])
+    wait_until(lambda: not living(process.pid), "all processes of set-up to end", LIMIT_S)
 
 
 # The cause is read from the log, in the same way for each step.
