@@ -11,6 +11,7 @@ import time
 
 import rospy
 
+from rospy_fixes.ports.event_log import printable
 from rospy_nodes.start import limit_ports
 from steering_devices.hands import Hands, hands_of
 from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
@@ -72,5 +73,5 @@ def _draw(screen: curses.window, hands: Hands, keyboard: Keyboard, steering) -> 
     screen.erase()
     height, width = screen.getmaxyx()
     for row, line in enumerate(lines[: height - 1]):
-        screen.addnstr(row, 0, line, width - 1)
+        screen.addnstr(row, 0, printable(line), width - 1)  # curses refuses a text that has a zero in it
     screen.refresh()

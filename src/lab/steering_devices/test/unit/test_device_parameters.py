@@ -9,6 +9,7 @@ import pytest
 import rospy
 
 from steering_devices import gamepad_node, hands, keyboard_node
+from steering_devices.steering import Keyboard, Steering
 
 NAN = float("nan")
 
@@ -78,3 +79,15 @@ def test_a_terminal_that_nobody_knows(parameters, monkeypatch):
         monkeypatch.setattr(sys, stream, SimpleNamespace(isatty=lambda: True))
     text = ended_by(keyboard_node.main)
     assert "'nonsense'" in text and "TERM" in text
+
+
+def test_what_a_servo_says_ends_no_keyboard(parameters, monkeypatch):
+    drawn = []
+
+    def add(row, column, text, count):
+        assert "\0" not in text, "curses raises ValueError"
+        drawn.append(text[:count])
+    screen = SimpleNamespace(erase=lambda: None, refresh=lambda: None, getmaxyx=lambda: (24, 60), addnstr=add)
+    hand = SimpleNamespace(name="left_servo", is_there=True, reason="'no\0where' is not a frame")
+    keyboard_node._draw(screen, SimpleNamespace(hands=[hand]), Keyboard(), Steering())
+    assert any("no\\x00where" in line for line in drawn)
