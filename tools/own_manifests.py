@@ -4,7 +4,8 @@
 
     own_manifests.py ROOT FOLDER…
 
-A file that is no XML stops every command that looks for a package, the lab's too, and none of them names the file.
+A file that is no XML stops every command that looks for a package, the lab's too, and none of them names the file. One
+that catkin refuses, as without a name or with a wrong address, ends rosmsg, catkin_make and set-up.
 Exit code 0: nothing is wrong; 1: something is.
 """
 
@@ -34,7 +35,8 @@ def manifests(folder: Path) -> Iterator[Path]:
 
 
 def problems(root: Path, own: Iterable[str]) -> list[str]:
-    """Sentences about the packages of the folders `own` of root/src: no XML, a name that another package has."""
+    """Sentences about the packages of the folders `own` of root/src: no XML, nothing that catkin takes, a name that
+    another package has."""
     own, found, owners = list(own), [], {}
     labs = [path.name for path in (root / "src").iterdir() if path.is_dir() and path.name not in (OVERLAY, *own)]
     for folder in (*sorted(labs), *own):
@@ -46,6 +48,11 @@ def problems(root: Path, own: Iterable[str]) -> list[str]:
                 found.append(f"{place}/package.xml cannot be read: {error}. Until it is mended no command finds any "
                              f"package. Mend it, or leave the package out: touch {place}/CATKIN_IGNORE")
                 continue
+            if folder in own and (refusal := _refusal(path)):
+                found.append(f"{place}/package.xml is refused: {refusal}. Until it is mended, commands such as rosmsg "
+                             "and catkin_make end with InvalidPackage. Mend it, or leave the package out: touch "
+                             f"{place}/CATKIN_IGNORE")
+                continue
             if folder in own and name in owners:
                 found.append(f"{place} has the name '{name}' of {owners[name]}: rename yours in package.xml and "
                              "CMakeLists.txt")
@@ -56,6 +63,20 @@ def problems(root: Path, own: Iterable[str]) -> list[str]:
 def _name(path: Path) -> str:
     """Raises ElementTree.ParseError, OSError, ValueError."""
     return (ElementTree.parse(path).findtext("name") or "").strip()
+
+
+def _refusal(path: Path) -> str:
+    """Why catkin does not take the package; empty if it does, or is not installed yet."""
+    try:
+        from catkin_pkg.package import InvalidPackage, parse_package
+    except ImportError:  # the doctor of a workspace that is not set up
+        return ""
+    try:
+        parse_package(str(path))
+    except InvalidPackage as error:
+        # The first line names the file.
+        return "; ".join(str(error).splitlines()[1:]) or str(error)
+    return ""
 
 
 def main(arguments: list[str]) -> int:

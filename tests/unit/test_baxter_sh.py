@@ -281,7 +281,9 @@ def set_up_copy(tmp_path):
 
 def new_package(copy, name):
     (copy / "src" / name).mkdir()
-    (copy / "src" / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+    (copy / "src" / name / "package.xml").write_text(
+        f"<package><name>{name}</name><version>1.0.0</version><description>mine</description><maintainer "
+        'email="a@b.example">a</maintainer><license>BSD-3-Clause</license></package>')
 
 
 def builds(copy):

@@ -9,7 +9,8 @@ from workspace_tree import ROOT
 
 import own_manifests
 
-MANIFEST = "<package format='2'><name>%s</name></package>"
+MANIFEST = """<package format="3"><name>%s</name><version>1.0.0</version><description>test</description>
+<maintainer email="a@b.example">a</maintainer><license>BSD-3-Clause</license></package>"""
 
 
 @pytest.fixture
@@ -30,6 +31,22 @@ def test_a_file_that_is_no_xml_is_named_with_its_line_and_how_to_leave_it_out(ro
     sentence, = own_manifests.problems(root, ["mine"])
     assert "src/mine/package.xml" in sentence and "line 3" in sentence and "touch src/mine/CATKIN_IGNORE" in sentence
     (broken.parent / "CATKIN_IGNORE").touch()
+    assert own_manifests.problems(root, ["mine"]) == []
+
+
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("<name>mine</name>", "", '"name" tag'), ("mine", "", "name must not be empty"), ("mine", "My Lab", '"My Lab"'),
+    ("a@b.example", "ann", 'Invalid email "ann"'), ("1.0.0", "one", '"one"'), ("BSD-3-Clause", "", "license"),
+])
+def test_a_file_that_catkin_refuses_is_named_with_the_reason(root, old, new, told):
+    """rosmsg, catkin_make and set-up end with a traceback by it."""
+    text = MANIFEST % "mine"
+    assert text.count(old) == 1
+    (root / "src/mine/package.xml").write_text(text.replace(old, new))
+    sentence, = own_manifests.problems(root, ["mine"])
+    assert sentence.startswith("src/mine/package.xml is refused: ") and told in sentence
+    assert "touch src/mine/CATKIN_IGNORE" in sentence
+    (root / "src/mine/CATKIN_IGNORE").touch()
     assert own_manifests.problems(root, ["mine"]) == []
 
 
