@@ -36,29 +36,48 @@ def mass_matrix_of(model: Model) -> np.ndarray:
 
     In the order of its n joints; then of three translations and three rotations of each root that is free.
     """
-    joints, roots = list(model.merged.joints.values()), model.merged.roots[1 if model.static else 0:]
-    index = {joint.child: i for i, joint in enumerate(joints)}
-    column_of = {root: len(joints) + 6 * number for number, root in enumerate(roots)}
-    frames = {body: model.body_frame(body) for body in (*index, *roots)}
-    axes = [frames[joint.child][:3, :3] @ joint.axis for joint in joints]
-    matrix = np.zeros((len(joints) + 6 * len(roots),) * 2)
-    for child, frame in frames.items():
+    tree = _Tree(model)
+    matrix = np.zeros((tree.width,) * 2)
+    for child, frame in tree.frames.items():
         inertial, rotation = model.merged.links[child].inertial, frame[:3, :3]
-        centre = frame[:3, 3] + rotation @ inertial.centre
         mass, moments, axes_of_link = moving_inertial(inertial)
-        moved, turned = np.zeros((3, len(matrix))), np.zeros((3, len(matrix)))
-        link = child
-        while link in index:
-            i = index[link]
-            if joints[i].type == "prismatic":
-                moved[:, i] = axes[i]
-            else:
-                moved[:, i], turned[:, i] = np.cross(axes[i], centre - frames[link][:3, 3]), axes[i]
-            link = joints[i].parent
-        if link in column_of:
-            first = column_of[link]
-            moved[:, first:first + 3] = turned[:, first + 3:first + 6] = np.eye(3)
-            moved[:, first + 3:first + 6] = np.cross(np.eye(3), centre - frames[link][:3, 3]).T
+        moved, turned = tree.motions(child, frame[:3, 3] + rotation @ inertial.centre)
         turned = (rotation @ axes_of_link).T @ turned
         matrix += mass * moved.T @ moved + turned.T @ (moments[:, None] * turned)
     return matrix
+
+
+def motion_of_point(model: Model, body: str, point: np.ndarray) -> np.ndarray:
+    """Return how a ``point`` (3,) [m, world] of a body moves (3, m), by the columns of :func:`mass_matrix_of`."""
+    return _Tree(model).motions(body, point)[0]
+
+
+class _Tree:
+    """The frames of a model's moving bodies at its present position, and the columns of its motions."""
+
+    def __init__(self, model: Model) -> None:
+        roots = model.merged.roots[1 if model.static else 0:]
+        self._joints = list(model.merged.joints.values())
+        self._index = {joint.child: i for i, joint in enumerate(self._joints)}
+        self._column_of = {root: len(self._joints) + 6 * number for number, root in enumerate(roots)}
+        self.frames = {body: model.body_frame(body) for body in (*self._index, *roots)}
+        self._axes = [self.frames[joint.child][:3, :3] @ joint.axis for joint in self._joints]
+        self.width = len(self._joints) + 6 * len(roots)
+
+    def motions(self, body: str, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The velocity of a point (3,) of a body and its turn rate, for each motion: (3, m) each."""
+        moved, turned = np.zeros((3, self.width)), np.zeros((3, self.width))
+        link = body
+        while link in self._index:
+            i = self._index[link]
+            if self._joints[i].type == "prismatic":
+                moved[:, i] = self._axes[i]
+            else:
+                moved[:, i] = np.cross(self._axes[i], point - self.frames[link][:3, 3])
+                turned[:, i] = self._axes[i]
+            link = self._joints[i].parent
+        if link in self._column_of:
+            first = self._column_of[link]
+            moved[:, first:first + 3] = turned[:, first + 3:first + 6] = np.eye(3)
+            moved[:, first + 3:first + 6] = np.cross(np.eye(3), point - self.frames[link][:3, 3]).T
+        return moved, turned

@@ -21,6 +21,7 @@ from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
 from .sliding_wheels import sliding_wheels
+from .slipping_wheels import SlippingWheels
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from urdf_model import MergedRobot
 
     from .parts import Motion
+    from .slipping_wheels import Slip
 
 # Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.
 SOLVER_ITERATIONS = 20
@@ -105,6 +107,7 @@ class World:
         self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
         self._sliding = {}  # model -> its SlidingWheels
+        self._slipping = {}  # model -> its SlippingWheels
         self._acting = {}  # model -> functions that act on it before each step
         self._watch = StateWatch(self, error)
         self._touched = []  # models that were touched since the last step, perhaps asleep
@@ -158,6 +161,8 @@ class World:
         pybullet.setPhysicsEngineParameter(fixedTimeStep=time_step_s, physicsClientId=self._client)
         for model in self.models.values():
             model.step_changed()
+        for slipping in itertools.chain(*self._slipping.values()):
+            slipping.step_changed(time_step_s)
 
     def wake_all(self) -> None:
         """Wake all sleeping bodies: Bullet does not notice changes from outside."""
@@ -252,6 +257,24 @@ class World:
         moves it and lets it go. Raises BulletSimError for an unknown link."""
         return Hanging(self._client, model, link, most_n)
 
+    def let_slip(self, model: Model, wheels: Sequence[Slip]) -> SlippingWheels:
+        """Let the contacts of ``wheels`` of a Model slip (:mod:`.slipping_wheels`); returns the
+        :class:`.slipping_wheels.SlippingWheels`. Raises BulletSimError for a body that is no wheel."""
+        slipping = SlippingWheels(self._client, model, wheels, self.time_step_s)
+        self._slipping.setdefault(model, []).append(slipping)
+        model.directed |= {wheel.body for wheel in wheels}
+        if model in self._sliding:
+            self._sliding[model] = sliding_wheels(self._client, model)
+        self._models_changed()
+        return slipping
+
+    def end_slip(self, slipping: SlippingWheels) -> None:
+        """Give the contacts of what :meth:`let_slip` returned back to Bullet's friction."""
+        for model, found in list(self._slipping.items()):
+            if slipping in found:
+                slipping.end()
+                self._slipping[model] = [other for other in found if other is not slipping]
+
     def add_ground_plane(self, name: str = "ground_plane") -> Model:
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
         link = Link("link", collisions=[Shape(Plane(), np.eye(4), "collision", None, "link")])
@@ -263,6 +286,7 @@ class World:
         model.remove()
         del self.models[name]
         self._sliding.pop(model, None)
+        self._slipping.pop(model, None)
         self._acting.pop(model, None)
         self._models_changed()
         self.note_weightless(model, False)
@@ -319,6 +343,9 @@ class World:
         for groups in self._sliding.values():
             for wheels in groups:
                 wheels.correct()
+        for found in self._slipping.values():
+            for slipping in found:
+                slipping.push()
         for functions in self._acting.values():
             for act in functions:
                 act()

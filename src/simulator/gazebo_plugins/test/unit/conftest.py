@@ -14,10 +14,11 @@ STEP_S = 0.001
 class PluginLab:
     """A world with a floor, and a model with one plugin. ``urdf`` has a place for its ``<gazebo>`` element."""
 
-    def __init__(self, urdf, plugin_class, elements, pose=None, sensor=None, filename="x.so"):
+    def __init__(self, urdf, plugin_class, elements, pose=None, sensor=None, filename="x.so",
+                 raw=""):
         self.world = World(time_step_s=STEP_S)
         self.world.add_ground_plane()
-        inside = "".join("<%s>%s</%s>" % (tag, text, tag) for tag, text in elements.items())
+        inside = raw + "".join("<%s>%s</%s>" % (tag, text, tag) for tag, text in elements.items())
         plugin = '<plugin name="p" filename="%s">%s</plugin>' % (filename, inside)
         text = urdf % ((sensor or "<gazebo>%s</gazebo>") % plugin)
         robot = parse_urdf(text)

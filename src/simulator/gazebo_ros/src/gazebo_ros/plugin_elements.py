@@ -97,6 +97,7 @@ PLUGINS = {
     "libhector_gazebo_ros_sonar.so": (_with_errors("frameId topicName updateRate", ""), _PAUSES),
     **dict.fromkeys(("libgazebo_ros_harness.so", "libHarnessPlugin.so"), ("joint winch detach",)),
     "libgazebo_ros_hand_of_god.so": ("frameId kl ka linkName",),
+    **dict.fromkeys(("libgazebo_ros_wheel_slip.so", "libWheelSlipPlugin.so"), ("wheel",)),
     "libgazebo_ros_video.so": ("topicName width height",),
     "libgazebo_world_odometry.so": ("topicName frameName updateRate",),
     "libgazebo_ros_control.so": ("robotParam robotSimType controlPeriod eStopTopic legacyModeNS",),
