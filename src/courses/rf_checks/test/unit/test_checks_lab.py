@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The judge's own lab, without a simulator: messages of a failed start."""
+import os
 import socket
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -17,11 +20,10 @@ from world_picture.results import READY
 
 
 @pytest.fixture
-def lab(tmp_path):
+def lab(tmp_path, monkeypatch):
     """A lab that is a process which does nothing."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     lab = Lab("<robot/>", walls=False)
-    lab._folder = tmp_path
-    (tmp_path / "output.txt").write_text("")
     lab._run([sys.executable, "-c", "import signal; signal.pause()"], None)
     lab._own_time.restart()
     yield lab
@@ -50,24 +52,24 @@ def test_a_lab_in_a_sandbox_sees_what_set_up_has_made_ready_for_pictures(tmp_pat
     ready = tmp_path / "cache" / "bullet_gazebo"
     ready.mkdir(parents=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(ready.parent))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     lab = Lab("<robot/>", walls=True)
-    lab._folder = tmp_path
     lab._run(["true"], {"A": "1"})
     (command, environment), = started
     assert environment == {"A": "1", READY: command[command.index(str(ready)) + 1]}
 
 
 def test_a_lab_ends_with_its_judge(tmp_path):
-    text = ("import os, sys\nfrom pathlib import Path\nfrom rf_checks.lab import Lab\n"
-            "lab = Lab('<robot/>', walls=False)\n"
-            "lab._folder = Path(sys.argv[1])\nlab._run([sys.executable, '-c', 'import signal; print(1, flush=True); "
+    text = ("import sys\nfrom rf_checks.lab import Lab\nlab = Lab('<robot/>', walls=False)\n"
+            "lab._run([sys.executable, '-c', 'import signal; print(1, flush=True); "
             "signal.pause()'], None)\n"
-            "print(lab._processes[0].pid, flush=True)\nsys.stdin.read()\n")
-    with subprocess.Popen([sys.executable, "-c", text, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                          text=True) as judge:
-        pid = int(judge.stdout.readline())
+            "print(lab._processes[0].pid, lab.folder / 'output.txt', flush=True)\nsys.stdin.read()\n")
+    with subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                          env={**os.environ, "TMPDIR": str(tmp_path)}) as judge:
+        pid, output = judge.stdout.readline().split()
+        pid = int(pid)
         assert is_alive(pid)
-        wait_until(lambda: (tmp_path / "output.txt").read_text(), "the lab to have started")
+        wait_until(Path(output).read_text, "the lab to have started")
         judge.kill()
     wait_until(lambda: not is_alive(pid), "the end of the lab")
 

@@ -104,7 +104,7 @@ START = mistakes.rotation_of(0.052, -0.381, 0.923, -0.015)
 
 
 @pytest.mark.parametrize("axis", "xyz")
-def test_slips_of_a_rotation_differ_from_what_is_right_and_from_each_other(axis):
+def test_mistakes_of_a_rotation_differ_from_what_is_right_and_from_each_other(axis):
     angle = math.pi / 2
     right = START @ mistakes.about(axis, angle)
     wrong = mistakes.wrong_rotations(START, axis, angle)
@@ -129,7 +129,7 @@ NOTES = ["right_s0", "right_e1", "right_e1", "right_w0", "right_w1", "right_w1"]
     (["right_s0"], [0.1, 0.2], "lengths", ["1 name", "2 values"]),
     (["left_s0", "left_s1"], [45.0, -30.0], "degrees", ["left_s0", "45.0", "radians"]),
 ])
-def test_slips_of_a_command_are_named(names, values, key, words):
+def test_mistakes_of_a_command_are_named(names, values, key, words):
     found, sentence = mistakes.command_slip([("right", 1, ["right_s0"], [0.2]), ("right", 1, names, values)])
     assert found == key
     assert all(word in sentence for word in words)

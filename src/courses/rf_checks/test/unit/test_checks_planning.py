@@ -25,7 +25,7 @@ def run_of(call, boxes=(), moves=True, end=None, contacts=()):
     begin = np.array([call.posture[name] for name in JOINTS])
     goal = begin.copy()
     if moves:
-        goal[:7] = call.expected if end is None else end
+        goal[:7] = call.expected.goal if end is None else end
     records = []
     for k in range(200):
         share = k / 199
@@ -119,7 +119,7 @@ def test_the_straight_way_leads_through_the_pillar(call):
 
     robot = Robot(robot_description())
     begin = np.array([call.posture[name] for name in joint_names("left")])
-    way = [begin + share * (np.array(call.expected) - begin) for share in np.linspace(0.0, 1.0, 100)]
+    way = [begin + share * (np.array(call.expected.goal) - begin) for share in np.linspace(0.0, 1.0, 100)]
     points = np.array([robot.frame("left_gripper", dict(zip(joint_names("left"), q, strict=True)))[:3, 3] for q in way])
     inside = (np.abs(points - call.obstacle.middle) < 0.5 * np.array(call.obstacle.edges)).all(axis=1)
     assert inside.any() and not inside[0] and not inside[-1]
