@@ -226,6 +226,8 @@ class FakeHandle:
         self.controller, self.done = controller, threading.Event()
         self._publisher = publisher
         self._cancelled = threading.Event()
+        # No playback says anything once the next one has begun.
+        self._speaks = threading.Lock()
         rate = controller.options.get("rate")
         self._step = 1.0 / rate if isinstance(rate, (int, float)) and rate > 0.0 else _FAKE_STEP_S
 
@@ -258,7 +260,8 @@ class FakeHandle:
 
         while rospy.get_rostime() < trajectory.header.stamp and not over():
             time.sleep(TICK_S)
-        before.set()
+        with self._speaks:
+            before.set()
         kind = self.controller.options["type"]
         if kind == "interpolate":
             self._interpolate(trajectory, over)
@@ -270,7 +273,7 @@ class FakeHandle:
                     time.sleep(TICK_S)
                 if over():
                     break
-                self._say(trajectory.joint_names, point.positions)
+                self._say(trajectory.joint_names, point.positions, over)
         done.set()
 
     def _interpolate(self, trajectory: JointTrajectory, over: Callable[[], bool]) -> None:
@@ -279,17 +282,19 @@ class FakeHandle:
             now = rospy.get_time() - begin
             after = next((i for i, point in enumerate(points) if point.time_from_start.to_sec() > now), len(points))
             if after == len(points):
-                self._say(trajectory.joint_names, points[-1].positions)
+                self._say(trajectory.joint_names, points[-1].positions, over)
                 return
             if after > 0:
                 a, b = points[after - 1], points[after]
                 share = (now - a.time_from_start.to_sec()) / (b.time_from_start - a.time_from_start).to_sec()
                 self._say(trajectory.joint_names, [p + share * (q - p)
-                                                   for p, q in zip(a.positions, b.positions, strict=True)])
+                                                   for p, q in zip(a.positions, b.positions, strict=True)], over)
             time.sleep(self._step)
 
-    def _say(self, names: Sequence[str], positions: Sequence[float]) -> None:
-        self._publisher.publish(_joint_state(names, positions))
+    def _say(self, names: Sequence[str], positions: Sequence[float], over: Callable[[], bool]) -> None:
+        with self._speaks:
+            if not over():
+                self._publisher.publish(_joint_state(names, positions))
 
 
 def _joint_state(names: Iterable[str], positions: Iterable[float]) -> JointState:

@@ -360,6 +360,27 @@ def test_fake_controllers_come_to_the_end(kind):
     assert list(one._publisher[-1].position) == [1.0, 0.5] and one._publisher[-1].name == JOINTS
 
 
+def test_a_fake_controllers_old_way_says_nothing_after_the_new_one(monkeypatch):
+    """Also where the old one's thread is held up while it speaks."""
+    one, said, new_has_spoken = fake("interpolate", rate=1000), [], threading.Event()
+
+    def publish(message):
+        if message.position[0] >= 0.0 and not said:
+            new_has_spoken.wait(0.3)  # in vain: the new one waits for this
+        said.append(message.position[0])
+        if message.position[0] < 0.0:
+            new_has_spoken.set()
+
+    monkeypatch.setattr(one._publisher, "publish", publish)
+    one.send(trajectory(LONG_S).joint_trajectory)
+    new = trajectory(0.01, positions=[-3.0, 0.0]).joint_trajectory
+    new.points = new.points[1:]
+    one.send(new)
+    assert one.done.wait(PATIENCE_S)
+    wait_until(lambda: len(said) >= 2, "both to have spoken")
+    assert said[-1] == -3.0
+
+
 def test_a_fake_controller_that_was_cancelled_plays_what_comes_next():
     one = fake("interpolate", rate=0.001)  # sleeps for longer than the test
     one.send(trajectory(LONG_S).joint_trajectory)
