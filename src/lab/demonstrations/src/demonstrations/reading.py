@@ -13,7 +13,7 @@ from . import layout
 from .films import frame_count, frames_of
 from .frames import DemonstrationError, Episode
 from .needed import need
-from .statistics import NAMES, Statistics
+from .statistics import NAMES, Statistics, from_lists, joined
 
 
 def _read_table(path: Path, columns: list[str] | None = None) -> Any:
@@ -36,6 +36,30 @@ def read_tasks(folder: Path) -> list[str]:
     return [task for _, task in rows]
 
 
+def statistics_of(folder: Path, episodes: int) -> dict[str, Statistics] | None:
+    """{key: of all frames} of the first episodes, joined from what is said of each; None where an episode's cannot be
+    read."""
+    found: dict[str, Statistics] = {}
+    count = 0
+    for path in sorted((folder / "meta/episodes").glob("chunk-*/file-*.parquet")):
+        try:
+            rows = _read_table(path).to_pylist()
+        except DemonstrationError:
+            return None
+        for row in rows[:episodes - count]:
+            count += 1
+            said: dict[str, dict[str, Any]] = {}
+            for column, value in row.items():
+                if column.startswith("stats/"):
+                    key, name = column[len("stats/"):].rsplit("/", 1)
+                    said.setdefault(key, {})[name] = value
+            for key, part in from_lists(said).items():
+                if not set(NAMES) <= set(part):
+                    return None
+                found[key] = joined([found[key], part]) if key in found else part
+    return found if count == episodes else None
+
+
 class DataSet:
     """A set in a folder. Attributes: `folder`, `schema`, `tasks`. len() is the number of its episodes. Raises
     DemonstrationError, which names the file, also from its methods."""
@@ -45,7 +69,7 @@ class DataSet:
     def __init__(self, folder: Path):
         self.folder = Path(folder)
         self.schema, self._info = layout.schema_of(self.folder)
-        self.tasks = read_tasks(self.folder)
+        self.tasks = read_tasks(self.folder) if len(self) else []
         self._rows = self._episode_rows()
         self._outcomes = layout.outcomes_of(self.folder)
         self._data: tuple[tuple[int, int], Any] | None = None

@@ -62,6 +62,8 @@ class SetWriter:
 
     def _continue(self):
         found, info = layout.schema_of(self.folder)
+        if not info["total_episodes"]:
+            return  # nothing that new frames must fit
         if found.rate_hz != self.schema.rate_hz or dict(found.features) != dict(self.schema.features):
             raise DemonstrationError("%s has other frames: %d Hz, %s; new ones have %d Hz, %s" % (
                 self.folder, found.rate_hz, _listed(found.features), self.schema.rate_hz,
@@ -69,12 +71,15 @@ class SetWriter:
         if found.about.get("task") != self.schema.about.get("task"):
             raise DemonstrationError("%s is of the task %s; new episodes are of %s" % (
                 self.folder, found.about.get("task"), self.schema.about.get("task")))
-        from .reading import read_tasks
+        from .reading import read_tasks, statistics_of
 
         self.episodes, self._frames = info["total_episodes"], info["total_frames"]
         self._tasks = read_tasks(self.folder)
         if (self.folder / layout.STATISTICS).is_file():
             self._statistics = from_lists(layout.read_json(self.folder / layout.STATISTICS))
+        counts = {int(part["count"][0]) for key, part in self._statistics.items() if key not in self.schema.cameras}
+        if counts != {self._frames}:  # a recorder was ended between this file and the one that counts the episodes
+            self._statistics = statistics_of(self.folder, self.episodes) or self._statistics
 
     def _begin(self):
         self._rows = {key: [] for key, feature in self.schema.features.items() if not feature.is_picture}
@@ -165,6 +170,9 @@ class SetWriter:
                     "index": self._frames + np.arange(length), "task_index": np.full(length, tasks.index(task))}
         statistics = {key: of_numbers(values.reshape(length, -1)) for key, values in columns.items()}
         statistics |= {key: pictures.result() for key, pictures in self._pictures.items()}
+        if not number:  # from now on the folder is a set, without episodes until this one is complete
+            layout.write_json(self.folder / layout.ABOUT, layout.about_of(self.schema))
+            layout.write_json(self.folder / layout.INFO, layout.info_of(self.schema, 0, 0, 0))
         self._move_films(place)
         layout.write_whole(self.folder / (layout.DATA % place), lambda draft: _write_data(draft, self.schema, columns))
         layout.write_whole(self.folder / (layout.EPISODES % place),

@@ -201,29 +201,50 @@ from test_data_set import SCHEMA, episode
 from demonstrations.writing import SetWriter
 from demonstrations import layout
 writer = SetWriter(Path(sys.argv[1]), SCHEMA)
-writer.add(episode(5, 0)); writer.add(episode(3, 1))
-name = sys.argv[2]
-write_json = layout.write_json
-def killed(path, value):
-    if path.name == name:
+for seed in range(int(sys.argv[3])):
+    writer.add(episode(5, seed))
+write_whole = layout.write_whole
+def killed(path, write):
+    if path.match(sys.argv[2]) and (path.name != "info.json" or (path.parent / "stats.json").exists()):
         os.kill(os.getpid(), signal.SIGKILL)
-    write_json(path, value)
-layout.write_json = killed
-writer.add(episode(7, 2))
+    write_whole(path, write)
+layout.write_whole = killed
+writer.add(episode(7, seed=7))
 """
+
+
+def killed_at(folder, name, before):
+    """A recorder is killed when it would write this file of the episode after `before` others."""
+    here = os.path.dirname(__file__)
+    program = [sys.executable, "-c", RECORD % [here, *sys.path], str(folder), name, str(before)]
+    done = subprocess.run(program, timeout=60)
+    assert done.returncode == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("name", ["info.json", "stats.json"])
 def test_a_killed_recorder_leaves_the_complete_episodes(tmp_path, name):
-    here = os.path.dirname(__file__)
-    done = subprocess.run([sys.executable, "-c", RECORD % [here, *sys.path], str(tmp_path), name], timeout=60)
-    assert done.returncode == -signal.SIGKILL
+    killed_at(tmp_path, name, 2)
     found = survey(tmp_path)
     assert found.good == [0, 1] and found.strays == ["data/chunk-000/file-002.parquet"]
     with SetWriter(tmp_path, SCHEMA) as writer:
         writer.add(episode(6, 8))
     data = DataSet(tmp_path)
     assert survey(tmp_path).strays == [] and [data.episode(number).seed for number in range(3)] == [0, 1, 8]
+    filled_at_once = tmp_path / "at_once"
+    with SetWriter(filled_at_once, SCHEMA) as writer:
+        for length, seed in ((5, 0), (5, 1), (6, 8)):
+            writer.add(episode(length, seed))
+    assert (tmp_path / layout.STATISTICS).read_text() == (filled_at_once / layout.STATISTICS).read_text()
+
+
+@pytest.mark.parametrize("name", ["data/*/*.parquet", "tasks.parquet", "info.json"])
+def test_a_recorder_killed_in_its_first_episode_leaves_a_folder_to_record_into(tmp_path, name):
+    killed_at(tmp_path, name, 0)
+    data = DataSet(tmp_path)
+    assert (len(data), data.seeds, survey(tmp_path).good) == (0, [], [])
+    with SetWriter(tmp_path, SCHEMA) as writer:
+        writer.add(episode(6, 8))
+    assert survey(tmp_path).good == [0] and DataSet(tmp_path).episode(0).seed == 8
 
 
 def test_a_full_disk_costs_the_present_episode_alone(tmp_path):
