@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-import actionlib
 import rospy
+from actionlib.action_server import ActionServer
 from actionlib.status_tracker import StatusTracker
 from actionlib_msgs.msg import GoalID, GoalStatus
 from std_msgs.msg import Header
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 _HEADER_SIZE = 16
 
 
-class TrajServer(actionlib.ActionServer):
-    """``actionlib.ActionServer`` of one ``versions.Version``; a client of the other version gets a log line on both
+class TrajServer(ActionServer):
+    """The action server of one ``versions.Version``; a client of the other version gets a log line on both
     sides."""
 
     def __init__(self, name: str, version: Version, goal_callback: Callable[..., Any],

@@ -2,7 +2,8 @@
 """The curve through the points of a goal: its polynomials and times. Free of ROS."""
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,14 +12,17 @@ from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, constant, splines
 
 from .optimal import time_optimal
 
+if TYPE_CHECKING:
+    from joint_trajectory.command import Point
 
-def has_positions_only(points: list[tuple[float, list[float], list[float], list[Any]]]) -> bool:
+
+def has_positions_only(points: Sequence[Point]) -> bool:
     """Whether no point of ``points``, rows (time, positions, velocities, accelerations), has more than positions."""
     return not any(len(point[2]) or len(point[3]) for point in points)
 
 
-def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[float], list[Any]]],
-                start: np.ndarray | None, interpolation: str) -> Trajectory:
+def interpolate(times: np.ndarray, points: Sequence[Point], start: np.ndarray | None,
+                interpolation: str) -> Trajectory:
     """The :class:`Trajectory` from ``start`` (k,) [rad], or from point 0 if that is None, through the points.
 
     ``times`` (m,) [s], increasing. From a ``start`` the curve begins at rest, and a point at time 0 is replaced by it.
@@ -27,8 +31,8 @@ def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[f
     """
     positions = np.array([point[1] for point in points], dtype=float)
     velocities, accelerations = (
-        np.array([point[field] if len(point[field]) else np.zeros(len(point[1])) for point in points], dtype=float)
-        for field in (2, 3))
+        np.array([row if len(row) else np.zeros(positions.shape[1]) for row in rows], dtype=float)
+        for rows in ([point[2] for point in points], [point[3] for point in points]))
     degrees = np.array([_degree(point) for point in points])
     if start is not None:
         first = 1 if times[0] == 0.0 else 0
@@ -54,14 +58,14 @@ def interpolate(times: np.ndarray, points: list[tuple[float, list[float], list[f
     return _with_end(times, pieces, positions[-1])
 
 
-def joined(lead_in: Any, way: Any) -> Trajectory:
+def joined(lead_in: Trajectory, way: Trajectory) -> Trajectory:
     """``way`` after ``lead_in``, both :class:`Trajectory` from time 0 on."""
     delay = lead_in.end_time
     return Trajectory(np.concatenate([lead_in.starts[:-1], way.starts + delay]),
                       np.concatenate([lead_in.coefficients[:-1], way.coefficients]), way.end_times + delay)
 
 
-def fastest(start: np.ndarray, points: list[tuple[float, list[float], list[Any], list[Any]]], velocity: np.ndarray,
+def fastest(start: np.ndarray, points: Sequence[Point], velocity: np.ndarray,
             acceleration: np.ndarray) -> Trajectory:
     """The time-optimal :class:`Trajectory` from ``start`` (k,) through the positions of the points."""
     return time_optimal(np.concatenate([start[None], [point[1] for point in points]]), velocity, acceleration)
@@ -71,7 +75,7 @@ def _with_end(times: np.ndarray, pieces: np.ndarray, end: np.ndarray) -> Traject
     return Trajectory(times, np.concatenate([pieces, constant(end)[None]]), np.full(len(end), times[-1]))
 
 
-def _degree(point: tuple[float, list[float], list[float], list[Any]]) -> int:
+def _degree(point: Point) -> int:
     if not len(point[2]):
         return LINEAR
     return QUINTIC if len(point[3]) else CUBIC

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from baxter_traj_streamer.settings import StreamerSettings
     from baxter_traj_streamer.versions import Version
 
-    from .judging import JointLimit
+    from .judging import JointLimit, Plan
     from .robot_link import RobotLink
 
 ACTION_NAME = "trajActionServer"
@@ -69,16 +69,19 @@ class Interpolator:
     # -- rospy's threads ------------------------------------------------------------------------------------------
 
     def _on_goal(self, handle: Any) -> None:
-        try:
+        def check(is_busy: bool) -> None:
             # While an arm moves, the start of this goal is unknown; it is checked when the goal starts.
-            self._goals.put(handle, lambda is_busy: self._judge(handle, None if is_busy else self._robot.angles()))
+            self._judge(handle, None if is_busy else self._robot.angles())
+
+        try:
+            self._goals.put(handle, check)
         except GoalRefused as refusal:
             rospy.logwarn("goal refused: %s", refusal)
             handle.set_rejected(self._result(handle), str(refusal))
 
     # -- the loop -------------------------------------------------------------------------------------------------
 
-    def _judge(self, handle: Any, measured: Any):
+    def _judge(self, handle: Any, measured: dict[str, float] | None) -> Plan:
         why = self._robot.why_not_ready()
         if why:
             raise GoalRefused("robot", why)
@@ -100,7 +103,7 @@ class Interpolator:
             rospy.logwarn("goal %d: %s", self._count, text)
         end(self._result(handle), text)
 
-    def _stream(self, handle: Any, plan, resets: int, stops: int):
+    def _stream(self, handle: Any, plan: Plan, resets: int, stops: int):
         """Move the arms; returns how the goal ends: the handle's method, and a text.
 
         resets, stops: how many of each the robot had seen before ``plan`` was made.

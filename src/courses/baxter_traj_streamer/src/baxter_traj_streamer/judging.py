@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .settings import SIDES, arm_joint_names
 
 if TYPE_CHECKING:
     from baxter_traj_streamer.settings import StreamerSettings
+    from joint_trajectory.command import Point
 
 KNOWN_JOINTS = tuple(name for side in SIDES for name in arm_joint_names(side))
 RIGHT_ARM = tuple(arm_joint_names("right"))
@@ -39,7 +40,7 @@ class JointLimit(NamedTuple):
 class Plan(NamedTuple):
     """The plan of an accepted goal: ``joint_names`` (k), ``trajectory`` from time 0 on, ``goal`` (k,) [rad]."""
 
-    joint_names: tuple
+    joint_names: tuple[str, ...]
     trajectory: Trajectory
     goal: np.ndarray
 
@@ -48,8 +49,8 @@ class Plan(NamedTuple):
         return self.trajectory.end_time
 
 
-def judge(joint_names: Sequence[str], points: Any,
-          limits: dict[str, JointLimit], measured: dict[str, float] | None, settings: StreamerSettings) -> Plan:
+def judge(joint_names: Sequence[str], points: Sequence[Point], limits: Mapping[str, JointLimit],
+          measured: Mapping[str, float] | None, settings: StreamerSettings) -> Plan:
     """Make a :class:`Plan`, or raise :class:`GoalRefused`.
 
     joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
@@ -123,8 +124,7 @@ def _judge_names(names: tuple[str, ...]) -> None:
             raise GoalRefused("joints", "joint_names has %s more than once" % name, joint=name)
 
 
-def _judge_numbers(index: int, point: tuple[float, list[float], list[float], list[Any]],
-                   names: tuple[str, ...]) -> None:
+def _judge_numbers(index: int, point: Point, names: tuple[str, ...]) -> None:
     if not math.isfinite(point[0]):
         raise GoalRefused("number", "point %d: time_from_start is %r, not a finite number" % (index, point[0]), index,
                           value=point[0])
@@ -156,8 +156,8 @@ def _judge_times(times: np.ndarray, settings: StreamerSettings) -> None:
             index, times[index], settings.max_duration_s), index, None, times[index], settings.max_duration_s)
 
 
-def _start(names: tuple[str, ...], first: np.ndarray, limits: dict[str, JointLimit],
-           measured: dict[str, float] | None) -> np.ndarray:
+def _start(names: tuple[str, ...], first: np.ndarray, limits: Mapping[str, JointLimit],
+           measured: Mapping[str, float] | None) -> np.ndarray:
     """(k,) [rad]: the robot's position, or, if that is unknown, the position within the limits nearest to ``first``."""
     for name in names:
         if name not in limits:
@@ -170,7 +170,7 @@ def _start(names: tuple[str, ...], first: np.ndarray, limits: dict[str, JointLim
     return np.clip(first, [limits[name].lower for name in names], [limits[name].upper for name in names])
 
 
-def _bounds(names: tuple[str, ...], limits: dict[str, JointLimit], start: np.ndarray, slack: float) -> np.ndarray:
+def _bounds(names: tuple[str, ...], limits: Mapping[str, JointLimit], start: np.ndarray, slack: float) -> np.ndarray:
     """(3, k): lower, upper, velocity; a joint that is beyond its limit may stay there, but not go farther."""
     table = np.array([limits[name] for name in names]).T
     table[0] = np.minimum(table[0], start) - slack

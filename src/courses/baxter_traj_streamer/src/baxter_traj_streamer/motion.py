@@ -25,7 +25,8 @@ class Motion:
         self.plan = plan
         self._start_time = start_time
         self._stop_deceleration = stop_deceleration
-        self._stop_time = None
+        # Infinity: nothing stops it.
+        self._stop_time = math.inf
         self._stop_duration_s = 0.0
 
     def positions(self, time_s: float) -> np.ndarray:
@@ -34,7 +35,7 @@ class Motion:
 
     def stop(self, time_s: float) -> None:
         """Come to rest from ``time_s`` on, which must not be before the last queried time."""
-        if self._stop_time is not None:
+        if self.stopping:
             return
         here = self._way_time(time_s)
         rest = np.linspace(here, max(here, self.plan.duration_s), _PLACES)
@@ -45,13 +46,11 @@ class Motion:
     @property
     def stopping(self) -> bool:
         """Whether :meth:`stop` was called."""
-        return self._stop_time is not None
+        return self._stop_time < math.inf
 
     def is_at_rest(self, time_s: float) -> bool:
         """Whether the motion is over: at its end, or after a stop."""
-        if self.stopping and time_s >= self._stop_time + self._stop_duration_s:
-            return True
-        return self._way_time(time_s) >= self.plan.duration_s
+        return time_s >= self._stop_time + self._stop_duration_s or self._way_time(time_s) >= self.plan.duration_s
 
     def percent(self, time_s: float) -> int:
         """Share of the path's time that has passed, 0 to 100."""
@@ -61,7 +60,7 @@ class Motion:
 
     def _way_time(self, time_s: float) -> float:
         """Time along the path [s], not below 0."""
-        if self._stop_time is None:
+        if not self.stopping:
             return max(0.0, time_s - self._start_time)
         since = min(time_s - self._stop_time, self._stop_duration_s)
         here = max(0.0, self._stop_time - self._start_time)

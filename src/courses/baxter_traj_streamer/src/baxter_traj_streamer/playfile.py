@@ -111,7 +111,7 @@ def check(playfiles: Mapping[str, Playfile], limits: Mapping[str, JointLimit], s
         raise PlayfileError("%s: %s" % (where, refusal)) from refusal
 
 
-def _numbers(fields: Sequence[str], source: str, line: str | int):
+def _numbers(fields: Sequence[str], source: str, line: int) -> list[float]:
     if len(fields) != _COLUMNS:
         raise PlayfileError("%s, line %d has %s, expected %d: %s, arrival time" % (
             source, line, counted(len(fields), "number"), _COLUMNS, ", ".join(JOINTS)))

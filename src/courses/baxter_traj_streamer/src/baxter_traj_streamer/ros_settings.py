@@ -29,7 +29,8 @@ def read_settings(changes: str | None = None) -> StreamerSettings:
 
 def _read(name: str) -> dict[str, Any]:
     path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / name
-    return yaml.safe_load(path.read_text(encoding="utf-8"))
+    settings: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return settings
 
 
 def read_limits() -> dict[str, JointLimit]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,14 @@ class LeavesReach(ValueError):
         self.reached_m, self.length_m = reached_m, length_m
 
 
+class _NoNext(Exception):
+    """There is no next solution on the branch; `is_beyond`: nor on any other. The text says why."""
+
+    def __init__(self, why: str, is_beyond: bool = False) -> None:
+        super().__init__(why)
+        self.is_beyond = is_beyond
+
+
 class StraightLine(NamedTuple):
     """``distances`` (m,) [m] along the line and the ``positions`` (m, n) [rad] of the joints there."""
 
@@ -45,7 +53,7 @@ class StraightLine(NamedTuple):
         The tip speeds up, continues at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
         ``acceleration`` [rad/s^2] (n,) allow along the whole line.
         """
-        slope = np.gradient(self.positions, self.distances, axis=0, edge_order=min(2, len(self.distances) - 1))
+        slope = np.gradient(self.positions, self.distances, axis=0, edge_order=2 if len(self.distances) > 2 else 1)
         bend = np.abs(np.gradient(slope, self.distances, axis=0)).max(axis=0)
         steepest = np.abs(slope).max(axis=0)
         with np.errstate(divide="ignore"):
@@ -85,37 +93,37 @@ def straight_line(chain: Chain, start: Sequence[float] | np.ndarray,
         left = length - distances[-1]
         distance = length if left <= 1.5 * step else distances[-1] + step
         pose[:3, 3] = origin + displacement * (distance / length)
-        found, why, is_beyond = _next(chain, pose, path[-1])
-        if not why:
+        try:
+            path.append(_next(chain, pose, path[-1]))
+        except _NoNext as why:
+            if why.is_beyond:
+                beyond, beyond_m = str(why), distance
+            if step <= _SHORTEST_STEP_M:
+                # Near the end of its reach an arm first turns fast or needs another configuration, then has no
+                # solution: the latter is the better reason.
+                raise LeavesReach(distances[-1], length,
+                                  beyond if beyond_m - distances[-1] <= usual else str(why)) from None
+            step /= 2.0
+        else:
             distances.append(distance)
-            path.append(found)
             step = min(2.0 * step, usual)
-            continue
-        if is_beyond:
-            beyond, beyond_m = why, distance
-        if step <= _SHORTEST_STEP_M:
-            # Near the end of its reach an arm first turns fast or needs another configuration, then has no solution:
-            # the latter is the better reason.
-            raise LeavesReach(distances[-1], length, beyond if beyond_m - distances[-1] <= usual else why)
-        step /= 2.0
     return StraightLine(np.array(distances), np.array(path))
 
 
-def _next(chain: Any, pose: np.ndarray, before: np.ndarray):
-    """(the solution for ``pose`` or None, why there is none on the branch of ``before`` or "", whether there is none on
-    any branch)."""
+def _next(chain: Chain, pose: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """The solution (n,) for ``pose`` on the branch of ``before``. Raises _NoNext."""
     try:
         found = solve(chain, pose, before, budget=_BUDGET).q
     except NoSolution as error:
         if error.reason is not Reason.NOT_CONVERGED:
-            return None, str(error), True
+            raise _NoNext(str(error), is_beyond=True) from None
         stuck = [name for name, angle, low, high in zip(chain.joint_names, error.best, chain.lower, chain.upper,
                                                         strict=True) if not low + _STUCK < angle < high - _STUCK]
-        return None, "this way of holding the arm ends here%s; start in another posture" % (
-            ", with %s at its limit" % ", ".join(stuck) if stuck else ""), False
+        raise _NoNext("this way of holding the arm ends here%s; start in another posture" % (
+            ", with %s at its limit" % ", ".join(stuck) if stuck else "")) from None
     turn = np.abs(found - before)
     joint = int(turn.argmax())
-    if turn[joint] <= _SAME_BRANCH:
-        return found, "", False
-    return found, "%s would have to turn by %.3f rad at once, to another way of holding the arm; start in another " \
-        "posture" % (chain.joint_names[joint], turn[joint]), False
+    if turn[joint] > _SAME_BRANCH:
+        raise _NoNext("%s would have to turn by %.3f rad at once, to another way of holding the arm; start in another "
+                      "posture" % (chain.joint_names[joint], turn[joint]))
+    return found

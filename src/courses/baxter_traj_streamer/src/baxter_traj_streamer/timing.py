@@ -2,6 +2,8 @@
 """Arrival times of paths. Free of ROS."""
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-def transition_time(difference: np.ndarray, velocity: np.ndarray, scale: float = 1.0) -> float:
+def transition_time(difference: ArrayLike, velocity: ArrayLike, scale: float = 1.0) -> float:
     """Shortest time [s] in which all joints can move by ``difference`` (n,) [rad], without acceleration limits.
 
     ``velocity`` (n,) [rad/s]: limits, multiplied by ``scale``. Raises ValueError for sizes that differ or numbers that
@@ -25,10 +27,10 @@ def transition_time(difference: np.ndarray, velocity: np.ndarray, scale: float =
     return float(np.max(np.abs(difference) / (velocity * scale)))
 
 
-def arrival_times(path: ArrayLike, velocity: ArrayLike, min_segment_s: float) -> list[float]:
+def arrival_times(path: Iterable[ArrayLike], velocity: ArrayLike, min_segment_s: float) -> list[float]:
     """Arrival times at m poses ``path`` (m, n) [rad]: list of m times [s], the first 0. Raises ValueError."""
     times = [0.0]
-    for here, there in zip(path[:-1], path[1:], strict=True):
+    for here, there in itertools.pairwise(path):
         step = transition_time(np.subtract(there, here), velocity)
         times.append(times[-1] + max(step, min_segment_s))
     return times

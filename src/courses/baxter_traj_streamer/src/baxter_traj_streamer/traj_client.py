@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rospy
+from actionlib.action_client import get_name_of_constant
 from actionlib_msgs.msg import GoalStatus
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -17,7 +18,7 @@ from baxter_interface.waiting import FIRST_NOTICE_S
 
 from .interpolator import ACTION_NAME
 from .streamer import BaxterTrajStreamer
-from .versions import VERSIONS
+from .versions import VERSIONS, Version
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,7 +31,7 @@ class MoveFailed(Exception):
     """The goal was not reached; the text says why. ``status``: of actionlib_msgs/GoalStatus."""
 
     def __init__(self, status: int, text: str) -> None:
-        super().__init__("the goal ended as %s: %s" % (GoalStatus.to_string(status), text))
+        super().__init__("the goal ended as %s: %s" % (get_name_of_constant(GoalStatus, status), text))
         self.status = status
 
 
@@ -82,7 +83,7 @@ class TrajClient:
 
     def __init__(self) -> None:
         self.streamer = BaxterTrajStreamer()
-        self._action = self._version = None
+        self._found: tuple[actionlib.ActionClient, Version] | None = None
 
     def wait_until_ready(self) -> None:
         """Wait for the server and for the robot to be enabled, in any order, and print what it waits for.
@@ -91,21 +92,28 @@ class TrajClient:
         """
         self._wait("%s: rosrun baxter_traj_streamer traj_interpolator_as" % ACTION_NAME, self._connect)
         self._wait("%s to answer" % ACTION_NAME,
-                   lambda: self._action.wait_for_server(rospy.Duration(_POLL_S)))
+                   lambda: self._server[0].wait_for_server(rospy.Duration.from_sec(_POLL_S)))
         if why := self.streamer.robot.why_not_ready():
             self._wait("the robot: %s" % why, lambda: not self.streamer.robot.why_not_ready())
 
+    @property
+    def _server(self) -> tuple[actionlib.ActionClient, Version]:
+        """The client of the server, and their version of the action. Raises RuntimeError before `wait_until_ready`."""
+        if self._found is None:
+            raise RuntimeError("no server is known yet: call wait_until_ready() first")
+        return self._found
+
     def _connect(self) -> bool:
         """Use the server's version of the action; returns whether there is a server."""
-        if self._action is None:
+        if self._found is None:
             kind = dict(rospy.get_published_topics()).get(rospy.resolve_name(ACTION_NAME + "/result"))
-            self._version = next((each for each in VERSIONS.values() if kind == each.name + "ActionResult"), None)
-            if kind is not None and self._version is None:
+            version = next((each for each in VERSIONS.values() if kind == each.name + "ActionResult"), None)
+            if version is not None:
+                self._found = actionlib.ActionClient(ACTION_NAME, version.action), version
+            elif kind is not None:
                 raise ValueError("%s serves %s; this program speaks %s" % (
                     ACTION_NAME, kind.removesuffix("ActionResult"), " and ".join(VERSIONS)))
-            if self._version is not None:
-                self._action = actionlib.ActionClient(ACTION_NAME, self._version.action)
-        return self._action is not None
+        return self._found is not None
 
     def _wait(self, what: str, is_there: Callable[[], bool]) -> None:
         begin_s = time.monotonic()
@@ -125,7 +133,8 @@ class TrajClient:
 
         The arms continue when this program ends; see the setting stop_when_client_leaves.
         """
-        return SentGoal(self._action, self._version.make_goal(trajectory, traj_id), feedback)
+        client, version = self._server
+        return SentGoal(client, version.make_goal(trajectory, traj_id), feedback)
 
     def move(self, trajectory: JointTrajectory, timeout_s: float | None = None) -> Any:
         """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.
@@ -151,15 +160,16 @@ def _raise_if_interrupted() -> None:
         raise rospy.ROSInterruptException("ROS is shutting down")
 
 
-def joint_trajectory(joint_names: Sequence[str], times: np.ndarray | None, positions: Any,
-                     velocities: Any | None = None) -> JointTrajectory:
+def joint_trajectory(joint_names: Sequence[str], times: Sequence[float] | np.ndarray | None,
+                     positions: Iterable[Sequence[float] | np.ndarray],
+                     velocities: np.ndarray | None = None) -> JointTrajectory:
     """The message: ``times`` (m,) [s], or None to let the server choose them, ``positions``, ``velocities`` (m, k)."""
-    trajectory = JointTrajectory(joint_names=list(joint_names))
+    points = []
     for index, row in enumerate(positions):
         point = JointTrajectoryPoint(positions=list(row))
         if times is not None:
             point.time_from_start = rospy.Duration.from_sec(float(times[index]))
         if velocities is not None:
             point.velocities = list(velocities[index])
-        trajectory.points.append(point)
-    return trajectory
+        points.append(point)
+    return JointTrajectory(joint_names=list(joint_names), points=points)
