@@ -2,9 +2,14 @@
 """Waving: a pose held up, and a sine on top of it. Free of ROS."""
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from baxter_model import arm_angles
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 # The left arm with its hand up [rad].
 HANDS_UP = {"s0": -0.3, "s1": -1.2, "e0": 0.0, "e1": 1.2, "w0": 0.0, "w1": -1.4, "w2": 0.0}
@@ -28,7 +33,7 @@ def shifts(side: str, amplitude_m: float, count: int) -> np.ndarray:
 class Swing:
     """Joint angles along a closed path, as a function of time."""
 
-    def __init__(self, rows: np.ndarray, period_s: float) -> None:
+    def __init__(self, rows: ArrayLike, period_s: float) -> None:
         """`rows`: (n, joints) angles [rad] at even times within `period_s` [s]; the first one is the start.
 
         Raises ValueError for invalid rows or an invalid period.
