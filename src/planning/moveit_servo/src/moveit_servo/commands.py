@@ -64,15 +64,15 @@ class Commands:
         twist = _bounded(np.where(self.control, twist, 0.0))
         self._twist = _Newest(since, twist if twist.any() else None, frame)
 
-    def take_jog(self, names: Any, velocities: Any, since: float, settings: ServoSettings) -> list[str]:
-        """Velocities of joints; return names that are not the arm's. Raises CommandIgnored; then nothing moves."""
+    def take_jog(self, names: Any, velocities: Any, since: float, settings: ServoSettings) -> str:
+        """Velocities of joints; return what of them is not carried out, or "". Raises CommandIgnored; then nothing
+        moves."""
         self._jog = _Newest(since)
         names, values = list(names), np.array(velocities, dtype=float)
         if not np.isfinite(values).all():
             raise CommandIgnored("joint velocities are not finite: %s" % values.tolist())
         if len(values) < len(names):
-            raise CommandIgnored("a joint command has %s but %s" % (counted(len(names), "name"),
-                                                                    counted(len(values), "velocitie")))
+            raise CommandIgnored("a joint command has %s but %s" % _counts(names, values))
         scale = settings.joint_scale if settings.command_in_type == UNITLESS else 1.0
         wanted, foreign = np.zeros(len(self.joints)), []
         for name, value in zip(names, values, strict=False):
@@ -82,7 +82,12 @@ class Commands:
                 foreign.append(name)
         # A command without a known joint is one, too: MoveIt publishes set-points for it.
         self._jog = _Newest(since, scale * _bounded(wanted) if values.any() else None)
-        return foreign
+        if len(values) > len(names):
+            return "a joint command has %s but %s; those without a name are ignored" % _counts(names, values)
+        if foreign:
+            return "joint commands name %s; the arm's joints are %s" % (
+                ", ".join(name or "''" for name in foreign), ", ".join(self.joints))
+        return ""
 
     def take_pose(self, pose: np.ndarray, since: float) -> None:
         """A pose (4, 4) of the tip in the model's frame."""
@@ -120,6 +125,10 @@ def bounded_pose(pose: np.ndarray) -> np.ndarray:
     pose = pose.copy()
     pose[:3, 3] = _bounded(pose[:3, 3])
     return pose
+
+
+def _counts(names: list, values: np.ndarray) -> tuple[str, str]:
+    return counted(len(names), "name"), counted(len(values), "velocity", "velocities")
 
 
 def _bounded(values: np.ndarray) -> np.ndarray:

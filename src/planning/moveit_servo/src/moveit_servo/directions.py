@@ -29,11 +29,14 @@ _MIN_WEIGHT, _FREE_WEIGHT = 0.1, 0.05
 # By which factor a singular direction may slow the whole motion down; and the time in which the way to the singularity
 # would be covered at the speed there [s].
 _MAX_SLOWING, _BRAKING_S = 3.0, 0.3
+# Share of a twist's square below which nothing of it is left: an arm of less than six joints lacks directions.
+_NOTHING = 1e-18
 
 
 class Wanted(NamedTuple):
     """velocity (k,) of the joints; metric (k, k): how much a deviation from it counts; lost, share of the twist that a
-    singularity takes, 0 to 1; condition: ratio of the largest singular value to the least."""
+    singularity takes of what the joints can do, 0 to 1, and 1 where they can do nothing of it; condition: ratio of the
+    largest singular value to the least."""
 
     velocity: np.ndarray
     metric: np.ndarray
@@ -85,13 +88,13 @@ def velocity_for(twist, jacobian, arm, q, thresholds):
     jacobian (r, k): that of the Arm at ``q`` (k,). thresholds: Thresholds.
     """
     left, values, right = np.linalg.svd(jacobian)
-    rank, k = len(values), len(q)
+    rank, k, rows = len(values), len(q), len(twist)
     fading, gone = values[0] / max(thresholds.lower, 1.0), values[0] / max(thresholds.hard, thresholds.lower, 1.0)
     velocity, metric = np.zeros(k), np.zeros((k, k))
     size, lost = 0.0, 0.0
     for i in range(rank):
         part, value, along = 0.0, values[i], right[i]
-        for a in range(rank):
+        for a in range(rows):
             part += left[a, i] * twist[a]
         if value >= fading or abs(part) < 1e-9:
             rate = part / max(value, gone)
@@ -119,7 +122,9 @@ def velocity_for(twist, jacobian, arm, q, thresholds):
                 velocity[a] += effort * share * along[a]
                 for b in range(k):
                     metric[a, b] += (_FREE_WEIGHT * values[0]) ** 2 * along[a] * along[b]
-    return Wanted(velocity, metric, math.sqrt(lost / size) if size > 0.0 else 0.0, values[0] / max(values[-1], 1e-12))
+    whole = np.sum(twist * twist)
+    share = math.sqrt(lost / size) if size > _NOTHING * whole else 1.0 if whole > 0.0 else 0.0
+    return Wanted(velocity, metric, share, values[0] / max(values[-1], 1e-12))
 
 
 @compiled

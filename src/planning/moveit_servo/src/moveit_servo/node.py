@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import rosgraph.names
 import rospy
 from control_msgs.msg import JointJog
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -42,7 +43,7 @@ from moveit_servo.settings import ServoSettings, SettingsError, at_run_time
 from moveit_servo.surroundings import Surroundings
 from moveit_servo.telling import Telling, kind_of
 from moveit_servo.warming import warm_up
-from rospy_fixes.ports.event_log import EventLog
+from rospy_fixes.ports.event_log import EventLog, printable
 from rospy_fixes.ports.threads import ThreadFaults, lasting
 from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wait_for_param
 
@@ -50,14 +51,19 @@ from rospy_nodes.start import MissingParameter, end_on_signals, limit_ports, wai
 _DESCRIPTION_TIMEOUT_S, _JOINTS_TIMEOUT_S = 60.0, 10.0
 # Wall time between two looks at the parameters, at the scene, and at the reason of a status [s].
 _PARAMETERS_EVERY_S, _SCENE_EVERY_S, _REASON_EVERY_S = 1.0, 0.1, 0.25
+# Wall time after a command without a step that tells that ROS time stands still [s].
+_STANDS_S = 1.0
 # A step covers at most this many periods: after a pause the motion goes on where it was.
 _MAX_PERIODS = 3.0
-# A joint that is said to move faster [rad/s, m/s] says nothing of use.
-_MAX_SPEED = 1e3
+# A joint that is said to move faster [rad/s, m/s], or to be so far beyond its limits [rad, m], says nothing of use; nor
+# does one without limits that is further away.
+_MAX_SPEED, _MAX_BEYOND, _FARTHEST = 1e3, 1.0, 1e6
+_SCENE_TOPIC = "move_group/monitored_planning_scene"
 _AXES = ("x_translation", "y_translation", "z_translation", "x_rotation", "y_rotation", "z_rotation")
 # Private parameters that are no settings of the servo.
 _OTHER_PARAMETERS = {"robot_description", "monitored_planning_scene_topic", "planning_scene_monitor_options",
                      "planning_scene_monitor"}
+_TOPICS = ("cartesian_command_in_topic", "joint_command_in_topic", "joint_topic", "status_topic", "command_out_topic")
 
 _DESCRIPTION = """Steer an arm, as MoveIt Servo does.
 
@@ -80,26 +86,32 @@ class ServoNode:
         self.commands = Commands(self.servo.joints)
         self._lock, self._news = threading.Lock(), threading.Event()
         self._q, self._velocity = model.default_state().q.copy(), np.zeros(len(model.variables))
+        lower, upper = model.bounds.T
+        self._least, self._most = (np.where(model.continuous, without, np.clip(limits, -_FARTHEST, _FARTHEST))
+                                   for limits, without in ((lower - _MAX_BEYOND, -_FARTHEST),
+                                                           (upper + _MAX_BEYOND, _FARTHEST)))
         self._heard: set[str] = set()
         self._indices = [model.index[name] for name in self.servo.joints]
         self._sent, self._halts, self._new_settings, self._begun_with = False, 0, settings, settings
         self._telling, self._events, self._rests = Telling(), EventLog(rospy.logwarn), True
+        # Wall times of the newest command and step [s].
+        self._came, self._stepped = -math.inf, math.inf
+        topics = topics_of(settings, rospy.get_name())
         self.monitor = SceneMonitor(model, lambda _, error: self._events.add(kind_of(str(error)), str(error)),
-                                    {"joint_state_topic": settings.joint_topic})
+                                    {"joint_state_topic": topics["joint_topic"]})
         self._prepare(self.monitor.scene())
         kind = message_type(settings.command_out_type)
-        self._out = rospy.Publisher(_private(settings.command_out_topic), kind, queue_size=2, tcp_nodelay=True)
-        self._status = rospy.Publisher(_private(settings.status_topic), Int8, queue_size=2)
+        self._out = rospy.Publisher(topics["command_out_topic"], kind, queue_size=2, tcp_nodelay=True)
+        self._status = rospy.Publisher(topics["status_topic"], Int8, queue_size=2)
         self._reason = rospy.Publisher("~status_reason", String, queue_size=2, latch=True)
         take = {"queue_size": 2, "tcp_nodelay": True}
         self._kept = [
-            rospy.Subscriber(settings.joint_topic, JointState, self._on_joints, queue_size=2),
-            rospy.Subscriber(_private(settings.cartesian_command_in_topic), TwistStamped, self._on_twist, **take),
-            rospy.Subscriber(_private(settings.joint_command_in_topic), JointJog, self._on_jog, **take),
+            rospy.Subscriber(topics["joint_topic"], JointState, self._on_joints, queue_size=2),
+            rospy.Subscriber(topics["cartesian_command_in_topic"], TwistStamped, self._on_twist, **take),
+            rospy.Subscriber(topics["joint_command_in_topic"], JointJog, self._on_jog, **take),
             rospy.Subscriber("~target_pose", PoseStamped, self._on_pose, **take),
-            rospy.Subscriber(rospy.get_param("~monitored_planning_scene_topic", "move_group/monitored_planning_scene"),
-                             PlanningScene, lambda message: self.monitor.apply(message, "the planning scene"),
-                             queue_size=100),
+            rospy.Subscriber(rospy.get_param("~monitored_planning_scene_topic", _SCENE_TOPIC), PlanningScene,
+                             lambda message: self.monitor.apply(message, "the planning scene"), queue_size=100),
             rospy.Service("~change_drift_dimensions", ChangeDriftDimensions, self._on_drift),
             rospy.Service("~change_control_dimensions", ChangeControlDimensions, self._on_control),
             rospy.Service("~reset_servo_status", Empty, self._on_reset)]
@@ -117,15 +129,19 @@ class ServoNode:
         moves = len(message.velocity) == len(message.name)
         with self._lock:
             for number, name in enumerate(message.name):
-                index = self.model.index.get(name)
-                if index is None or not math.isfinite(message.position[number]):
+                index, angle = self.model.index.get(name), message.position[number]
+                if index is None:
+                    continue
+                if not self._least[index] <= angle <= self._most[index]:
+                    self._events.add(("position", name), "joint %s is said to be at %g, and can be at %g to %g; it is "
+                                     "ignored" % (name, angle, self._least[index], self._most[index]))
                     continue
                 speed = message.velocity[number] if moves else 0.0
                 if not abs(speed) < _MAX_SPEED:  # drivers that do not measure it send NaN
                     rospy.logwarn_once("the velocity of joint %s comes as %g; such velocities count as 0"
                                        % (name, speed))
                     speed = 0.0
-                self._q[index], self._velocity[index] = message.position[number], speed
+                self._q[index], self._velocity[index] = angle, speed
                 self._heard.add(name)
 
     def _on_twist(self, message: TwistStamped) -> None:
@@ -136,10 +152,9 @@ class ServoNode:
 
     def _on_jog(self, message: JointJog) -> None:
         def take(_, since):
-            foreign = self.commands.take_jog(message.joint_names, message.velocities, since, self.servo.settings)
-            if foreign:
-                self._refuse("joint commands name %s; the arm's joints are %s" % (
-                    ", ".join(foreign), ", ".join(self.servo.joints)))
+            remark = self.commands.take_jog(message.joint_names, message.velocities, since, self.servo.settings)
+            if remark:
+                self._refuse(remark)
         self._take(message.header, take, self.servo.settings.incoming_command_timeout)
 
     def _on_pose(self, message: PoseStamped) -> None:
@@ -158,13 +173,15 @@ class ServoNode:
 
     def _take(self, header: Any, take: Any, timeout: float) -> None:
         """Give a command to ``commands``, where it counts for ``timeout`` [s]; say why one is ignored."""
-        arrived = rospy.get_time()
+        arrived, self._came = rospy.get_time(), time.monotonic()
         since = sent_at(header.stamp.to_sec(), arrived)
         if arrived - since >= timeout:
             self._refuse("a command has come %.2f s after its stamp, and counts for %g s; do the clocks agree?"
                          % (arrived - since, timeout))
         frame = header.frame_id.lstrip("/")
         try:
+            if "\0" in frame:  # tf's library has an error of its own for it
+                raise CommandIgnored("%r is not a frame, it has a zero in it" % frame)
             # What tf alone knows is looked up once for each command, which keeps it.
             of_robot = not frame or frame in self.model.link_index or frame == self.model.frame
             place = frame if of_robot else self.monitor.tf_frame(frame)
@@ -271,14 +288,19 @@ class ServoNode:
         if step.reached and not settings.target_pose_timeout:
             with self._lock:
                 self.commands.forget_pose()
-        status = self._telling.take(step.status, step.reason, time.monotonic())
-        if self._status.get_num_connections():
-            self._status.publish(Int8(int(status)))
+        self._stepped = time.monotonic()
+        self._tell(step.status, step.reason)
         self._halts = self._halts + 1 if step.rests and not kind else 0
         self._sent |= bool(kind)
         if self._sent and (not settings.num_outgoing_halt_msgs_to_publish
                            or self._halts <= settings.num_outgoing_halt_msgs_to_publish):
             self._out.publish(message_of(step, q[self._indices], servo.joints, settings, seconds, now))
+
+    def _tell(self, status: Status, reason: str) -> None:
+        """Publish the status, of this or of a command that has been refused."""
+        status = self._telling.take(status, reason, time.monotonic())
+        if self._status.get_num_connections():
+            self._status.publish(Int8(int(status)))
 
     def _command(self, kind: str, value: Any, frame: Frame, q: np.ndarray, settings: ServoSettings) -> Command:
         if not kind:
@@ -360,6 +382,7 @@ class ServoNode:
         told = (None, "")
         while not ends():
             time.sleep(_REASON_EVERY_S)
+            self._tell_without_steps(time.monotonic())
             status, reason = self._telling.said
             if (status, reason) == told:
                 continue
@@ -367,11 +390,20 @@ class ServoNode:
             told = status, reason
             if status in (Status.DECELERATE_FOR_COLLISION, Status.HALT_FOR_COLLISION):
                 reason += self._between()
+            reason = printable(reason)  # it quotes what others send, to terminals
             self._reason.publish(String(reason))
             if changed and reason:
                 text = "%s: %s" % (status.name.lower().replace("_", " "), reason)
                 text = reason if status is Status.INVALID else text  # a refusal has been logged
                 self._events.add(kind_of(text), text)
+
+    def _tell_without_steps(self, now: float) -> None:
+        """At ``now`` of wall time [s]: while no steps are made, say what is refused, and that nothing moves."""
+        if now - self._came < _STANDS_S < self._came - self._stepped:
+            self._refuse("no step has been made for %.0f s: ROS time stands at %.3f s; is the simulation paused, or "
+                         "has it ended?" % (self._came - self._stepped, rospy.get_time()))
+        if now - self._stepped > _STANDS_S:
+            self._tell(Status.NO_WARNING, "")
 
     def _between(self) -> str:
         scene = self.monitor.scene()
@@ -382,6 +414,9 @@ class ServoNode:
 def settings_of(values: dict, model: PlanningModel) -> ServoSettings:
     """Return the ServoSettings of a node's parameters, with the model's frame where they name none. Raises
     SettingsError."""
+    if not isinstance(values, dict):
+        raise SettingsError("the parameter of the node's name is %r; expected the servo's parameters below it"
+                            % (values,))
     values = {name: value for name, value in values.items() if name not in _OTHER_PARAMETERS}
     values["planning_frame"] = values.get("planning_frame") or model.frame
     settings = ServoSettings.from_mapping(values)
@@ -390,7 +425,14 @@ def settings_of(values: dict, model: PlanningModel) -> ServoSettings:
         if frame and frame not in model.link_index and frame != model.frame:
             raise SettingsError("%s is '%s', which is no link of robot '%s'; its frame is '%s'"
                                 % (name, frame, model.name, model.frame))
+    for name in _TOPICS:
+        if not _is_topic(getattr(settings, name)):
+            raise SettingsError("%s is '%s'; expected a topic's name" % (name, getattr(settings, name)))
     return settings
+
+
+def _is_topic(name: Any) -> bool:
+    return isinstance(name, str) and name not in ("", "/", "~") and rosgraph.names.is_legal_name(name)
 
 
 def _of_scene(scene: Any) -> tuple:
@@ -400,14 +442,28 @@ def _of_scene(scene: Any) -> tuple:
             tuple(scene.link_padding.items()), tuple(scene.link_scale.items()), scene.state.base.tobytes())
 
 
-def _private(topic: str) -> str:
-    """A topic as MoveIt Servo's node names it: relative ones are private."""
-    return topic if topic.startswith(("/", "~")) else "~" + topic
+def topics_of(settings: ServoSettings, node: str) -> dict[str, str]:
+    """Return the topics of a node, {parameter: name for rospy}, as MoveIt Servo names them: relative ones are private,
+    but for joint states. In files of moveit_jog_arm, from which it comes, they begin with the node's name, and those
+    that do not are public."""
+    own = node.rpartition("/")[2] + "/"
+    is_old = settings.cartesian_command_in_topic.startswith(own)
+
+    def named(parameter: str) -> str:
+        topic = getattr(settings, parameter)
+        if topic.startswith(own):
+            return "~" + topic.removeprefix(own)
+        return topic if topic[0] in "/~" or parameter == "joint_topic" or is_old else "~" + topic
+    return {parameter: named(parameter) for parameter in _TOPICS}
 
 
 def build(faults: ThreadFaults) -> ServoNode:
     """Raises SettingsError, PlanningError, MissingParameter."""
     name = rospy.get_param("~robot_description", "robot_description")
+    scene = rospy.get_param("~monitored_planning_scene_topic", _SCENE_TOPIC)
+    for parameter, value in (("robot_description", name), ("monitored_planning_scene_topic", scene)):
+        if not _is_topic(value):
+            raise SettingsError("%s is %r; expected a name" % (parameter, value))
     urdf, srdf = (wait_for_param(name + end, _DESCRIPTION_TIMEOUT_S) for end in ("", "_semantic"))
     limits = (rospy.get_param(name + "_planning", None) or {}).get("joint_limits")
     model = PlanningModel.from_xml(urdf, srdf, {"joint_limits": limits} if limits else None)

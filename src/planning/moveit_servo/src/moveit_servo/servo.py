@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 # Within this distance of the joints [rad] set-points are kept between two motions, so that an arm that sags a little
 # does not creep.
 _SAME_RAD = 0.03
+# An arm in motion that is so far from its set-points [rad] has been moved by others, and must not be thrown back: a
+# blocked one stays much nearer, see ``LEAD_RAD``.
+_MOVED_RAD = 0.3
 # Speed at which a threshold of distance is the place where slowing down begins [m/s].
 _SPEED_AT_THRESHOLD = 0.4
 # Gaps are looked for up to this distance [m]; the fastest hand needs no more to stop.
@@ -171,8 +174,15 @@ class Servo:
         motion = self._motion
         if motion is None:
             motion = self._motion = Motion(measured, self.limits)
-        if self._at_rest() and np.abs(motion.position - measured).max() > _SAME_RAD:
+        away, at_rest = np.abs(motion.position - measured), self._at_rest()
+        moved = ""
+        if away.max() > (_SAME_RAD if at_rest else _MOVED_RAD):
             motion.rest_at(measured)
+            self._way.reset()
+            self._target = None
+            if not at_rest:
+                moved = ("joint %s was moved by others, %.2f rad from its set-point; the arm goes on from where it is"
+                         % (self.joints[int(away.argmax())], away.max()))
         whole = np.array(q, dtype=float)
         whole[self._indices] = motion.position
         reached = False
@@ -185,15 +195,15 @@ class Servo:
         if not command and self._at_rest():
             motion.rest_at(motion.position)
             self._rests = True
-            return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), Status.NO_WARNING,
-                        "", True, reached, self._moving)
+            return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(),
+                        Status.JOINT_BOUND if moved else Status.NO_WARNING, moved, True, reached, self._moving)
         if self._rests:
             self._rests, self._moving = False, 0.0
         self._moving += seconds
         wanted = _Wanted(np.zeros(len(measured)))
         if command:
             wanted = self._wanted(whole, velocity, measured, command)
-        status, reason = wanted.status, wanted.reason
+        status, reason = (Status.JOINT_BOUND, moved) if moved else (wanted.status, wanted.reason)
         if status is not Status.NO_WARNING:
             self._way.reset()
         try:
@@ -241,7 +251,8 @@ class Servo:
         lost, condition = 0.0, 1.0
         if command.twist is not None and command.twist.any():
             limits = self.limits
-            keep = np.flatnonzero(~command.drift)
+            # Where none matters, x does, as in MoveIt's node: something must tell the way.
+            keep = np.array([0]) if command.drift.all() else np.flatnonzero(~command.drift)
             turn = command.axes.T @ self._chain_base(whole)[:3, :3]
             arm = Arm(*self._chain.arrays, turn, keep, limits.lower, limits.upper, limits.velocity)
             jacobian = jacobian_of(arm, q)
@@ -303,6 +314,9 @@ class Servo:
                   or found[number] <= low[number] + 1e-6 > 1e-6 - self.limits.velocity[number]]
             return Status.JOINT_BOUND, "%.0f %% of the motion is held back by the limits of %s" % (
                 100.0 * min(taken, 1.0), " and ".join(at) or "the joints")
+        if lost >= 1.0 and condition < self.settings.lower_singularity_threshold:
+            return Status.HALT_FOR_SINGULARITY, ("the arm's %d joints cannot move the hand in this direction"
+                                                 % len(self.joints))
         if lost > _NOTICED:
             return (Status.HALT_FOR_SINGULARITY if lost > 1.0 - _REMAINS else Status.DECELERATE_FOR_SINGULARITY,
                     "%.0f %% of the motion is lost to a singularity, condition number %.0f" % (

@@ -263,3 +263,38 @@ def test_a_group_that_is_no_chain_is_refused(baxter):
         Driven(baxter, "nothing", {})
     with pytest.raises(SettingsError, match="left_w2"):
         arm(baxter, "left", max_acceleration={"left_" + name: 9.0 for name in ("s0", "s1", "e0", "e1", "w0", "w1")})
+
+
+def test_an_arm_that_others_move_goes_on_from_where_it_is(planar):
+    """As by a cuff that is squeezed while the arm is steered, or by a simulator that puts it elsewhere."""
+    driven = Driven(planar, "arm", {"turn0": 0.3, "turn1": 0.8, "turn2": -0.5})
+    command = Command(joints=np.array([0.5, 0.0, 0.0]))
+    driven.go(command, 0.5)
+    driven.q[driven.indices] += (0.0, -1.0, 0.2)
+    begin, (first, *rest) = driven.q[driven.indices], driven.go(command, 0.5)
+    assert np.abs(first.position - begin).max() < 0.01 and np.abs(first.velocity).max() < 0.1
+    assert first.status is Status.JOINT_BOUND and "turn1 was moved by others, 1.00 rad" in first.reason
+    assert rest[-1].status is Status.NO_WARNING and rest[-1].position[0] > begin[0] + 0.15
+    driven.follows = False
+    driven.q[driven.indices] += 1.0
+    last = driven.go(Command(), DT)[-1]
+    assert last.rests and last.position == pytest.approx(driven.q[driven.indices]) and "moved by others" in last.reason
+
+
+def test_of_directions_that_may_all_drift_x_counts(planar):
+    """As in MoveIt's node; an error ended each step."""
+    driven = Driven(planar, "arm", {"turn0": 0.3, "turn1": 0.8, "turn2": -0.5})
+    before = driven.tip[:3, 3]
+    steps = driven.go(Command(twist=twist(x=-0.1, y=0.3), drift=np.ones(6, dtype=bool)), 0.5)
+    assert driven.tip[0, 3] == pytest.approx(before[0] - 0.05, abs=0.01) and steps[-1].status is Status.NO_WARNING
+
+
+def test_an_arm_of_few_joints_turns_its_hand_and_says_what_it_cannot_do(planar):
+    driven = Driven(planar, "arm", {"turn0": 0.3, "turn1": 0.8, "turn2": -0.5})
+    before = driven.tip
+    steps = driven.go(Command(twist=twist(rz=0.3)), 0.5)
+    turn = rotation_vector(driven.tip[:3, :3] @ before[:3, :3].T)
+    assert turn == pytest.approx([0.0, 0.0, 0.14], abs=0.02) and steps[-1].status is Status.NO_WARNING
+    assert driven.tip[:3, 3] == pytest.approx(before[:3, 3], abs=0.002)
+    last = driven.go(Command(twist=twist(z=0.1)), 0.5)[-1]
+    assert last.status is Status.HALT_FOR_SINGULARITY and "3 joints cannot move the hand" in last.reason

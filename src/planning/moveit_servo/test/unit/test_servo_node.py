@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from motion_planning.errors import PlanningError
 from moveit_servo import node as module
-from moveit_servo.node import ServoNode
+from moveit_servo.node import ServoNode, settings_of, topics_of
 from moveit_servo.servo import Status
 from moveit_servo.settings import ARRAY, TRAJECTORY, UNITLESS, ServoSettings, SettingsError
 from moveit_servo.telling import Telling, kind_of
@@ -51,11 +51,13 @@ def node(monkeypatch):
         log.append(text % parts if parts else text)
 
     def tf_frame(name):
+        if "\0" in name:  # as tf2's library does
+            raise ValueError("embedded null character")
         raise PlanningError("there is no frame '%s'" % name)
     monkeypatch.setattr(module, "rospy", SimpleNamespace(
         Publisher=Topic, Subscriber=nothing, Service=nothing, get_param=lambda name, default: default,
-        get_time=lambda: 5.0, is_shutdown=lambda: True, logwarn=say, logwarn_once=say,
-        logwarn_throttle=lambda _, text: say(text)))
+        get_time=lambda: 5.0, get_name=lambda: "/lab/servo_server", is_shutdown=lambda: True, logwarn=say,
+        logwarn_once=say, logwarn_throttle=lambda _, text: say(text)))
     monkeypatch.setattr(module, "SceneMonitor", lambda *_: SimpleNamespace(scene=nothing, tf_frame=tf_frame))
     monkeypatch.setattr(module, "sphere_model_of", nothing)
     monkeypatch.setattr(module, "ConvexParts", nothing)
@@ -70,6 +72,15 @@ def test_a_velocity_that_is_none_counts_as_0(node, speed):
     node._on_joints(JointState(name=["turn0", "turn1"], position=[0.1, 0.2], velocity=[speed, 0.5]))
     assert node._q[:2].tolist() == [0.1, 0.2] and node._velocity.tolist() == [0.0, 0.5, 0.0]
     assert "turn0" in node.log[0] and "count as 0" in node.log[0]
+
+
+@pytest.mark.parametrize("angle", [float("nan"), float("inf"), 1e300, -3.6])
+def test_where_no_joint_can_be_is_ignored_and_told(node, angle):
+    node._on_joints(JointState(name=["turn0", "turn1"], position=[0.1, 0.2]))
+    node._on_joints(JointState(name=["turn0", "turn1"], position=[angle, 0.3]))
+    assert node._q[:2].tolist() == [0.1, 0.3]
+    line, = node.log
+    assert "turn0 is said to be at %g" % angle in line
 
 
 class Clock:
@@ -123,7 +134,7 @@ def test_what_is_refused_is_the_status_and_each_kind_is_logged(node):
     refused = [
         (node._on_twist, twist(0.1, "nowhere"), "nowhere"), (node._on_twist, twist(NAN), "not finite"),
         (node._on_twist, twist(0.1, stamp=1.0), "4.00 s after"), (node._on_pose, pose(0.5, w=3.0), "length 3"),
-        (node._on_pose, pose(NAN), "position"),
+        (node._on_pose, pose(NAN), "position"), (node._on_twist, twist(0.1, "no\0where"), r"no\x00where"),
         (node._on_jog, JointJog(joint_names=["other"], velocities=[1.0]), "other"),
         (node._on_jog, JointJog(joint_names=["turn0", "turn1"], velocities=[1.0]), "2 names but 1")]
     for number, (take, message, word) in enumerate(refused, 1):
@@ -205,6 +216,64 @@ def test_what_is_read_at_the_start_stays_and_that_is_said(node, monkeypatch):
 def test_a_margin_without_room_is_refused_by_the_joints_name(node):
     with pytest.raises(SettingsError, match="joint_limit_margin is 2.5.*2.5, half.*turn0"):
         node.servo.settings = replace(SETTINGS, joint_limit_margin=2.5)
+
+
+def test_the_whole_of_the_parameters_is_no_number(node, monkeypatch):
+    monkeypatch.setattr(module, "time", SimpleNamespace(sleep=lambda _: None, monotonic=lambda: 1.0))
+    monkeypatch.setattr(module.rospy, "get_param", lambda *_: 5)
+    looks = iter([False] * 3 + [True])
+    node._watch_parameters(lambda: next(looks))
+    line, = node.log
+    assert "is 5; expected" in line and node._new_settings is node.servo.settings
+
+
+@pytest.mark.parametrize("name", ["cartesian_command_in_topic", "status_topic", "joint_topic", "command_out_topic"])
+@pytest.mark.parametrize("topic", ["two words", "-x", "~", "/"])
+def test_a_topic_without_a_legal_name_is_refused(node, name, topic):
+    with pytest.raises(SettingsError, match="%s is '%s'; expected a topic's name" % (name, topic)):
+        settings_of({"move_group_name": "arm", "command_out_topic": "out", name: topic}, node.model)
+
+
+def test_topics_are_named_as_by_moveits_nodes():
+    new = ServoSettings(command_out_topic="out", joint_topic="states")
+    assert topics_of(new, "/lab/servo_server") == {
+        "cartesian_command_in_topic": "~delta_twist_cmds", "joint_command_in_topic": "~delta_joint_cmds",
+        "joint_topic": "states", "status_topic": "~status", "command_out_topic": "~out"}
+    old = ServoSettings(cartesian_command_in_topic="jog_server/twists", joint_command_in_topic="jog_server/jogs",
+                        status_topic="jog_server/halted", command_out_topic="group/command")
+    assert topics_of(old, "/jog_server") == {
+        "cartesian_command_in_topic": "~twists", "joint_command_in_topic": "~jogs", "joint_topic": "joint_states",
+        "status_topic": "~halted", "command_out_topic": "group/command"}
+
+
+def test_a_reason_holds_nothing_that_ends_a_terminals_program(node, monkeypatch):
+    monkeypatch.setattr(module, "time", SimpleNamespace(sleep=lambda _: None, monotonic=lambda: 1.0))
+    node._on_twist(twist(0.1, "no\0where\x1b[2J" + 10**4 * "x"))
+    steps(node)
+    looks = iter([False, True])
+    node._tell_reasons(lambda: next(looks))
+    said = node._reason.sent[-1].data
+    assert said.isprintable() and "no\\x00where" in said and len(said) < 1100
+
+
+def test_time_that_stands_still_is_told(node, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    bend(node)
+    steps(node)
+    now[0] += 20.0
+    node._tell_without_steps(now[0])
+    assert node._status.sent.pop().data == Status.NO_WARNING and not node.log, "nobody steers"
+    node._on_twist(twist(0.1))
+    node._tell_without_steps(now[0] + 0.1)
+    assert node._status.sent.pop().data == Status.INVALID
+    assert "for 20 s: ROS time stands at 5.000 s" in node._telling.said[1] and len(node.log) == 1
+    node._on_twist(twist(0.1, "nowhere"))
+    node._tell_without_steps(now[0] + 1.1)
+    steps(node)
+    now[0] += 5.0
+    node._tell_without_steps(now[0])
+    assert node._status.sent[-1].data == Status.NO_WARNING
 
 
 def test_a_reason_stays_until_it_is_read():

@@ -111,11 +111,15 @@ def test_a_bad_twist_ends_the_one_before(value):
 
 def test_joint_commands_with_other_names_or_none():
     taken = commands()
-    assert taken.take_jog(["a", "c"], [0.2, 0.3], 1.0, SPEEDS) == ["c"]
+    assert "name c;" in taken.take_jog(["a", "c"], [0.2, 0.3], 1.0, SPEEDS)
     assert taken.newest(1.0, SPEEDS)[1] == pytest.approx([0.2, 0.0])
-    assert taken.take_jog([], [0.1], 1.1, SPEEDS) == []  # MoveIt's own test sends this
+    assert "name '';" in taken.take_jog([""], [0.3], 1.0, SPEEDS)
+    assert "0 names but 1 velocity;" in taken.take_jog([], [0.1], 1.1, SPEEDS)  # MoveIt's own test sends this
     assert taken.newest(1.1, SPEEDS)[1] == pytest.approx([0.0, 0.0])
-    with pytest.raises(CommandIgnored, match="2 names but 1"):
+    assert "1 name but 2 velocities;" in taken.take_jog(["b"], [0.1, 0.2], 1.1, SPEEDS)
+    assert taken.newest(1.1, SPEEDS)[1] == pytest.approx([0.0, 0.1])
+    assert taken.take_jog(["b"], [0.1], 1.1, SPEEDS) == ""
+    with pytest.raises(CommandIgnored, match="2 names but 1 velocity$"):
         taken.take_jog(["a", "b"], [0.2], 1.2, SPEEDS)
 
 
