@@ -23,6 +23,7 @@ STAND_INS=(
     src/compat/imu_sensor_controller
     src/compat/force_torque_sensor_controller
     src/compat/media_export
+    src/compat/moveit_ros_planning_interface
 )
 
 # leave_out_stand_ins ROOT SHARE…: where an installed ROS (its share folders) has a package of that name, hide ours from

@@ -32,6 +32,7 @@ from .requests import JOINTS, RequestSettings, code_name
 from .retiming import retimed
 from .targeting import Targeting
 from .targets import JointTarget, jacobian, random_values, values_of, within_limits
+from .wrapped import WrappedGroup
 
 if TYPE_CHECKING:
     from moveit_msgs.msg import Grasp, MotionPlanRequest, MoveGroupGoal, PickupGoal, PlaceGoal
@@ -76,6 +77,8 @@ class MoveGroupCommander(Targeting):
         self._kind = JOINTS
         self._remembered = {}
         self._random = np.random.default_rng()
+        # MoveIt's commander is made of this object, and programs use it.
+        self._g = WrappedGroup(self)
 
     # -- the group --------------------------------------------------------------------------------------------------
 

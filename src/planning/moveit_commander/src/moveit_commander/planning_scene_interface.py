@@ -17,6 +17,7 @@ from . import acm, scene_calls
 from .connection import connect
 from .conversions import matrix_of
 from .exception import MoveItCommanderException
+from .wrapped import WrappedScene
 
 if TYPE_CHECKING:
     from geometry_msgs.msg import PoseStamped
@@ -44,6 +45,7 @@ class PlanningSceneInterface:
         self._pub_co = self._connection.advertise("collision_object")
         self._pub_aco = self._connection.advertise("attached_collision_object")
         self._apply_planning_scene_diff = self._connection.service("apply_planning_scene")
+        self._psi = WrappedScene(self)
         if not synchronous:
             self._connection.advertise("planning_scene")
 

@@ -16,6 +16,7 @@ from .description import load
 from .exception import MoveItCommanderException
 from .markers import link_markers
 from .move_group import MoveGroupCommander
+from .wrapped import WrappedRobot
 
 if TYPE_CHECKING:
     from motion_planning.model import Group
@@ -98,6 +99,7 @@ class RobotCommander:
         self._connection = connect(ns)
         self._model = load(robot_description, ns).model
         self._groups = {}
+        self._r = WrappedRobot(self)
 
     # -- names ------------------------------------------------------------------------------------------------------
 
