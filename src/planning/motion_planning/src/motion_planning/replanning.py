@@ -11,9 +11,11 @@ from motion_planning.constraints import ConstraintSet, JointTarget
 from motion_planning.pipeline import Code, Plan, PlanningFailure, checked, plan
 from motion_planning.planners import first_touching
 from motion_planning.timing import Timed
-from motion_planning.timing.joining import brakings, joinings
+from motion_planning.timing.joining import brakings, joinings, led
 
 if TYPE_CHECKING:
+    from motion_planning.exact import ExactChecker
+    from motion_planning.model import Group
     from motion_planning.pipeline import PlanQuery, Tools
     from motion_planning.scene import Scene
 
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 AHEAD_S = (0.12, 0.08, 0.05)
 # What the way to the controller may take of that [s], and the share of the rest that the search may use.
 _SENDING_S, _SEARCHING = 0.02, 0.5
+# How far ahead of now joints that are to stop begin to brake [s], and the multiples of their limits of acceleration
+# that are tried: what is near is worth a hard stop.
+_BRAKING_AHEAD_S, _HARDER = 0.05, (1.0, 2.0, 4.0, 8.0)
 # Distance of checked states [rad or m, in any joint].
 _APART = 0.01
 # Greatest deviation of goal joints [rad or m].
@@ -47,6 +52,27 @@ class Redirection(NamedTuple):
     begin: float
     plan: Plan
     overlap: float
+
+
+class Stop(NamedTuple):
+    """timed: what to follow from the time ``begin`` [s] of the running trajectory on, where position, velocity and
+    acceleration are that one's, until the joints rest; its second point is some time behind its first. harder: the
+    multiple of the joints' limits of acceleration that it keeps to, 1 where there is room."""
+
+    timed: Timed
+    begin: float
+    harder: float
+
+
+def stopped(exact: ExactChecker, scene: Scene, group: Group, running: Running) -> Stop | None:
+    """Return a Stop of a Group's joints, which follow a :class:`Running` trajectory in a scene: the gentlest one that
+    touches nothing. None if all of those that are tried touch something: whatever stops them at once has to."""
+    limit = scene.model.acceleration[group.indices]
+    for harder in _HARDER:
+        found = _at_rest(exact, scene, group, running, _BRAKING_AHEAD_S, harder * limit)
+        if found is not None:
+            return Stop(led(found[1]), found[0], harder)
+    return None
 
 
 def redirected(query: PlanQuery, tools: Tools, running: Running) -> Redirection:
@@ -83,15 +109,24 @@ def _brake(query: PlanQuery, tools: Tools, running: Running) -> tuple[float, Tim
     group = query.scene.model.groups[query.group]
     acceleration = query.scene.model.acceleration[group.indices]
     for ahead in AHEAD_S:
-        start = min(running.now + ahead, running.timed.duration)
-        if start >= running.blocked_from:
-            continue
-        for found in brakings(running.timed, start, acceleration):
-            states = found.sampled(found.spaced(_APART))[0]
-            if first_touching(tools.exact, query.scene, group, states) is None:
-                return start, found, ahead
+        found = _at_rest(tools.exact, query.scene, group, running, ahead, acceleration)
+        if found is not None:
+            return *found, ahead
     raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot come to rest in time: something stands %.2f s "
                           "ahead" % (running.blocked_from - running.now))
+
+
+def _at_rest(exact: ExactChecker, scene: Scene, group: Group, running: Running, ahead: float,
+             acceleration: np.ndarray) -> tuple[float, Timed] | None:
+    """(time on the running trajectory, ``ahead`` [s] of now, Timed that comes to rest from there within the limits
+    acceleration (k,) without touching anything), or None."""
+    start = min(running.now + ahead, running.timed.duration)
+    if start >= running.blocked_from:
+        return None
+    for found in brakings(running.timed, start, acceleration):
+        if first_touching(exact, scene, group, found.sampled(found.spaced(_APART))[0]) is None:
+            return start, found
+    return None
 
 
 def _goals(query: PlanQuery, tools: Tools, running: Running, scene: Scene) -> list[ConstraintSet]:

@@ -135,6 +135,13 @@ def test_nothing_works_and_every_fall_is_named(scene, exact, hand):
         pick(scene, exact, hand, [])
 
 
+@pytest.mark.parametrize("option", ["approach", "retreat"])
+def test_less_than_the_least_is_desired(scene, exact, hand, option):
+    short = from_above(**{option: (LOWER if option == "approach" else LIFT)._replace(desired=0.02)})
+    with pytest.raises(ManipulationFailure, match=f"at '{option}': 0.02 m are desired and at least 0.05 m allowed"):
+        pick(scene, exact, hand, [short])
+
+
 def test_a_shorter_way_will_do_down_to_the_least(scene, exact, hand):
     low = scene.with_object(thing("shelf", SPOT + (0.0, 0.0, 0.62), (0.5, 0.5, 0.02)))
     way = LOWER._replace(desired=0.3, least=0.02)

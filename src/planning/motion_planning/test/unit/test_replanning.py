@@ -9,7 +9,7 @@ from motion_planning.constraints import ConstraintSet, JointTarget, sampler
 from motion_planning.exact import ExactChecker
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools
 from motion_planning.planners import plan_path
-from motion_planning.replanning import Running, redirected
+from motion_planning.replanning import Running, redirected, stopped
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.timing import time_path
 from urdf_model import Box
@@ -98,3 +98,26 @@ def test_a_way_that_is_found_too_late_is_not_taken(probot, exact):
     with pytest.raises(PlanningFailure) as failure:
         Lab(probot, exact, tick_s=0.01).place_ahead(1.4).redirected()
     assert failure.value.code in (Code.TIMED_OUT, Code.PREEMPTED)
+
+
+def test_joints_stop_as_gently_as_the_room_allows(probot, exact):
+    multiples = []
+    for seconds, size in ((1.6, 0.05), (0.6, 0.02), (0.3, 0.02)):
+        lab = Lab(probot, exact).place_ahead(seconds, size)
+        found = stopped(exact, lab.scene, lab.group, lab.running)
+        if found is None:
+            break
+        multiples.append(found.harder)
+        assert NOW_S < found.begin < lab.running.blocked_from
+        for new, old in zip(found.timed.sampled([0.0]), lab.timed.sampled([found.begin]), strict=True):
+            np.testing.assert_allclose(new, old, atol=1e-6)
+        states, velocities, _ = found.timed.sampled(found.timed.spaced(0.004))
+        assert exact.first_blocked(lab.scene, states, GROUP) is None and np.abs(velocities[-1]).max() < 1e-9
+        accelerations = found.timed.peaks()[1]
+        assert (accelerations <= found.harder * probot.acceleration[lab.group.indices] * 1.02).all()
+    assert multiples[0] == 1.0 and len(multiples) >= 2 and multiples[1] > 1.0
+
+
+def test_joints_before_which_something_stands_already_are_stopped_by_whatever_can(probot, exact):
+    lab = Lab(probot, exact).place_ahead(0.02, size=0.05)
+    assert stopped(exact, lab.scene, lab.group, lab.running) is None

@@ -31,6 +31,9 @@ _CANCEL_S = 0.2
 _REST_S = 1.0
 _FIRST_STATE_S = 1.0
 _RESTING_STATES = 3
+# A controller whose action has been away for so long is not waited for [s, wall time: the simulation's may have ended].
+_AWAY_S = 5.0
+_INVALIDATED = MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
 
 
 @dataclass
@@ -94,8 +97,9 @@ class Executor:
         """Follow a RobotTrajectory to its end; return an Outcome.
 
         preempted(): whether the caller wants to stop it; invalidated(): None, the reason why the rest of the path is no
-        longer free, or a NewWay, which is followed instead. Both are called every few milliseconds. from_anywhere: the
-        first point need not be near the joints' positions, as for a hand with an object between its fingers.
+        longer free, which ends the motion at once, or a NewWay, which is followed instead, until the joints rest if it
+        is one that stops. Both are called every few milliseconds. from_anywhere: the first point need not be near the
+        joints' positions, as for a hand with an object between its fingers.
         """
         trajectory = message.joint_trajectory
         if not trajectory.points:
@@ -175,7 +179,7 @@ class Executor:
                preempted: Callable[[], bool], invalidated: Callable[[], str | NewWay | None]) -> Outcome:
         duration = trajectory.points[-1].time_from_start.to_sec()
         allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
-        begin = rospy.get_time()
+        begin, stops, answered = rospy.get_time(), "", time.monotonic()
         # If time is set back, as by a reset of the simulation, nothing ends; the limit starts again.
         while True:
             running = [handle for handle in handles if not handle.done.is_set()]
@@ -188,24 +192,34 @@ class Executor:
                 return self._cancel(handles, MoveItErrorCodes.PREEMPTED, "stopped on request")
             change = invalidated()
             if isinstance(change, NewWay):
-                trajectory, begin = change.trajectory.joint_trajectory, change.begins
+                trajectory, begin, stops = change.trajectory.joint_trajectory, change.begins, change.stops
                 duration = trajectory.points[-1].time_from_start.to_sec()
                 allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
                 _send(trajectory, chosen, handles)
             elif change:
-                return self._cancel(handles, MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, change)
+                outcome = self._cancel(handles, _INVALIDATED, change)
+                # Who plans again begins where the joints rest.
+                self._wait_for_rest(trajectory.joint_names, preempted)
+                return outcome
+            away = [one for one, handle in zip(chosen, handles, strict=True)
+                    if not handle.done.is_set() and not handle.connected(0.0)]
+            answered = answered if away else time.monotonic()
             failed = _failed(handles)
+            if failed is None and time.monotonic() - answered > _AWAY_S:
+                failed = Outcome(MoveItErrorCodes.CONTROL_FAILED, "%s has ended while it moved the arm; %s"
+                                 % (away[0], away[0].remedy))
+            elif failed is None and self.settings.monitored and now - begin > allowed:
+                failed = Outcome(MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
+                                 % (", ".join(map(str, chosen)), allowed, duration))
             if failed is not None:
-                return self._cancel(handles, failed.code, failed.text)
-            if self.settings.monitored and now - begin > allowed:
-                return self._cancel(handles, MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
-                                    % (", ".join(map(str, chosen)), allowed, duration))
+                return self._cancel(handles, failed.code, failed.text) if not stops else self._cancel(
+                    handles, _INVALIDATED, "%s; %s" % (stops, failed.text))
         failed = _failed(handles)
-        if failed is not None:
+        if failed is not None and not stops:
             return failed
-        if self.settings.wait_for_rest:
+        if stops or self.settings.wait_for_rest:
             self._wait_for_rest(trajectory.joint_names, preempted)
-        return Outcome(MoveItErrorCodes.SUCCESS)
+        return Outcome(_INVALIDATED, stops) if stops else Outcome(MoveItErrorCodes.SUCCESS)
 
     def _cancel(self, handles: Sequence[Handle], code: int, text: str) -> Outcome:
         for handle in handles:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether what is left of a running trajectory is still free, and another way where it is not."""
+"""Whether what is left of a running trajectory is still free; where it is not, another way, or a gentle stop."""
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from moveit_msgs.msg import RobotTrajectory
 
 from motion_planning.errors import PlanningError
 from motion_planning.planners import first_touching
-from motion_planning.replanning import Running
+from motion_planning.replanning import Running, stopped
 from motion_planning.timing import Timed
 from moveit_ros_move_group.convert.scene_out import trajectory_message
 
@@ -33,10 +33,11 @@ LATER_S = 0.5
 class NewWay:
     """trajectory: takes the place of the running one at its header's stamp, where its positions, velocities and
     accelerations are that one's; it has no point at its start, so that a controller leads to its first one from where
-    it really is. begins: the stamp [s]."""
+    it really is. begins: the stamp [s]. stops: why the joints come to rest on it, empty where it leads to the goal."""
 
     trajectory: RobotTrajectory
     begins: float
+    stops: str = ""
 
 
 class RestOfTheWay:
@@ -55,8 +56,8 @@ class RestOfTheWay:
         self.contacts: list[Contact] = []
 
     def hit(self) -> str | NewWay | None:
-        """None, the sentence what is in the way, or a NewWay around it. The first call is when the trajectory
-        begins."""
+        """None, a NewWay, or the sentence what is so near that the joints have to stop at once. The first call is when
+        the trajectory begins."""
         now = rospy.get_time()
         # Time may have been set back, as by a reset of the simulation.
         self._begin = now if self._begin is None else min(self._begin, now + LATER_S)
@@ -73,19 +74,33 @@ class RestOfTheWay:
         state = scene.state.with_q(states[first], self._group.indices)
         self.contacts = self._exact.contacts(scene, state, self._group.name)
         reason = "in the way of what is left: %s" % self.contacts[0] if self.contacts else "something is in the way"
-        return reason if self._onward is None else self._around(scene, float(times[first]), reason)
+        blocked_from = float(times[first])
+        if self._onward is not None:
+            found = self._around(scene, blocked_from)
+            if isinstance(found, NewWay):
+                return found
+            reason = "%s; %s" % (reason, found)
+            self._onward = None  # joints that stop go nowhere else
+        stop = stopped(self._exact, scene, self._group, self._running(blocked_from))
+        return reason if stop is None else self._new_way(scene, stop.timed, self._begin + stop.begin, reason)
 
-    def _around(self, scene: Scene, blocked_from: float, reason: str) -> str | NewWay:
+    def _running(self, blocked_from: float) -> Running:
+        return Running(self._timed, rospy.get_time() - self._begin, blocked_from)
+
+    def _around(self, scene: Scene, blocked_from: float) -> str | NewWay:
+        """A NewWay to the goal, or the sentence why there is none."""
         try:
-            found = self._onward(scene, Running(self._timed, rospy.get_time() - self._begin, blocked_from))
+            found = self._onward(scene, self._running(blocked_from))
         except PlanningError as error:
-            return "%s; no other way while the joints move: %s" % (reason, error)
+            return "no other way while the joints move: %s" % error
         begins = self._begin + found.begin
         late = rospy.get_time() - begins
         if late > 0.0:
-            return "%s; another way was found %.3f s too late" % (reason, late)
-        timed = found.timed
+            return "another way was found %.3f s too late" % late
+        return self._new_way(scene, found.timed, begins)
+
+    def _new_way(self, scene: Scene, timed: Timed, begins: float, stops: str = "") -> NewWay:
         self._timed, self._begin = timed, begins
         later = Timed(*(column[1:] for column in (timed.times, timed.positions, timed.velocities, timed.accelerations)))
         return NewWay(trajectory_message(self._group.joints, later, scene.model.frame, rospy.Time.from_sec(begins)),
-                      begins)
+                      begins, stops)

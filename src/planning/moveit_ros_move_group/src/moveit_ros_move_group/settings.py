@@ -38,8 +38,11 @@ _TIMINGS = {"AddTimeParameterization": "ruckig",
             "AddTimeOptimalParameterization": "time_optimal_trajectory_generation",
             "AddIterativeSplineParameterization": "iterative_spline_parameterization",
             "AddRuckigTrajectorySmoothing": "ruckig"}
-# Planning plugins for motions of industrial robots, and those that have no counterpart here.
-_INDUSTRIAL, _NOT_BUILT_IN = "pilz_industrial_motion_planner", "chomp|stomp"
+# Planning plugins for motions of industrial robots, by their name in MoveIt and an earlier one, and those that have no
+# counterpart here.
+_INDUSTRIAL, _NOT_BUILT_IN = ("pilz_industrial_motion_planner", "pilz::"), "chomp|stomp"
+# The same for the package of their capabilities.
+_INDUSTRIAL_PACKAGES = {"pilz_trajectory_generation": "pilz_industrial_motion_planner"}
 _FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
 
 
@@ -87,7 +90,11 @@ def pipelines(groups: Collection[str]) -> tuple[dict[str, Pipeline], str, list[s
             continue
         found[name] = _pipeline(name, tree, groups)
     if not found:
-        found["ompl"] = _pipeline("ompl", rospy.get_param("~", {}), groups)
+        tree = rospy.get_param("~", {})
+        plugin = str(tree.get("planning_plugin", ""))
+        if re.match(_NOT_BUILT_IN, plugin):
+            complaints.append("the planner %s is not built in; RRT-Connect takes its place" % plugin)
+        found["ompl"] = _pipeline("ompl", tree, groups)
     usual = rospy.get_param("~default_planning_pipeline", "")
     if usual not in found:
         first = next((name for name, pipeline in found.items() if not pipeline.industrial), next(iter(found)))
@@ -199,13 +206,19 @@ def initial_positions(model: PlanningModel) -> dict[str, float]:
 
 def capabilities() -> tuple[set[str], list[str]]:
     """Return (set of the capabilities that are wanted, list of complaints)."""
-    wanted = set(DEFAULT_CAPABILITIES) | set(str(rospy.get_param("~capabilities", "")).split())
+    wanted = set(DEFAULT_CAPABILITIES) | _names_in(rospy.get_param("~capabilities", ""))
     named = rospy.get_param("~planning_pipelines", {})
     for tree in named.values() if isinstance(named, dict) else ():
-        wanted |= set(str(tree.get("capabilities", "")).split()) if isinstance(tree, dict) else set()
-    wanted -= set(str(rospy.get_param("~disable_capabilities", "")).split())
+        wanted |= _names_in(tree.get("capabilities", "")) if isinstance(tree, dict) else set()
+    wanted -= _names_in(rospy.get_param("~disable_capabilities", ""))
     unknown = sorted(wanted - set(DEFAULT_CAPABILITIES) - set(OTHER_CAPABILITIES))
     return wanted, ["there is no capability '%s'; it is left out" % name for name in unknown]
+
+
+def _names_in(text: object) -> set[str]:
+    """The capabilities of a parameter, by their present names."""
+    named = (name.partition("/") for name in str(text).split())
+    return {_INDUSTRIAL_PACKAGES.get(package, package) + slash + name for package, slash, name in named}
 
 
 def _number(value: object, usual: float) -> float:

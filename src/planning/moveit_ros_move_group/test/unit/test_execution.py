@@ -13,7 +13,7 @@ from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from lab_testing.waiting import wait_until
-from moveit_ros_move_group import handles, node
+from moveit_ros_move_group import execution, handles, node
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings, Executor, part_of
 from moveit_ros_move_group.rest_of_the_way import NewWay
@@ -208,6 +208,65 @@ def test_a_new_way_is_followed_in_the_place_of_the_old_one():
         assert not handle.cancelled
         handle.end()
     assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_a_controller_that_ends_while_it_moves_is_not_waited_for(monkeypatch):
+    """The robot's computer, or the simulation with its clock, may be gone: nothing else would end the goal."""
+    monkeypatch.setattr(execution, "_AWAY_S", 0.2)
+    monkeypatch.setattr(rospy, "get_time", lambda: 100.0)
+    lab = Lab().start(seconds=1.0)
+    lab.wait_until_sent()
+    lab.handles["turn"].end()
+    lab.handles["reach"].there = False
+    outcome = lab.outcome()
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED
+    assert "'reach/follow' has ended while it moved" in outcome.text
+    assert lab.handles["reach"].cancelled
+
+
+def test_a_controller_that_is_away_for_a_moment_is_waited_for():
+    lab = Lab().start(seconds=1.0)
+    lab.wait_until_sent()
+    asked = []
+    lab.handles["reach"].connected = lambda timeout_s, given_up=None: asked.append(timeout_s) or len(asked) > 3
+    until(lambda: len(asked) > 5)
+    for handle in lab.handles.values():
+        handle.end()
+    assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def stopping(seconds=2.0):
+    new = trajectory(seconds)
+    new.joint_trajectory.header.stamp = rospy.Time.from_sec(rospy.get_time() + 0.05)
+    return NewWay(new, new.joint_trajectory.header.stamp.to_sec(), "a box")
+
+
+def test_joints_that_come_to_rest_before_something_have_not_arrived():
+    ways = iter([None, stopping()])
+    lab = Lab().start(invalidated=lambda: next(ways, None))
+    until(lambda: all(len(handle.sent) == 2 for handle in lab.handles.values()))
+    for handle in lab.handles.values():
+        assert not handle.cancelled
+        handle.end()
+    outcome = lab.outcome()
+    assert (outcome.code, outcome.text) == (MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, "a box")
+    assert not any(handle.cancelled for handle in lab.handles.values())
+
+
+def test_what_comes_near_while_they_come_to_rest_stops_them_at_once():
+    ways = iter([None, stopping(), None, "another box"])
+    outcome = Lab().start(invalidated=lambda: next(ways, None)).outcome()
+    assert (outcome.code, outcome.text) == (MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                                            "another box")
+
+
+def test_a_controller_that_does_not_come_to_rest_is_cancelled():
+    ways = iter([stopping(0.01)])
+    lab = Lab(scaling=1.0, margin=0.01).start(invalidated=lambda: next(ways, None))
+    outcome = lab.outcome()
+    assert outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+    assert outcome.text.startswith("a box; ") and "0.01 s planned" in outcome.text
+    assert all(handle.cancelled for handle in lab.handles.values())
 
 
 def test_the_time_limit_is_that_of_the_new_way():

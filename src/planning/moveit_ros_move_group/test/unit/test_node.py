@@ -91,6 +91,17 @@ def test_a_robot_that_takes_long_to_prepare_delays_nothing_but_plans(monkeypatch
     assert answers[0][0] == MoveItErrorCodes.SUCCESS, answers
 
 
+def test_looking_around_without_a_sensor_to_point_plans_as_usual_and_is_told(monkeypatch):
+    node = node_of(monkeypatch)
+    goal = good_requests(SIX)["move_group"]
+    goal.planning_options.plan_only, goal.planning_options.look_around = False, True
+    goal.request.start_state.joint_state.name = []
+    with node.hearing("joint_states", joint_state):
+        code, text = outcome(node.ask("move_group", goal))
+    assert code == MoveItErrorCodes.SUCCESS, text
+    assert len([line for line in node.logged if "look_around" in line and "sensor" in line]) == 1
+
+
 def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
     node = node_of(monkeypatch, capabilities="move_group/Cleaning some_package/Cooking")
     assert len([line for line in node.logged if "move_group/Cleaning" in line]) == 1

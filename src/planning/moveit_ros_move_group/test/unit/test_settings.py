@@ -65,6 +65,29 @@ def test_a_default_pipeline_that_is_not_built_in_gives_way_to_ompl(monkeypatch):
     assert any("there is no pipeline 'chomp'" in text and "'z' is taken" in text for text in complaints)
 
 
+@pytest.mark.parametrize("tree", [
+    {"planning_plugin": "pilz::CommandPlanner"},
+    {"planning_pipelines": {"command": {"planning_plugin": "pilz::CommandPlanner"}}}])
+def test_the_industrial_planner_is_known_by_its_earlier_name(monkeypatch, tree):
+    """As in configurations before MoveIt took it over: LIN would be any path otherwise."""
+    given = {"~": tree, "~planning_pipelines": tree.get("planning_pipelines", {}),
+             "~capabilities": "pilz_trajectory_generation/MoveGroupSequenceAction",
+             "~disable_capabilities": "pilz_trajectory_generation/MoveGroupSequenceService"}
+    monkeypatch.setattr(settings.rospy, "get_param", lambda name, usual=None: given.get(name, usual))
+    found, usual, complaints = settings.pipelines([])
+    assert found[usual].industrial and "LIN" in found[usual].planners
+    wanted, unknown = settings.capabilities()
+    assert "pilz_industrial_motion_planner/MoveGroupSequenceAction" in wanted and unknown == []
+
+
+def test_a_planner_of_an_old_configuration_that_is_not_built_in_is_named(monkeypatch):
+    given = {"~": {"planning_plugin": "chomp_interface/CHOMPPlanner"}}
+    monkeypatch.setattr(settings.rospy, "get_param", lambda name, usual=None: given.get(name, usual))
+    found, usual, complaints = settings.pipelines([])
+    assert not found[usual].industrial
+    assert any("chomp_interface/CHOMPPlanner is not built in" in text for text in complaints)
+
+
 @pytest.mark.parametrize("adapters, timing", [
     ("", "ruckig"), ("AddTimeParameterization ResolveConstraintFrames", "ruckig"),
     ("AddTimeOptimalParameterization", "time_optimal_trajectory_generation"),

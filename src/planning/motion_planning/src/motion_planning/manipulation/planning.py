@@ -216,6 +216,8 @@ class _Attempt:
         here = state.q[self.group.indices][None]
         if not way.desired > 0.0:
             return here
+        if way.desired < way.least - 1e-9:
+            raise _Fallen(stage, "%.3g m are desired and at least %.3g m allowed" % (way.desired, way.least))
         try:
             path = self._line(scene, state, direction * way.desired, _STEP_M)
         except CartesianError as error:

@@ -90,6 +90,13 @@ def joined(first: Timed, second: Timed, overlap: float) -> Timed:
     return Timed(times, parts[0] - second.positions[0], *parts[1:])
 
 
+def led(timed: Timed) -> Timed:
+    """Return ``timed`` with its second point LEAD_S after its first one, or at its end if that is sooner."""
+    times = np.arange(LEAD_S, timed.duration - 0.5 * _STEP_S, _STEP_S)
+    times = np.concatenate([[0.0], times, [timed.duration]])
+    return Timed(times, *timed.sampled(times))
+
+
 def joinings(first: Timed, second: Timed, velocity: np.ndarray,
              acceleration: np.ndarray) -> Iterator[tuple[float, Timed]]:
     """Yield (overlap [s], ``joined`` with it) from the longest overlap that keeps to the limits (k,) of velocity and

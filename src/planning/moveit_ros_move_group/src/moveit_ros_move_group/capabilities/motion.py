@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 _STATE_TIMEOUT_S = 1.0
 # Number of replanning attempts if neither the goal nor a parameter sets it.
 _REPLAN_ATTEMPTS = 5
+# What is the same with every goal is logged again after so long [s].
+_SAY_AGAIN_S = 60.0
 
 
 class PlanService:
@@ -141,6 +143,9 @@ class MoveAction:
         executor = context.require_executor()
         if request.start_state.joint_state.name and not request.start_state.is_diff:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
+        if options.look_around:
+            rospy.logwarn_throttle(_SAY_AGAIN_S, "move_group: look_around: nothing here points a sensor; planned with "
+                                   "what the scene knows")
         group = context.model.groups[request.group_name]
         require_state(context, group)
         left = _Attempts(max(0, options.replan_attempts or self.replan_attempts) if options.replan else 0)
