@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -119,6 +120,7 @@ class SetWriter:
         try:
             number = self._write(columns, task, success, seed)
         except OSError as error:
+            self._remove_files(layout.numbered(self.episodes))  # a full disk needs the room
             self.drop()
             raise DemonstrationError("episode %d of %s is not kept, the %d before are: %s" % (
                 self.episodes, self.folder, self.episodes, error)) from error
@@ -199,6 +201,12 @@ class SetWriter:
             with open(film.path, "rb") as file:
                 os.fsync(file.fileno())
             film.path.replace(path)
+
+    def _remove_files(self, place):
+        for name in (layout.DATA % place, layout.EPISODES % place,
+                     *(layout.FILM % (key, *place) for key in self.schema.cameras)):
+            with suppress(OSError):
+                (self.folder / name).unlink()
 
     def _tell_outcome(self, outcome):
         path = self.folder / layout.OUTCOMES

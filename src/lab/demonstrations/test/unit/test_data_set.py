@@ -264,6 +264,33 @@ def test_a_full_disk_costs_the_present_episode_alone(tmp_path):
     assert DataSet(tmp_path).episode(1).seed == 2
 
 
+@pytest.mark.parametrize("name", ["file-001.parquet", "stats.json", "info.json"])
+def test_an_episode_that_a_full_disk_refused_takes_no_room(tmp_path, monkeypatch, name):
+    def frames(writer):
+        for level in range(4):
+            writer.frame({ACTION: [level], CAMERA: grey(level)})
+
+    def full(path, write):
+        if "meta" in path.parts and path.name == name:
+            raise OSError(28, "No space left on device")
+        write_whole(path, write)
+
+    write_whole = layout.write_whole
+    with SetWriter(tmp_path, FILMED) as writer:
+        frames(writer)
+        writer.keep("Look.", True)
+        monkeypatch.setattr(layout, "write_whole", full)
+        frames(writer)
+        with pytest.raises(DemonstrationError, match="episode 1 of .* is not kept, the 1 before are: .*No space"):
+            writer.keep("Look.", True)
+        monkeypatch.undo()
+        assert (survey(tmp_path).good, survey(tmp_path).strays) == ([0], [])
+        assert not list(tmp_path.rglob("file-001.*"))
+        frames(writer)
+        writer.keep("Look.", True)
+    assert survey(tmp_path).good == [0, 1]
+
+
 def test_robomimics_file_has_its_groups(tmp_path):
     h5py = pytest.importorskip("h5py", reason="the workspace has it; elsewhere it is optional")
     data = DataSet(filled(tmp_path / "set"))
