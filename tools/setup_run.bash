@@ -189,7 +189,7 @@ disk_note() {
     local full
     full=$(full_disks | paste -sd ' ')
     if [[ -n $full ]]; then
-        echo "the disk is full: nothing is left for $full (df -h); all of set-up takes some 4 GB"
+        echo "the disk is full: nothing is left for $full (df -h); all of set-up takes some 5 GB"
     else
         echo "$1"
     fi
@@ -203,7 +203,7 @@ cause_of() {
     local line
     line=$(first_line 'no space left on device|disk quota exceeded|enough free space|not enough space in')
     if [[ -n $line ]]; then
-        echo "the disk is full (df -h; all of set-up takes some 4 GB): $line"
+        echo "the disk is full (df -h; all of set-up takes some 5 GB): $line"
     elif [[ -n $(full_disks) ]]; then
         disk_note
     elif [[ $1 -eq 137 || $1 -eq 143 ]]; then

@@ -319,7 +319,7 @@ def test_too_little_disk_is_told_before_anything_is_fetched(workspace):
     root, fakes = workspace
     (fakes / "free").write_text("3900")
     status, said = finish(start(root))
-    assert status == 1 and "too little disk: / has 3900 MB free" in said and "4000 MB" in said
+    assert status == 1 and "too little disk: / has 3900 MB free" in said and "4800 MB" in said
     assert "too little disk" in last_failure(root).cause
     assert "apt-get" not in (root / ".baxter/logs/apt.log").read_text()
     # The rest of a set-up that has begun needs less.
