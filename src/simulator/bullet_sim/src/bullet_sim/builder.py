@@ -112,8 +112,10 @@ def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose,
         "baseOrientation": start.quaternion,
         "baseInertialFramePosition": root_offset[:3, 3].tolist(),
         "baseInertialFrameOrientation": quaternion_from_matrix(root_offset).tolist(),
-        # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
-        "flags": (pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
+        # Bullet numbers links depth first by itself, which patches are not in. Self-collision must be enabled at
+        # creation; Model then keeps only the requested pairs.
+        "flags": pybullet.URDF_MAINTAIN_LINK_ORDER
+        | (pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
         # Models with joints never sleep, as in Gazebo: a drive would not wake them.
         | (0 if static or own[0].joints else pybullet.URDF_ENABLE_SLEEPING),
     }

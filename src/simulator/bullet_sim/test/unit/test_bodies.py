@@ -373,3 +373,26 @@ def test_surfaces_that_act_alike_are_no_further_link(world, first, second, patch
                     for name, said in (("a", first), ("b", second), ("c", second)))
     model = world.spawn(parse_urdf('<robot name="r">%s%s</robot>' % (base, parts)), "r")
     assert sum(map(len, model.parts.patches.values())) == patches
+
+
+def test_surfaces_of_some_links_leave_all_joints_where_they_are(world):
+    """Bullet numbers links depth first, unless it is told not to: a further link of the first arm shifted the second
+    one's."""
+    inertial = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+    arm = "".join(
+        '<link name="{0}{1}">%s<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
+        '<joint name="to_{0}{1}" type="revolute"><parent link="{2}"/><child link="{0}{1}"/><origin xyz="0.2 {3} 0"/>'
+        '<limit lower="-3" upper="3" effort="9" velocity="9"/></joint>'
+        '<link name="tip_{0}{1}"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>'
+        '<joint name="fix_{0}{1}" type="fixed"><parent link="{0}{1}"/><child link="tip_{0}{1}"/></joint>'
+        '<gazebo reference="tip_{0}{1}"><mu1>0.1</mu1></gazebo>'.format(*link) % inertial
+        for link in (("a", 1, "base", 1), ("a", 2, "a1", 0), ("b", 1, "base", -1), ("b", 2, "b1", 0)))
+    robot = parse_urdf('<robot name="r"><link name="base">%s</link>%s</robot>' % (inertial, arm))
+    model = world.spawn(robot, "r", Pose((0, 0, 5)))
+    for link, place in {"a1": (0.2, 1, 5), "a2": (0.4, 1, 5), "b1": (0.2, -1, 5), "b2": (0.4, -1, 5)}.items():
+        np.testing.assert_allclose(model.link_pose(link).position, place, atol=1e-6)
+    model.drive_velocity(model.index(["to_b2"]), np.array([1.0]), np.array([9.0]))
+    step(world, 5)
+    velocity = dict(zip(model.joint_names, model.read_joints()[1], strict=True))
+    assert velocity["to_b2"] == pytest.approx(1.0, abs=0.05)
+    assert model.link_twist("b2")[1][0] - model.link_twist("b1")[1][0] == pytest.approx(1.0, abs=0.05)
