@@ -138,13 +138,20 @@ class Expert:
 
     def _approach(self, side, place, rotation):
         """A hand that comes to its place along its own axis, and closes there."""
+        height = _funnel(self._beside(side, place, rotation))
+        closes = self._is_at(side, place, rotation, self._patience(side))
+        return Hand(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
+
+    def _beside(self, side, place, rotation):
+        """How far a hand is beside its way to a place [m]; turns count as well."""
         pose, axis = self.arms[side].pose, rotation[:, 2]
         off = pose[:3, 3] - place
-        beside = float(np.linalg.norm(off - axis * (axis @ off)))
-        beside += 0.05 * float(np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T)))
-        times = _STILL_NEAR if self.arms[side].gripper.position < _BEGUN else 1.0
-        closes = self._is_at(side, place, rotation, times)
-        return Hand(place - axis * _funnel(beside), rotation, CLOSED if closes else OPEN)
+        return (float(np.linalg.norm(off - axis * (axis @ off)))
+                + 0.05 * float(np.linalg.norm(rotation_vector(rotation @ pose[:3, :3].T))))
+
+    def _patience(self, *sides):
+        """How much further from their places hands may be once fingers of one of them have begun to close."""
+        return _STILL_NEAR if any(self.arms[side].gripper.position < _BEGUN for side in sides) else 1.0
 
 
 class ReachExpert(Expert):
@@ -185,23 +192,25 @@ class PickPlaceExpert(Expert):
 
 
 class TwoArmLiftExpert(Expert):
-    """Each hand at its handle, then both up."""
+    """Both hands come down at their handles and close together, then both go up. One that closed before the other would
+    pull the pot about."""
 
     TASK = "TwoArmLift"
     _HIGH_M = 0.16
 
     def hands(self):
         """Both hands."""
-        handles, pose = self.task._handles(), self.task.pot.pose
-        rotation = down(_nearest(_yaw(pose), 0.0, math.pi))
-        holding = [self.arms[side].gripper.holds for side in SIDES]
-        found = {side: self._approach(side, place, rotation) for side, place in handles.items()}
-        if all(holding):
+        handles = self.task._handles()
+        rotation = down(_nearest(_yaw(self.task.pot.pose), 0.0, math.pi))
+        if all(self.arms[side].gripper.holds for side in SIDES):
             raised = self._HIGH_M - self.task._lift()
             return {side: Hand(self.arms[side].pose[:3, 3] + (0.0, 0.0, raised), rotation, CLOSED, 0.5)
                     for side in SIDES}
-        return {side: hand._replace(grip=CLOSED) if holds else hand
-                for (side, hand), holds in zip(found.items(), holding, strict=True)}
+        height = _funnel(max(self._beside(side, place, rotation) for side, place in handles.items()))
+        times = self._patience(*SIDES)
+        closes = all(self._is_at(side, place, rotation, times) for side, place in handles.items())
+        return {side: Hand(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
+                for side, place in handles.items()}
 
 
 class TwoArmHandoverExpert(Expert):

@@ -29,6 +29,17 @@ def test_an_expert_does_its_task_and_the_record_is_replayed_to_the_last_bit(task
     core.close()
 
 
+@pytest.mark.parametrize("seed", [100000, 100004])
+def test_hands_close_on_a_pot_together(seed):
+    """One that closes first pulls the pot away from the other: these seeds failed."""
+    core = core_of("TwoArmLift")
+    episode = record(core, expert_of(core), seed, noise=1.0)
+    left, right = episode.columns[EXPERT_ACTION][:, [6, 13]].T
+    assert episode.success and left.max() > 0.0
+    np.testing.assert_array_equal(left, right)
+    core.close()
+
+
 def test_what_an_expert_wants_is_beside_what_was_done():
     core = core_of("Reach", options=PLAIN)
     episode = record(core, expert_of(core), 1, noise=1.0)
