@@ -11,12 +11,12 @@ from sensor_renderer.best import best_renderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import looking_at
-from urdf_model import parse_xml
 from urdf_model.writer import drawing_urdf
 from world_picture.drawing import DrawingCache
 
 from .errors import LabError
 from .planning import FLOOR
+from .tools import root_of
 
 if TYPE_CHECKING:
     from sensor_renderer.gl_renderer import GlRenderer
@@ -104,7 +104,7 @@ def _lenses(urdf):
     """{link: (horizontal field of view [rad], nearest, furthest [m])} of the cameras in a description."""
     return {block.get("reference"): tuple(float(block.findtext("sensor/camera/" + path))
                                           for path in ("horizontal_fov", "clip/near", "clip/far"))
-            for block in parse_xml(urdf).findall("gazebo") if block.find("sensor/camera") is not None}
+            for block in root_of(urdf).findall("gazebo") if block.find("sensor/camera") is not None}
 
 
 def _entry(name, model):

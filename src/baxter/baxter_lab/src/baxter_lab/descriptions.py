@@ -50,7 +50,8 @@ def baxter_srdf(arguments: dict[str, str]) -> str:
     return _expanded("baxter_moveit_config", "config/baxter.srdf.xacro", electric)
 
 
-def joint_limits() -> dict:
+def joint_limits() -> dict[str, Any]:
     """Limits for planned motions, slower than the drives': what people can stand beside."""
     path = Path(find_packages().get_path("baxter_moveit_config")) / "config" / "joint_limits.yaml"
-    return yaml.safe_load(path.read_text(encoding="utf-8"))
+    limits: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return limits

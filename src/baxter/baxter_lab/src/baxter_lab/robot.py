@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from arm_kinematics import NoSolution, solve, solve_as_vendor
-from baxter_model import HEAD_JOINT, JOINTS, SIDES
+from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware.arms.joint_command import JointCommand, Mode
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.robot_state import Event, State
@@ -233,4 +232,4 @@ class Baxter:
                         strict=True))
 
     def __repr__(self) -> str:
-        return "Baxter (%s, head at %.2f rad)" % (self.state.value, self.head.pan if HEAD_JOINT else math.nan)
+        return "Baxter (%s, head at %.2f rad)" % (self.state.value, self.head.pan)

@@ -19,8 +19,16 @@ class Tool(NamedTuple):
 
     side: str
     description: str
-    place: tuple = (0.0, 0.0, 0.0)
-    rpy: tuple = (0.0, 0.0, 0.0)
+    place: Sequence[float] = (0.0, 0.0, 0.0)
+    rpy: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+def root_of(urdf: str) -> etree._Element:
+    """The root element of a description. Raises LabError where it holds none, urdf_model.XmlRefused."""
+    root = parse_xml(urdf)
+    if root is None:
+        raise LabError("a description holds no XML element; expected <robot name=\"...\">")
+    return root
 
 
 def with_tools(robot: str, tools: Sequence[Tool]) -> str:
@@ -28,12 +36,12 @@ def with_tools(robot: str, tools: Sequence[Tool]) -> str:
     weight, and they collide as the hand does. Raises LabError for an unknown side, and for a name that is taken."""
     if not tools:
         return robot
-    root = parse_xml(robot)
+    root = root_of(robot)
     names = {link.get("name") for link in root.findall("link")}
     for tool in tools:
         if tool.side not in SIDES:
             raise LabError("a tool's side is %r; choices are %s" % (tool.side, ", ".join(SIDES)))
-        described = parse_xml(tool.description)
+        described = root_of(tool.description)
         links = [link.get("name") for link in described.findall("link")]
         if len(links) != 1 or links[0] in names:
             raise LabError("a tool is one link with a name that the robot does not have; found %s"

@@ -16,7 +16,7 @@ from sim_time.pace import Schedule
 from . import avoidance, collision, safety
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Hashable, Iterable, Mapping
 
     from arm_kinematics import Chain
     from baxter_sim_hardware.robot import Baxter
@@ -60,7 +60,8 @@ class Guarding:
         self._watches = {side: collision.Held() for side in SIDES}
         self.held = dict.fromkeys(SIDES, ())
         self._schedule = Schedule(CHECK_RATE_HZ)
-        self.safety, self.warn = None, None
+        self.safety: safety.Safety | None = None
+        self.warn: Callable[[float, Hashable, str], None] = lambda time_s, kind, text: None
 
     def forget(self) -> None:
         """The joints were put elsewhere."""
