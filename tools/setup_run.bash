@@ -215,6 +215,8 @@ cause_of() {
         echo "the network cannot be reached (cable, Wi-Fi, proxy?): $line"
     elif line=$(first_line 'unable to locate package|no installation candidate') && [[ -n $line ]]; then
         echo "a package is missing in the system's sources (docs/platforms.md lists suitable systems): $line"
+    elif line=$(first_line 'cannot find -lE?GL|(EGL/egl|GL/gl)\.h: no such file') && [[ -n $line ]]; then
+        echo "a Python package is compiled here and misses OpenGL's libraries (sudo apt install libegl-dev libgl-dev): $line"
     elif line=$(first_line 'permission denied|read-only file system') && [[ -n $line ]]; then
         echo "no permission to write files (was set-up run with sudo before?): $line"
     else

@@ -4,6 +4,7 @@
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -50,6 +51,20 @@ def test_the_dev_container_is_a_stage_with_its_user_and_forwards_the_page():
     assert f"\nFIRST_PORT = {wanted['forwardPorts'][0]}\n" in page
     for command in (wanted["postCreateCommand"], wanted["postAttachCommand"]):
         assert (ROOT / command.split()[0]).exists()
+
+
+@pytest.mark.parametrize(("processor", "expected"), [
+    ("amd64", ""), ("arm64", "update\ninstall -y --no-install-recommends libegl-dev libgl-dev\n")])
+def test_the_stage_that_compiles_has_what_it_links_with(tmp_path, processor, expected):
+    """Debian 13's ROS packages bring no libraries of OpenGL to link with."""
+    stage = (ROOT / "docker/Dockerfile").read_text().split(" AS wheels\n")[1].split("\nFROM ")[0]
+    command = re.search(r"^RUN (if .*?[^\\])$", stage, re.S | re.M)[1]
+    for name, body in {"dpkg": f"echo {processor}", "apt-get": f'echo "$@" >>{tmp_path}/said'}.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{body}\n")
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "said").touch()
+    subprocess.run(["sh", "-c", command], check=True, env={"PATH": f"{tmp_path}:/usr/bin:/bin"})
+    assert (tmp_path / "said").read_text() == expected
 
 
 @pytest.fixture(scope="module")

@@ -389,6 +389,8 @@ SAYINGS = [
     (1, "SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED]", "a certificate that is not trusted"),
     (100, "E: Unable to locate package ros-desktop", "a package is missing in the system's sources"),
     (1, "cannot create directory 'build': Permission denied", "no permission to write files"),
+    (1, "/usr/bin/ld: cannot find -lEGL: No such file or directory", "a Python package is compiled here"),
+    (1, "glcontext/headless.cpp:3:10: fatal error: EGL/egl.h: No such file", "a Python package is compiled here"),
     (137, "c++: fatal error", "it was killed"),
     (2, "CMake Error at CMakeLists.txt:7\n-- Configuring incomplete, errors occurred!", "-- Configuring incomplete"),
 ]
