@@ -116,12 +116,15 @@ declare -A PROGRAMS=(
 run_program() {
     local mode=$1 command
     shift
-    if ! asks_only "$mode" "$@"; then refuse_words "$mode" "$@" || exit; fi
-    if ! asks_only "$mode" "$@" || has_earlier_build; then use_container "$mode" "$@" || exit; fi
+    if ! asks_only help "$@"; then refuse_words "$mode" "$@" || exit; fi
+    if ! asks_only help "$@" || has_earlier_build; then use_container "$mode" "$@" || exit; fi
     read -ra command <<<"${PROGRAMS[$mode]}"
     if asks_only "$mode" "$@"; then
         # While set-up is at work, half a build may be there.
-        if ! has_earlier_build || set_up_runs; then help_of "$mode" && exit; fi
+        if ! has_earlier_build || set_up_runs; then
+            if asks_only help "$@"; then help_of "$mode" && exit; fi
+            bring_up_to_date || exit
+        fi
         use_loopback
     elif [[ $mode == test ]]; then
         bring_up_to_date --strict || exit

@@ -162,6 +162,12 @@ def tasks() -> list[str]:
 
 def wrong_check(options: argparse.Namespace) -> Iterator[str]:
     known = exercises()
+    names = [name for names in known.values() for name in names]
+    if options.start and options.start not in names:
+        yield "there is no exercise '%s'; there are: %s%s" % (
+            options.start, ", ".join(names), did_you_mean(options.start, names))
+    if options.list or options.start:
+        return
     if not options.lab:
         yield "say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows them all)"
     elif options.lab not in known and (len(options.words) not in (1, 2) or options.lab.endswith(".py")):

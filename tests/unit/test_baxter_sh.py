@@ -404,6 +404,7 @@ REFUSED = {
     "check lab2 .": "is no file", "check wave.py": "LAB [EXERCISE] PROGRAM", "check lab3 wave.py": "did you mean lab2?",
     "check wave wave.py": "an exercise of lab2", "check lab2 wav wave.py": "did you mean wave?",
     "check lab2 wave.py --sed 3": "did you mean --seed?", "check lab2 wave.py --seed x": "a whole number from 0",
+    "check --start wav": "did you mean wave?", "check --start": "--start",
     "check lab2 wave.py --profile real": "robot", "check cwru wave wave.py": "no exercise 'wave'",
     "grade": "which folder", "grade nowhere": "no folder or archive nowhere", "grade . lab4": "did you mean lab2?",
     "grade . lab2 wav": "did you mean wave?", "grade . --workers 0": "from 1",
@@ -428,7 +429,7 @@ ACCEPTED = (
     "notebook 7_waving", "notebook --list", "web", "web --port 80 __name:=page", "web --no-notebook", "conformance",
     "conformance localhost --json x", "test", "test bullet_sim -k foo --lf", "test --busy",
     "test --busy=30 test_words.py", "test --busy bullet_sim", "test --changed", "test torture", "test -x --repeat 3",
-    "sim python3 nowhere.py", "sim", "sim devel/lib/x", "sim bash -c ./nowhere",
+    "check --list", "check --start wave", "sim python3 nowhere.py", "sim", "sim devel/lib/x", "sim bash -c ./nowhere",
 )
 
 
