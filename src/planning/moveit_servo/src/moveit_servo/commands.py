@@ -27,11 +27,13 @@ class CommandIgnored(ValueError):
 
 @dataclass
 class _Newest:
-    """The newest command of one kind. since [s]: when it was sent; value None: no motion is wanted."""
+    """The newest command of one kind. since [s]: when it was sent, -inf if it came too late; value None: no motion is
+    wanted; is_new: no step has been made since it came."""
 
     since: float = -np.inf
     value: Any = None
     frame: Frame = ""
+    is_new: bool = True
 
 
 @dataclass
@@ -94,16 +96,22 @@ class Commands:
         self._pose = _Newest(since, pose)
 
     def newest(self, now: float, settings: ServoSettings) -> tuple[str, Any, Frame]:
-        """Return (kind, value, frame) of the command in force at ``now`` [s]: "twist", "joints" or "pose"; "" if there
-        is none."""
+        """Return (kind, value, frame) of the command in force for a step at ``now`` [s]: "twist", "joints" or "pose";
+        "" if there is none.
+
+        Each counts for one step, however late that is made: on a busy machine simulated time may jump by more than the
+        time-out between a command and its step, and the arm would stand still.
+        """
+        found: tuple[str, Any, Frame] = ("", None, "")
         for kind, newest, timeout in (("twist", self._twist, settings.incoming_command_timeout),
                                       ("joints", self._jog, settings.incoming_command_timeout),
                                       ("pose", self._pose, settings.target_pose_timeout or np.inf)):
-            if newest.value is not None and now - newest.since < timeout:
-                if kind != "pose":
-                    self.forget_pose()  # a hand on the stick ends a pursuit
-                return kind, newest.value, newest.frame
-        return "", None, ""
+            is_new, newest.is_new = newest.is_new and newest.since > -np.inf, False
+            if found[0] == "" and newest.value is not None and (is_new or now - newest.since < timeout):
+                found = kind, newest.value, newest.frame
+        if found[0] in ("twist", "joints"):
+            self.forget_pose()  # a hand on the stick ends a pursuit
+        return found
 
     def forget_pose(self) -> None:
         """Pursue no pose any longer."""

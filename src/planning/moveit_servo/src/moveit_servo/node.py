@@ -178,6 +178,7 @@ class ServoNode:
         if arrived - since >= timeout:
             self._refuse("a command has come %.2f s after its stamp, and counts for %g s; do the clocks agree?"
                          % (arrived - since, timeout))
+            since = -math.inf
         frame = header.frame_id.lstrip("/")
         try:
             if "\0" in frame:  # tf's library has an error of its own for it

@@ -96,7 +96,17 @@ def test_commands_grow_old_and_twists_go_first():
     assert taken.newest(1.25, SPEEDS)[0] == "joints"
     assert taken.newest(1.31, SPEEDS)[0] == ""  # the pose has been given up
     taken.take_pose(np.eye(4), 2.0)
+    assert taken.newest(2.0, SPEEDS)[0] == "pose"
     assert taken.newest(2.0 + SPEEDS.target_pose_timeout, SPEEDS)[0] == ""
+
+
+def test_a_command_counts_for_one_step_also_where_time_jumps():
+    taken = commands()
+    taken.take_twist((0.1, 0, 0, 0, 0, 0), "", 1.0, SPEEDS)
+    taken.take_jog(["a"], [0.5], 1.0, SPEEDS)
+    assert [taken.newest(1.0 + 3.0 * SPEEDS.incoming_command_timeout, SPEEDS)[0] for _ in range(2)] == ["twist", ""]
+    taken.take_twist((0.1, 0, 0, 0, 0, 0), "", -np.inf, SPEEDS)
+    assert taken.newest(2.0, SPEEDS)[0] == "", "it has come too late"
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1.01])
