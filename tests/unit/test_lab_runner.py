@@ -203,6 +203,8 @@ case $1 in
     *leaves.test) setsid sleep 60 & ;;
     *hangs.test) sleep 60 ;;
     *dies.test) exit 1 ;;
+    *ahead.test) [[ $LAB_REAL_TIME_FACTOR == 3 ]] || exit 1 ;;
+    *in_time.test) [[ $LAB_REAL_TIME_FACTOR == 1 ]] || exit 1 ;;
     *as_usual.test) [[ -z $LEFT_BY_A_UNIT_TEST && $LC_ALL != de_DE* ]] || exit 1 ;;
 esac
 echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESULTS_DIR/T.xml
@@ -234,6 +236,14 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, fake_rostest, monkeypatch,
     tally = rostests.run(path, tmp_path / "work", dict(os.environ), time_limit_s=limit_s)
     assert (tally.passed, tally.failed) == (passed, failed)
     assert detail is None or detail in tally.details[0]
+
+
+@pytest.mark.parametrize(("name", "mark"), [("ahead", ""), ("in_time", "<!-- real time -->"),
+                                            ("in_time", "<!-- whole machine -->")])
+def test_labs_run_ahead_unless_the_file_says_real_time(tmp_path, fake_rostest, name, mark):
+    path = tmp_path / f"{name}.test"
+    path.write_text(f"{mark}<launch/>")
+    assert rostests.run(path, tmp_path / "work", dict(os.environ)).failed == 0
 
 
 def test_the_comma_locale_is_there_as_a_whole_or_not_at_all(tmp_path, monkeypatch):

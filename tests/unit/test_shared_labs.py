@@ -25,7 +25,8 @@ def write(folder, name, lab="<param name='speed' value='2'/>", inside=""):
 def test_files_share_a_lab_that_is_written_the_same(tmp_path):
     lab = shared_labs.lab_of(write(tmp_path, "one"))
     assert lab == shared_labs.lab_of(write(tmp_path, "two", "<!-- fast -->\n  <param  name='speed' value='2' />"))
-    others = ["<param name='speed' value='3'/>", "<!-- beside others --><param name='speed' value='2'/>", ""]
+    others = ["<param name='speed' value='3'/>", "<!-- beside others --><param name='speed' value='2'/>",
+              "<!-- real time --><param name='speed' value='2'/>", ""]
     found = [shared_labs.lab_of(write(tmp_path, f"other{number}", other)) for number, other in enumerate(others)]
     assert lab not in found
     alone = write(tmp_path, "alone")

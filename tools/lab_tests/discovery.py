@@ -52,6 +52,11 @@ def is_whole_machine(path: Path) -> bool:
     return _has_mark(path, "whole machine")
 
 
+def runs_in_real_time(path: Path) -> bool:
+    """Whether the labs of a .test file run in real time; others run ahead (rostests.SPEED)."""
+    return is_whole_machine(path) or _has_mark(path, "real time")
+
+
 def looks_at_the_whole_tree(path: Path) -> bool:
     """Whether a test file says that it reads files of all packages."""
     return "pytest.mark.tree" in path.read_text(encoding="utf-8")

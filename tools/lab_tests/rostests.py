@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from lab_tests import processes, shared_labs
-from lab_tests.discovery import is_long
+from lab_tests.discovery import is_long, runs_in_real_time
 from lab_tests.results import Tally, failure, read_rostest_results
 from processes.ports import free_port
 
@@ -24,6 +24,8 @@ OUTPUT_LINES_SHOWN = 80
 # Environment variable with the factor of time limits, for rostest and for the tests' own deadlines
 # (lab_testing.waiting).
 STRETCH_VARIABLE = "LAB_TEST_STRETCH"
+# Simulated time by wall time in labs whose launch names none, and the variable that launch files read it from.
+SPEED, SPEED_VARIABLE = 3.0, "LAB_REAL_TIME_FACTOR"
 STRETCHED_ROSTEST = Path(__file__).with_name("stretched_rostest.py")
 
 
@@ -40,7 +42,7 @@ def run(
     stretch: factor of all time limits, including those in the file, when the processes get only a part of the machine.
     """
     _empty(work_folder)
-    tally = _run(path, [], work_folder, environment, time_limit_s, stretch)
+    tally = _run(path, [], work_folder, environment, time_limit_s, stretch, runs_in_real_time(path))
     return _with_output(tally, path, work_folder)
 
 
@@ -59,7 +61,7 @@ def run_shared(
         _empty(folder)
         launch, results = shared_labs.write(waiting, folder)
         owner = ["--package", "lab_testing", "--pkgdir", str(folder)]
-        whole = _run(launch, owner, folder, environment, None, stretch)
+        whole = _run(launch, owner, folder, environment, None, stretch, runs_in_real_time(paths[0]))
         ran = [path for path, result in zip(waiting, results, strict=True) if result.is_dir()] or waiting[:1]
         for path, result in zip(ran, results, strict=False):
             tallies[path] = read_rostest_results(result)
@@ -86,7 +88,7 @@ def _with_output(tally: Tally, path: Path, work_folder: Path) -> Tally:
 
 def _run(
     path: Path, options: list[str], work_folder: Path, environment: dict[str, str], time_limit_s: float | None,
-    stretch: float,
+    stretch: float, in_real_time: bool,
 ) -> Tally:
     if time_limit_s is None:
         time_limit_s = stretch * max(LONG_TIME_LIMIT_S if is_long(path) else TIME_LIMIT_S, declared_s(path))
@@ -101,6 +103,7 @@ def _run(
         "ROS_LOG_DIR": str(work_folder / "log"),
         "ROS_TEST_RESULTS_DIR": str(work_folder / "results"),
         STRETCH_VARIABLE: f"{stretch:g}",
+        SPEED_VARIABLE: f"{1.0 if in_real_time else SPEED:g}",
     }
     command = ["rostest"] if stretch == 1.0 else [sys.executable, str(STRETCHED_ROSTEST)]
     output = work_folder / "output.txt"

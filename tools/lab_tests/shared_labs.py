@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
-from lab_tests.discovery import mostly_waits, shares_its_lab
+from lab_tests.discovery import mostly_waits, runs_in_real_time, shares_its_lab
 
 DEFAULT_LIMIT_S = 60.0
 # For the start of the lab, and to put it back after each file.
@@ -28,7 +28,7 @@ def lab_of(path: Path) -> str | None:
     for test in root.findall("test"):
         root.remove(test)
     text = ElementTree.canonicalize(ElementTree.tostring(root, encoding="unicode"), strip_text=True)
-    return f"{mostly_waits(path)} {text}"
+    return f"{mostly_waits(path)} {runs_in_real_time(path)} {text}"
 
 
 def write(paths: list[Path], folder: Path) -> tuple[Path, list[Path]]:
