@@ -33,7 +33,7 @@ class ForceTorqueSensor(PacedSensor):
         except BulletSimError as error:
             raise PluginError("%s: <jointName>: %s" % (self.what, error)) from error
         self._frame = context.frame(self._joint.child)
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
         self._measuring = False
 
     def update(self, time_s: float, dt: float) -> None:

@@ -29,7 +29,7 @@ class BlockLaser(RaySensor):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
 
     def message(self, ranges: np.ndarray) -> PointCloud:
         with np.errstate(invalid="ignore"):  # 0 times infinity
@@ -52,7 +52,7 @@ class VelodyneLaser(RaySensor):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
         self._least = max(self.number("min_range", 0.0), self.pattern.range_min)
         self._most = min(self.number("max_range", self.pattern.range_max), self.pattern.range_max)
         self._organized = context.element_text("organize_cloud", "false").lower() in ("true", "1")

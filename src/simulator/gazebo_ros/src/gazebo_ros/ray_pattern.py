@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 #: Largest number of rays per tick [about 5 us each]: a larger scan takes several ticks, as a real scanner's sweep does.
 RAYS_PER_TICK = 32
 _MAX_RAYS = 100000
+# Of all numbers of a ray, which messages have in 32 bits.
+_MOST = 1e9
 _ONCE_ROUND = 2.0 * math.pi + 0.01  # [rad]; descriptions round it up
 
 
@@ -68,7 +70,10 @@ class RayPattern:
             value = math.nan
         if not math.isfinite(value):
             raise RayPatternError("%s: <%s> is '%s', expected a number" % (self._what, path, text))
-        return value
+        used = min(max(value, -_MOST), _MOST)
+        if used != value:
+            self.remarks.append("%s: <%s> is %g, for which %g is used" % (self._what, path, value, used))
+        return used
 
 
 class Sweep:

@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 
     from gazebo_ros.model_plugin import PluginContext
 
+# No element of a sensor means more than this; squares of it can be computed with.
+_MOST = 1e12
+# A sensor with a lower rate above 0 measures once. Messages have the period in 32 bits.
+_SLOWEST_HZ = 1e-9
+
 
 class PacedSensor(ModelPlugin):
     """Base class: one topic, published at a rate while it has subscribers. Names come from the plugin's elements."""
@@ -44,7 +49,7 @@ class PacedSensor(ModelPlugin):
         self.what = "sensor plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         own = self.number("updateRate", 0.0)
         rate = own if own > 0.0 or self.sensor is None else self.number_in(self.sensor, "update_rate", 0.0)
-        self._pace = Pace(max(0.0, rate))
+        self._pace = Pace(max(_SLOWEST_HZ, rate) if rate > 0.0 else 0.0)
         topic = context.element_text(self.topic_tag, self.default_topic)
         if topic is None:
             raise PluginError("%s names no topic; expected <%s>" % (self.what, self.topic_tag))
@@ -59,7 +64,7 @@ class PacedSensor(ModelPlugin):
         return self.numbers(element, tag, (default,))[0]
 
     def numbers(self, element: Any, tag: str, defaults: Sequence[float]) -> tuple[float, ...]:
-        """As many numbers as ``defaults`` has; raises ``PluginError``."""
+        """As many numbers as ``defaults`` has, up to _MOST each, with a warning beyond; raises ``PluginError``."""
         text = (element.findtext(tag) or "").strip()
         try:
             values = tuple(float(word) for word in text.split()) or tuple(defaults)
@@ -68,7 +73,14 @@ class PacedSensor(ModelPlugin):
         if len(values) != len(defaults) or not np.isfinite(values).all():
             raise PluginError("%s: <%s> is '%s', expected %d number%s"
                               % (self.what, tag, text, len(defaults), "" if len(defaults) == 1 else "s"))
-        return values
+        used = tuple(min(max(value, -_MOST), _MOST) for value in values)
+        if used != values:
+            self.context.log.warn("%s: <%s> is '%s', of which %g is used at most" % (self.what, tag, text, _MOST))
+        return used
+
+    def noise(self) -> float:
+        """The standard deviation ``gaussianNoise``, 0 by default. A negative one means its amount, as in Gazebo."""
+        return abs(self.number("gaussianNoise", 0.0))
 
     def sensor_pose(self) -> np.ndarray:
         """The pose (4, 4) of the ``<sensor>`` in its link."""
@@ -172,7 +184,7 @@ class RangeFinder(RaySensor):
         self._field = self.number("fov", self.pattern.field)
         said = context.element_text("radiation", "infrared").lower()
         self._radiation = Range.ULTRASOUND if said == "ultrasound" else Range.INFRARED
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
 
     def message(self, ranges: np.ndarray) -> Range:
         nearest = min(float(ranges.min()), self.pattern.range_max)
@@ -199,7 +211,7 @@ class ImuSensor(PacedSensor):
         self._body = self.link if self.link is not None else self.link_named("bodyName")
         self._frame = context.element_text("frameName", self._body)
         self._place = np.eye(4) if self.sensor is None else self.sensor_pose()
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, "rpyOffset", (0.0,) * 3))[:3, :3]
         if context.element_text("initialOrientationAsReference", "false").lower() in ("true", "1"):
             self._turn = self._turn @ self._matrix()[:3, :3].T
@@ -253,7 +265,7 @@ class PoseSensor(PacedSensor):
         self._offset = np.array(self.numbers(context.element, "xyzOffset", (0.0,) * 3))
         turn = "rpyOffset" if context.element.find("rpyOffset") is not None else "rpyOffsets"
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, turn, (0.0,) * 3))
-        self._noise = self.number("gaussianNoise", 0.0)
+        self._noise = self.noise()
 
     def publish(self, time_s: float) -> None:
         if not self.is_due(time_s):

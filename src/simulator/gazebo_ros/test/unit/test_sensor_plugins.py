@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sensors in a small physics world with known measurements."""
+import io
 import math
 
 import numpy as np
@@ -39,8 +40,8 @@ class Lab:
         robot = parse_urdf(urdf, "test")
         self.model = self.world.spawn(robot, "it", pose, static=static)
         element = (plugins(robot) + found_in(robot, warn=pytest.fail))[0]
-        self.ros = FakeRos()
-        context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), None, self.ros,
+        self.ros, self.log = FakeRos(), FakeLog()
+        context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), self.log, self.ros,
                                 parameters or {})
         try:
             self.plugin = plugin_class(context)
@@ -180,6 +181,25 @@ def test_p3d_says_where_a_link_is(lab):
     assert last.header.frame_id == "world" and last.child_frame_id == "link"
     assert (last.pose.pose.position.x, last.pose.pose.position.y) == pytest.approx((2.0, 2.0))
     assert last.twist.twist.linear.z == pytest.approx(-9.81 * last.header.stamp.to_sec(), abs=0.03)
+
+
+@pytest.mark.parametrize(("noise", "spread", "warnings"), [("-0.1", 0.1, 0), ("0.1", 0.1, 0), ("1e300", 1e12, 1)])
+def test_a_noise_may_be_negative_and_is_bounded(lab, noise, spread, warnings):
+    plugin = """<gazebo><plugin filename="libgazebo_ros_p3d.so"><topicName>truth</topicName><bodyName>link</bodyName>
+<gaussianNoise>%s</gaussianNoise></plugin></gazebo>""" % noise
+    it = lab(BOX % plugin, sensor_plugins.PoseSensor, Pose((1, 2, 5)))
+    speeds = [message.twist.twist.linear.x for message in it.run(1.0)]
+    assert len(speeds) == 500 and np.std(speeds) == pytest.approx(spread, rel=0.2)
+    assert len(it.log.of("warn")) == warnings
+
+
+@pytest.mark.parametrize(("old", "new"), [("<update_rate>50<", "<update_rate>1e-300<"), ("<max>5<", "<max>1e300<"),
+                                          (">-0.5<", ">-1e300<")])
+def test_a_scan_with_absurd_numbers_fits_into_a_message(lab, old, new):
+    ray = RAY % ("", 3, "libgazebo_ros_laser.so")
+    assert old in ray
+    it = lab(BOX % ray.replace(old, new), sensor_plugins.Laser, Pose((0, 0, 1)))
+    it.run(0.1)[0].serialize(io.BytesIO())
 
 
 def test_a_bumper_feels_the_weight(lab):
