@@ -28,7 +28,7 @@ class Outgoing:
     def is_due(self, now_s: float) -> bool:
         return now_s >= self._due_s
 
-    def wait_s(self, now_s: float) -> float | None:
+    def wait_s(self, now_s: float) -> float:
         """Until the next message is due [s]; infinite when none is."""
         return max(0.0, self._due_s - now_s)
 
