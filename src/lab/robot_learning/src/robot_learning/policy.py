@@ -70,8 +70,27 @@ def _same_names(name, wanted, found):
 
 
 def contract_of(text: Mapping[str, Any]) -> Contract:
-    """A contract as JSON has it. Raises KeyError, TypeError."""
-    return Contract(**{**text, **{name: tuple(text[name]) for name in ("observation", "units", "action")}})
+    """A contract as JSON has it. Raises KeyError, TypeError, and ValueError for what cannot be."""
+    found = Contract(**{**text, **{name: _texts(name, text[name]) for name in ("observation", "units", "action")}})
+    for name in ("task", "control", "inputs"):
+        if not isinstance(getattr(found, name), str):
+            raise ValueError("%s is %r; it must be a text" % (name, getattr(found, name)))
+    for name in ("rate_hz", "chunk"):
+        value = getattr(found, name)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise ValueError("%s is %r; it must be a whole number from 1" % (name, value))
+    if len(found.units) != len(found.observation):
+        raise ValueError("there are %d units for %d numbers of the observation"
+                         % (len(found.units), len(found.observation)))
+    if not isinstance(found.robosuite_order, bool):
+        raise ValueError("robosuite_order is %r; it must be true or false" % (found.robosuite_order,))
+    return found
+
+
+def _texts(name, texts):
+    if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
+        raise ValueError("%s is %r; it must be a list of texts" % (name, texts))
+    return tuple(texts)
 
 
 def normalised(values: np.ndarray, mean: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -97,11 +116,34 @@ class Policy:
             raise PolicyError("the policy's inputs are of kind %r; this version has %r"
                               % (contract.inputs, inputs.KIND))
         self.inputs = Inputs(contract.observation, contract.control != "osc_pose")
+        self._require_numbers()
         expected = (len(self.inputs), contract.chunk * len(contract.action))
         found = (self.network.layers[0][0].shape[0], self.network.layers[-1][0].shape[1])
         if found != expected:
             raise PolicyError("the network goes from %d to %d numbers; its contract needs %d to %d"
                               % (*found, *expected))
+
+    def _require_numbers(self):
+        """Raises PolicyError where an action would be no number, or an array does not fit the others."""
+        width = self.network.layers[0][0].shape[0]
+        for index, (weights, offsets) in enumerate(self.network.layers):
+            if weights.ndim != 2 or offsets.shape != weights.shape[1:] or width != weights.shape[0]:
+                raise PolicyError("layer %d has weights %s and offsets %s after %d numbers; they do not fit"
+                                  % (index, weights.shape, offsets.shape, width))
+            if not (np.isfinite(weights).all() and np.isfinite(offsets).all()):
+                raise PolicyError("layer %d has weights that are not finite" % index)
+            width = weights.shape[1]
+        for name, size in (("input", len(self.inputs)), ("action", len(self.contract.action))):
+            for what in ("mean", "scale"):
+                values = np.asarray(getattr(self, "%s_%s" % (name, what)))
+                wanted = "%d finite numbers%s" % (size, " above 0" if what == "scale" else "")
+                if values.shape != (size,) or values.dtype.kind != "f":
+                    raise PolicyError("%s_%s has %s %s; it must have %s" % (
+                        name, what, values.dtype, values.shape, wanted))
+                bad = ~np.isfinite(values) | ((what == "scale") & (values <= 0.0))
+                if bad.any():
+                    raise PolicyError("%s_%s has %g at place %d; it must have %s" % (
+                        name, what, values[bad][0], np.flatnonzero(bad)[0], wanted))
 
     def chunks(self, observations: np.ndarray) -> np.ndarray:
         """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""
@@ -146,19 +188,21 @@ def load(path: Path) -> Acting:
             arrays = {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise PolicyError("there is no policy file %s" % path) from None
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+    except (OSError, ValueError, TypeError, AttributeError, zipfile.BadZipFile, EOFError) as error:
         raise PolicyError("%s is no policy file: %s" % (path, error)) from error
     try:
         text = json.loads(str(arrays["contract"]))
         if text.pop("format") != FORMAT:
-            raise PolicyError("%s has another format than %d, which this version reads" % (path, FORMAT))
+            raise PolicyError("it has another format than %d, which this version reads" % FORMAT)
         contract = contract_of(text)
         layers = [(arrays["weights_%d" % index], arrays["offsets_%d" % index])
                   for index in range(sum(name.startswith("weights_") for name in arrays))]
-        if not layers or not all(np.isfinite(array).all() for layer in layers for array in layer):
-            raise PolicyError("%s has no weights, or weights that are not finite" % path)
+        if not layers:
+            raise PolicyError("it has no weights")
         return Policy(contract, Network(layers),
                       *(arrays[name] for name in ("input_mean", "input_scale", "action_mean", "action_scale")))
+    except PolicyError as error:
+        raise PolicyError("%s: %s" % (path, error)) from None
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise PolicyError("%s is no policy file of this version: %s %s"
                           % (path, type(error).__name__, error)) from error
@@ -177,12 +221,15 @@ class Runner:
         self._chunks: list[np.ndarray] = []
 
     def act(self, observation: Sequence[float] | np.ndarray) -> np.ndarray:
-        """(action,) of the present observation. Raises PolicyError for numbers that are not finite."""
+        """(action,) of the present observation. Raises PolicyError for numbers that are not finite, seen or said."""
         observation = np.asarray(observation, dtype=float)
         if observation.shape != (len(self.policy.contract.observation),) or not np.isfinite(observation).all():
             raise PolicyError("an observation is %d finite numbers; found %s"
                               % (len(self.policy.contract.observation), observation))
-        self._chunks.insert(0, self.policy.chunks(observation[None])[0])
+        said = self.policy.chunks(observation[None])[0]
+        if not np.isfinite(said).all():
+            raise PolicyError("the policy says actions that are not finite")
+        self._chunks.insert(0, said)
         del self._chunks[self.policy.contract.chunk:]
         predicted = np.array([chunk[age] for age, chunk in enumerate(self._chunks)])
         weights = ENSEMBLE ** np.arange(len(predicted))

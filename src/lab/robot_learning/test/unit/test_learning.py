@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A small policy learns from a small set of the real format; contracts, files and figures are checked."""
 import dataclasses
+import json
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from robot_learning.evaluation import Score, wilson
 from robot_learning.inputs import Inputs
 from robot_learning.network import Network
 from robot_learning.pictures import choose, draw_curve
-from robot_learning.policy import PolicyError, Runner, load
+from robot_learning.policy import Contract, PolicyError, Runner, load
 from robot_learning.training import TrainingSettings, contract_of, train
 
 HAND, GOAL = ("left_hand.x", "left_hand.y", "left_hand.z"), ("goal.x", "goal.y", "goal.z")
@@ -86,6 +88,51 @@ def test_a_file_that_is_cut_off_and_arrays_without_a_contract_are_refused(learne
     for name in ("half.npz", "other.npz"):
         with pytest.raises(PolicyError, match=name):
             load(tmp_path / name)
+
+
+@pytest.mark.parametrize(("name", "value", "text"), [
+    ("input_mean", np.full(12, np.nan), "input_mean has nan at place 0"),
+    ("input_scale", np.zeros(12), "12 finite numbers above 0"),
+    ("input_mean", np.zeros(3), "12 finite"), ("action_scale", np.full(3, np.inf), "action_scale"),
+    ("action_mean", np.array(["a"] * 3), "action_mean"), ("weights_0", np.zeros(12), "layer 0"),
+    ("weights_1", np.zeros((5, 3)), "layer 1"), ("offsets_0", np.zeros(3), "layer 0"),
+    ("weights_0", np.full((12, 8), 1e300), "layer 0 has weights that are not finite")])
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")
+def test_numbers_that_would_give_no_action_are_refused(learned, tmp_path, name, value, text):
+    path = tmp_path / "policy.npz"
+    small = dataclasses.replace(learned[0], network=Network.random(
+        (12, 8, 2 * len(learned[0].contract.action)), np.random.default_rng(0)))
+    small.save(path)
+    with np.load(path) as file:
+        np.savez(path, **{**{key: file[key] for key in file.files}, name: value})
+    with pytest.raises(PolicyError, match="policy.npz: .*" + text):
+        load(path)
+
+
+@pytest.mark.parametrize(("change", "text"), [
+    ({"rate_hz": 0}, "rate_hz is 0"), ({"rate_hz": "x"}, "rate_hz"), ({"chunk": 2.0}, "chunk is 2.0"),
+    ({"task": ["Reach"]}, "task is"), ({"units": ["m"]}, "1 units for 6"), ({"observation": "abc"}, "list of texts"),
+    ({"robosuite_order": "yes"}, "true or false")])
+def test_a_contract_that_cannot_be_is_refused(learned, tmp_path, change, text):
+    path = tmp_path / "policy.npz"
+    learned[0].save(path)
+    with np.load(path) as file:
+        arrays = {key: file[key] for key in file.files}
+    arrays["contract"] = np.array(json.dumps({**json.loads(str(arrays["contract"])), **change}))
+    np.savez(path, **arrays)
+    with pytest.raises(PolicyError, match=text):
+        load(path)
+
+
+def test_a_policy_that_says_nan_is_stopped(learned):
+    class Says(NamedTuple):
+        contract: Contract
+
+        def chunks(self, observations):
+            return np.full((len(observations), self.contract.chunk, len(self.contract.action)), np.nan)
+
+    with pytest.raises(PolicyError, match="not finite"):
+        Runner(Says(learned[0].contract)).act(np.zeros(6))
 
 
 @pytest.mark.parametrize(("found", "text"), [
