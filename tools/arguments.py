@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -274,6 +275,7 @@ def wrong_labs(options: argparse.Namespace) -> Iterator[str]:
 
 def wrong_test(options: argparse.Namespace) -> Iterator[str]:
     from lab_tests import discovery
+    os.chdir(ROOT)  # as the program does
     try:
         if options.changed is None:
             discovery.select(discovery.take_inventory(ROOT), options.rest, ROOT)

@@ -441,6 +441,12 @@ def test_what_can_be_judged_without_a_set_up_is_refused_before_it(fresh_clone, w
     assert done.stdout == "" and len(done.stderr.splitlines()) == 1
 
 
+def test_a_path_of_a_test_counts_from_the_workspace_as_its_program_reads_it(fresh_clone, tmp_path):
+    done = baxter("test", "tests/unit/test_words.py", script=fresh_clone / "baxter.sh", cwd=tmp_path)
+    assert (fresh_clone / "was_set_up").exists() and done.returncode == 7, done
+    (fresh_clone / "was_set_up").unlink()
+
+
 @pytest.mark.parametrize("words", ACCEPTED)
 def test_what_may_be_right_is_not_refused_before_a_set_up(fresh_clone, words):
     done = baxter(*words.split(), script=fresh_clone / "baxter.sh", cwd=fresh_clone)
