@@ -84,12 +84,14 @@ def _replay(options):
 
 
 def _told(found):
+    for why in found.faults:
+        print(why)
     for index, why in found.broken.items():
         print("episode %d is broken: %s" % (index, why))
     for name in found.strays:
         print("%s belongs to no episode" % name)
     print("%s whole, %d broken" % (counted(len(found.good), "episode"), len(found.broken)))
-    return 1 if found.broken or found.strays else 0
+    return 1 if found.broken or found.strays or found.faults else 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:

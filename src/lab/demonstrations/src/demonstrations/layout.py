@@ -108,9 +108,15 @@ def schema_of(folder: Path) -> tuple[Schema, dict[str, Any]]:
         features = {key: Feature(value["dtype"], tuple(value["shape"]), _texts(value.get("names")),
                                  _texts(units.get(key)))
                     for key, value in info["features"].items() if key not in INDICES}
-        schema = Schema(int(info["fps"]), features, info.get("robot_type") or "", own.get("about", {}))
+        rate_hz, robot = info["fps"], info.get("robot_type") or ""
+        if isinstance(rate_hz, float) and rate_hz.is_integer():
+            rate_hz = int(rate_hz)
+        try:
+            schema = Schema(rate_hz, features, robot, own.get("about", {}))
+        except DemonstrationError as error:
+            raise DemonstrationError("%s: %s" % (folder / INFO, error)) from None
         for name in ("total_episodes", "total_frames"):
-            if not (isinstance(info[name], int) and info[name] >= 0):
+            if not is_count(info[name]):
                 raise DemonstrationError("%s: %s is %r, no count" % (folder / INFO, name, info[name]))
     except (KeyError, TypeError, AttributeError) as error:
         raise DemonstrationError("%s is not as in format %s: %s %s" % (
@@ -118,14 +124,21 @@ def schema_of(folder: Path) -> tuple[Schema, dict[str, Any]]:
     return schema, info
 
 
+def is_count(value: Any) -> bool:
+    """Whether it is a whole number from 0."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
 def outcomes_of(folder: Path) -> dict[int, dict[str, Any]]:
-    """{episode: its line} of what was told of each; lines that are cut off have none."""
+    """{episode: its line} of what was told of each: episode, seed, success, frames. Lines that are cut off have none,
+    nor have seeds and frames that are no counts."""
     path, found = folder / OUTCOMES, {}
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else ():
         try:
             outcome = json.loads(line)
-            found[outcome["episode"]] = outcome
-        except (ValueError, KeyError, TypeError):
+            found[outcome["episode"]] = {key: value for key, value in outcome.items()
+                                         if key not in ("seed", "frames") or is_count(value)}
+        except (ValueError, KeyError, TypeError, AttributeError):
             continue
     return found
 

@@ -31,8 +31,10 @@ def read_tasks(folder: Path) -> list[str]:
     table = _read_table(folder / layout.TASKS)
     try:
         rows = sorted(zip(table["task_index"].to_pylist(), table["task"].to_pylist(), strict=True))
-    except KeyError as error:
-        raise DemonstrationError("%s has no column %s" % (folder / layout.TASKS, error)) from None
+    except (KeyError, TypeError) as error:
+        raise DemonstrationError("%s is not as in the format: %s" % (folder / layout.TASKS, error)) from None
+    if not all(isinstance(task, str) for _, task in rows):
+        raise DemonstrationError("%s has a task that is no text" % (folder / layout.TASKS))
     return [task for _, task in rows]
 
 
@@ -61,16 +63,18 @@ def statistics_of(folder: Path, episodes: int) -> dict[str, Statistics] | None:
 
 
 class DataSet:
-    """A set in a folder. Attributes: `folder`, `schema`, `tasks`. len() is the number of its episodes. Raises
-    DemonstrationError, which names the file, also from its methods."""
+    """A set in a folder. Attributes: `folder`, `schema`, `tasks`, and `faults`: what is wrong with files that say of
+    the episodes where they are and what they show. len() is the number of its episodes. Raises DemonstrationError,
+    which names the file, also from its methods."""
 
     _NEEDED = ("episode_index", "tasks", "length", "data/chunk_index", "data/file_index", "dataset_from_index")
 
     def __init__(self, folder: Path):
         self.folder = Path(folder)
         self.schema, self._info = layout.schema_of(self.folder)
-        self.tasks = read_tasks(self.folder) if len(self) else []
+        self.faults: list[str] = []
         self._rows = self._episode_rows()
+        self.tasks = self._read_tasks()
         self._outcomes = layout.outcomes_of(self.folder)
         self._data: tuple[tuple[int, int], Any] | None = None
 
@@ -82,26 +86,37 @@ class DataSet:
         """The seed that each episode began by."""
         return [self._outcomes.get(number, {}).get("seed") for number in range(len(self))]
 
+    def _read_tasks(self):
+        """Without their file: as the episodes say."""
+        try:
+            return read_tasks(self.folder) if len(self) else []
+        except DemonstrationError as error:
+            self.faults.append(str(error))
+            return list(dict.fromkeys(row["tasks"][0] for row in self._rows.values()))
+
     def _episode_rows(self):
-        rows = {}
+        rows: dict[int, dict[str, Any]] = {}
         for path in sorted((self.folder / "meta/episodes").glob("chunk-*/file-*.parquet")):
             if len(rows) >= len(self):
                 break
             try:
                 table = _read_table(path)
-            except DemonstrationError:
-                continue  # its episodes are told as missing
-            names = [name for name in table.column_names if not name.startswith("stats/")]
-            if missing := [name for name in self._NEEDED if name not in names]:
-                raise DemonstrationError("%s has no column %s" % (path, ", ".join(missing)))
-            rows.update({row["episode_index"]: row for row in table.select(names).to_pylist()})
+                names = [name for name in table.column_names if not name.startswith("stats/")]
+                if missing := [name for name in self._NEEDED if name not in names]:
+                    raise DemonstrationError("%s has no column %s" % (path, ", ".join(missing)))
+                for row in table.select(names).to_pylist():
+                    _require_row(path, row)
+                    rows[row["episode_index"]] = row
+            except DemonstrationError as error:
+                self.faults.append(str(error))
         return rows
 
     def _row(self, number):
         if not 0 <= number < len(self):
             raise DemonstrationError("%s has the episodes 0 to %d, not %d" % (self.folder, len(self) - 1, number))
         if number not in self._rows:
-            raise DemonstrationError("%s: no readable file in meta/episodes has episode %d" % (self.folder, number))
+            raise DemonstrationError("%s: no readable file in meta/episodes has episode %d%s" % (
+                self.folder, number, "".join("; " + fault for fault in self.faults)))
         return self._rows[number]
 
     def length(self, number: int) -> int:
@@ -121,7 +136,9 @@ class DataSet:
             if len(mine) != row["length"]:
                 raise DemonstrationError("%s has %d frames of episode %d, which has %d" % (
                     path, len(mine), number, row["length"]))
-            part = table.slice(mine[0], len(mine))
+            if len(mine) and mine[-1] - mine[0] != len(mine) - 1:
+                raise DemonstrationError("%s has other frames among those of episode %d" % (path, number))
+            part = table.slice(mine[0] if len(mine) else 0, len(mine))
             columns = {key: _column(part[key], feature) for key, feature in self.schema.features.items()
                        if not feature.is_picture}
         except (KeyError, ValueError) as error:
@@ -160,14 +177,28 @@ class DataSet:
         return {camera: self._film(number, camera) for camera in self.schema.cameras}, said
 
     def check(self, number: int) -> None:
-        """Read an episode, and look whether its films have enough frames. Raises DemonstrationError."""
-        self.episode(number)
+        """Read an episode, and look whether its numbers are finite and its films have enough frames. Raises
+        DemonstrationError."""
+        for key, values in self.episode(number).columns.items():
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                raise DemonstrationError("episode %d of %s has numbers in %s that are missing or not finite"
+                                         % (number, self.folder, key))
         for camera in self.schema.cameras:
             row, path = self._row(number), self._film(number, camera)
             end = round(row["videos/%s/to_timestamp" % camera] * self.schema.rate_hz)
             if frame_count(path) < end:
                 raise DemonstrationError("%s has %d frames; episode %d ends at frame %d" % (
                     path, frame_count(path), number, end))
+
+
+def _require_row(path, row):
+    """Raises DemonstrationError where a row of meta/episodes has no counts, or no task."""
+    for name in DataSet._NEEDED:
+        if name != "tasks" and not layout.is_count(row[name]):
+            raise DemonstrationError("%s: %s is %r, no count" % (path, name, row[name]))
+    tasks = row["tasks"]
+    if not (isinstance(tasks, list) and tasks and isinstance(tasks[0], str)):
+        raise DemonstrationError("%s: tasks is %r, no list of texts" % (path, tasks))
 
 
 def _column(values, feature):
@@ -178,16 +209,18 @@ def _column(values, feature):
 
 @dataclass
 class Survey:
-    """good: numbers of whole episodes; broken: {number: why}; strays: files of no episode."""
+    """good: numbers of whole episodes; broken: {number: why}; strays: files of no episode; faults: of `DataSet`."""
 
     good: list[int] = field(default_factory=list)
     broken: dict[int, str] = field(default_factory=dict)
     strays: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
 
 
 def survey(folder: Path) -> Survey:
     """Read a whole set. Raises DemonstrationError where not even its description can be read."""
-    found, data = Survey(), DataSet(folder)
+    data = DataSet(folder)
+    found = Survey(faults=data.faults)
     for number in range(len(data)):
         try:
             data.check(number)

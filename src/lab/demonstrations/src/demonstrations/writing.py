@@ -21,7 +21,7 @@ from . import layout
 from .films import Film
 from .frames import DemonstrationError, Episode, Feature, Schema
 from .needed import need
-from .statistics import PictureStatistics, Statistics, as_lists, from_lists, joined, of_numbers
+from .statistics import NAMES, PictureStatistics, Statistics, as_lists, from_lists, joined, of_numbers
 
 
 class SetWriter:
@@ -76,11 +76,18 @@ class SetWriter:
 
         self.episodes, self._frames = info["total_episodes"], info["total_frames"]
         self._tasks = read_tasks(self.folder)
-        if (self.folder / layout.STATISTICS).is_file():
-            self._statistics = from_lists(layout.read_json(self.folder / layout.STATISTICS))
+        self._statistics = self._known_statistics()
         counts = {int(part["count"][0]) for key, part in self._statistics.items() if key not in self.schema.cameras}
         if counts != {self._frames}:  # a recorder was ended between this file and the one that counts the episodes
             self._statistics = statistics_of(self.folder, self.episodes) or self._statistics
+
+    def _known_statistics(self):
+        """Those of meta/stats.json, none where it is broken."""
+        try:
+            found = from_lists(layout.read_json(self.folder / layout.STATISTICS))
+            return found if all(np.size(part[name]) for part in found.values() for name in NAMES) else {}
+        except (DemonstrationError, KeyError, TypeError, ValueError, AttributeError):
+            return {}
 
     def _begin(self):
         self._rows = {key: [] for key, feature in self.schema.features.items() if not feature.is_picture}

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from demonstrations import layout, robomimic, statistics
+from demonstrations.card import card
+from demonstrations.editing import listed
 from demonstrations.films import frames_of
 from demonstrations.frames import (
     ACTION,
@@ -176,6 +178,84 @@ def test_the_other_episodes_of_a_broken_set_are_kept(tmp_path, name):
     mended = DataSet(tmp_path / "mended")
     np.testing.assert_array_equal(mended.episode(1).columns[ACTION], episode(7, 2).columns[ACTION])
     assert mended.episode(1).seed == 2 and survey(tmp_path / "mended").broken == {}
+
+
+def _changed_row(name, change):
+    def break_(folder):
+        parquet = need("pyarrow", "parquet")
+        table = parquet.read_table(folder / name)
+        row = {key: table[key].to_pylist() for key in table.column_names}
+        change(row)
+        parquet.write_table(need("pyarrow").table(row), folder / name)
+
+    return break_
+
+
+def _changed_info(**values):
+    def break_(folder):
+        path = folder / layout.INFO
+        path.write_text(json.dumps({**json.loads(path.read_text()), **values}))
+
+    return break_
+
+
+def _text(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+ROW = "meta/episodes/chunk-000/file-001.parquet"
+NUMBERS = "data/chunk-000/file-001.parquet"
+
+
+@pytest.mark.parametrize(("break_", "good", "said"), [
+    (_changed_row(ROW, lambda row: row.pop("length")), [0, 2], "no column length"),
+    (_changed_row(ROW, lambda row: row.update(length=["x"])), [0, 2], "length is 'x'"),
+    (_changed_row(ROW, lambda row: row.update(length=[None])), [0, 2], "length is None"),
+    (_changed_row(ROW, lambda row: row.update({"data/chunk_index": ["a"]})), [0, 2], "data/chunk_index is 'a'"),
+    (_changed_row(ROW, lambda row: row.update(tasks=[[]])), [0, 2], "tasks is "),
+    (_changed_row(NUMBERS, lambda row: row.update({STATE: [float("nan")] * 3})), [0, 2], "not finite"),
+    (_changed_row(NUMBERS, lambda row: row.update({STATE: [1.0, None, 1.0]})), [0, 2], "missing or not finite"),
+    (_changed_row(NUMBERS, lambda row: [row[key].insert(1, row[key][0]) for key in row] and
+                  row["episode_index"].__setitem__(1, 7)), [0, 2], "other frames among those of episode 1"),
+    (lambda folder: (folder / layout.TASKS).unlink(), [0, 1, 2], "tasks.parquet is missing"),
+    (_changed_row(layout.TASKS, lambda row: row.update(task=[None, "x"])), [0, 1, 2], "no text"),
+    (_text(layout.OUTCOMES, '5\n{"episode": 0, "seed": "x", "frames": "many"}\n{"episode": 1, "seed": 1.5}\n'),
+     [0, 1, 2], ""),
+    (_text(layout.STATISTICS, "[]"), [0, 1, 2], ""),
+    (_text(layout.STATISTICS, '{"index": {"count": []}}'), [0, 1, 2], ""),
+])
+def test_what_is_whole_in_a_broken_set_is_kept_and_the_rest_named(tmp_path, break_, good, said):
+    folder = filled(tmp_path / "set")
+    break_(folder)
+    found = repair(folder, tmp_path / "mended")
+    assert found.good == good and said in " ".join([*found.broken.values(), *found.faults])
+    mended = DataSet(tmp_path / "mended")
+    assert [len(mended.episode(number)) for number in range(len(good))] == [(5, 3, 7)[number] for number in good]
+    assert all(row.frames in (0, 3, 5, 7) for row in listed(folder)[0]) and card(mended)
+
+
+@pytest.mark.parametrize("text", [None, "[]", '{"index": {"count": []}}', '{"index": {"mean": "x"}}'])
+def test_lost_statistics_come_back_from_those_of_the_episodes(tmp_path, text):
+    folder = filled(tmp_path / "set")
+    (folder / layout.STATISTICS).unlink()
+    if text is not None:
+        (folder / layout.STATISTICS).write_text(text)
+    with SetWriter(folder, SCHEMA) as writer:
+        writer.add(episode(4, 3, "Reach it again."))
+    whole = filled(tmp_path / "whole", (5, 3, 7, 4))
+    assert (folder / layout.STATISTICS).read_text() == (whole / layout.STATISTICS).read_text()
+
+
+@pytest.mark.parametrize("values", [
+    {"fps": "twenty"}, {"fps": float("inf")}, {"fps": 20.5}, {"fps": None}, {"total_episodes": True},
+    {"total_episodes": "3"}, {"features": {"action": {"dtype": "float32", "shape": [0]}}}])
+def test_a_broken_description_is_named(tmp_path, values):
+    folder = filled(tmp_path / "set")
+    _changed_info(**values)(folder)
+    with pytest.raises(DemonstrationError, match="info.json"):
+        survey(folder)
+    with pytest.raises(DemonstrationError, match="info.json"):
+        SetWriter(folder, SCHEMA)
 
 
 def test_a_cut_off_film_is_named(tmp_path):
