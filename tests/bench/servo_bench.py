@@ -2,17 +2,17 @@
 """The servo in random streams of twists in physics, 20 s each of simulated time: Baxter's two arms, and PROBOT.
 
 Every stream begins at a random posture among random things, and its twists change once a second; through
-singularities, joint limits and obstacles (``servo_streams``). Times are CPU times of one thread for a step. A round has
-40 streams, with ``--all`` 200.
+singularities, joint limits and obstacles (``servo_streams``). Times of steps are CPU times of one thread, those to the
+first motion simulated. A round has 40 streams, with ``--all`` 200.
 """
 import os
 
 import numpy as np
-from servo_streams import FORCE_N, STREAM_S, BaxterPhysics, ProbotPhysics, run
+from servo_streams import FORCE_N, STREAM_S, BaxterPhysics, ProbotPhysics, first_motion, run
 
 from moveit_servo.warming import warm_up
 
-STREAMS, STREAMS_OF_ALL, QUICK, QUICK_S = 40, 200, 2, 4.0
+STREAMS, STREAMS_OF_ALL, FIRST_MOTIONS, QUICK, QUICK_S = 40, 200, 20, 2, 4.0
 
 
 def measure(report, quick, number):
@@ -37,6 +37,8 @@ def measure(report, quick, number):
                 ("the hand off its way", "deg", max(np.degrees(one.hand_rad) for one in found), None)):
             report.add("%s: %s [%s]" % (name, what, unit), value, unit, samples=count,
                        **({} if most is None else {"most": most}))
+        firsts = [1e3 * first_motion(physics, first + k) for k in range(min(count, FIRST_MOTIONS))]
+        report.add("%s: from a twist to the first motion" % name, max(firsts), "ms", samples=len(firsts), most=20.0)
         every = {"samples": count, "pooled": True, "most": 0.0}
         for what, hits in (("a contact of more than %g N" % FORCE_N, [one.force_n > FORCE_N for one in found]),
                            ("a posture that exact geometry refuses", [one.touches for one in found]),

@@ -55,6 +55,8 @@ PROBE_STEPS, MOVED_RAD = 12, 1e-4
 # Ends of the names of joints that are near 0 in a stretched arm.
 STRETCHED = ("e1", "w1", "joint_3", "joint_5")
 FORCE_N = 5.0
+# An arm has come to rest after this time, and is to move within the second [s].
+RESTS_S, FIRST_S = 0.5, 0.5
 UNDER_FLOOR_M = 0.001
 
 
@@ -404,6 +406,29 @@ def run(physics: Physics, seed: int, seconds: float = STREAM_S) -> Found:
     for arm in arms:
         found.share = max(found.share, _worst(arm))
     return found
+
+
+def first_motion(physics: Physics, seed: int) -> float:
+    """Simulated time [s] from a twist for an arm at rest, whose step a node makes at once, to a joint's first motion
+    in the physics. Raises RuntimeError if none moves."""
+    rng = np.random.default_rng((seed, 2))
+    _, scene = start(physics, rng)
+    physics.begin([], scene.state.q)
+    arm = Steered(physics, list(physics.arms)[seed % len(physics.arms)], scene, rng)
+    for _ in range(round(RESTS_S / TICK_S)):
+        physics.tick()
+    q, velocity = np.array(scene.state.q), np.zeros(len(scene.state.q))
+    known = {name: index for name, index in physics.model.index.items() if name in physics.joints()[0]}
+    _take(physics.joints(), known, q, velocity)
+    arm.twist, began, here = np.eye(6)[seed % 6] * 0.2, physics.time_s, q.copy()
+    for step in range(round(FIRST_S / PERIOD_S)):
+        _step(physics, [arm], q, velocity, step * PERIOD_S, Found())
+        for _ in range(round(PERIOD_S / TICK_S)):
+            physics.tick()
+            _take(physics.joints(), known, here, velocity.copy())
+            if np.abs(here - q)[arm.indices].max() > MOVED_RAD:
+                return physics.time_s - began
+    raise RuntimeError("seed %d: no joint has moved within %g s" % (seed, FIRST_S))
 
 
 def _step(physics: Physics, arms: list[Steered], q: np.ndarray, velocity: np.ndarray, now: float,
