@@ -45,15 +45,17 @@ class Entities:
 
         Raises :class:`UnknownEntity`.
         """
-        model_name, separator, link_name = scoped.partition("::")
-        if not separator:
+        # A model's name may have a :: itself.
+        within = max((name for name in self._world.models if scoped.startswith(name + "::")), key=len, default=None)
+        model_name = scoped.partition("::")[0] if within is None else within
+        if "::" not in scoped:
             owners = [model for model in self._world.models.values() if scoped in model.link_names]
             if len(owners) == 1:
                 return owners[0], scoped
             found = "; several models have it: %s" % _known([model.name for model in owners]) if owners else ""
             raise UnknownEntity("link '%s' not found; scope the link by its model's name: model::link%s"
                                 % (scoped, found))
-        model = self.model(model_name)
+        model, link_name = self.model(model_name), scoped[len(model_name) + 2:]
         if link_name not in model.link_names:
             raise UnknownEntity("model '%s' has no link '%s'; links: %s"
                                 % (model_name, link_name, _known(model.link_names)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from gazebo_msgs.srv import (
     DeleteLight,
     DeleteLightResponse,
@@ -16,8 +15,9 @@ from gazebo_msgs.srv import (
 )
 from std_msgs.msg import ColorRGBA
 
+from bullet_sim import BulletSimError
+from gazebo_ros.convert import pose_from_msg
 from gazebo_ros.entities import UnknownEntity
-from urdf_model.transforms import matrix_from_quaternion, rigid
 
 if TYPE_CHECKING:
     from gazebo_ros.world_lights import WorldLights
@@ -54,14 +54,12 @@ class LightServices:
             if direction.x or direction.y or direction.z:
                 values["direction"] = (direction.x, direction.y, direction.z)
             if q.x or q.y or q.z or q.w:
-                at, turn = request.pose.position, np.array([q.x, q.y, q.z, q.w])
-                turn /= np.linalg.norm(turn)
-                values["pose"] = rigid(matrix_from_quaternion(turn), (at.x, at.y, at.z))
+                values["pose"] = pose_from_msg(request.pose).matrix()
             self._lights.change(
                 request.light_name, diffuse=colour(request.diffuse), specular=colour(request.specular),
                 attenuation=(request.attenuation_constant, request.attenuation_linear, request.attenuation_quadratic),
                 **values)
-        except (UnknownEntity, ValueError) as error:
+        except (UnknownEntity, BulletSimError, ValueError) as error:
             return SetLightPropertiesResponse(False, "SetLightProperties: %s" % error)
         return SetLightPropertiesResponse(True, "SetLightProperties: attributes set")
 

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from sdf_model import Light
     from urdf_model import MergedRobot, Robot
 
+# Of the numbers of a light, which viewers have in 32 bits.
+_MOST = 1e9
+
 
 class WorldLights:
     """Lights by name."""
@@ -43,11 +46,11 @@ class WorldLights:
 
     def change(self, name: str, **values: npt.ArrayLike) -> None:
         """Change some fields of a light; raises :class:`UnknownEntity`, and ``ValueError`` for values that are not
-        finite."""
+        finite or that 32 bits do not hold."""
         light = self.get(name)
         for key, value in values.items():
-            if not np.isfinite(np.asarray(value, dtype=float)).all():
-                raise ValueError("%s of light '%s' is %s, expected finite numbers" % (key, name, value))
+            if not (np.abs(np.asarray(value, dtype=float)) <= _MOST).all():
+                raise ValueError("%s of light '%s' is %s, expected finite numbers up to %g" % (key, name, value, _MOST))
         self._lights[name] = dataclasses.replace(light, **values)
         self.on_change()
 

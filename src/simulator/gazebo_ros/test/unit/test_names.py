@@ -34,6 +34,11 @@ def test_a_reference_frame_is_a_model_or_a_link_with_or_without_its_model(world)
     # A model goes before a link of its name; of several links, the first model's counts.
     assert places == {"": [0, 0, 0], "two": [1, 0, 1], "two::camera": [1, 0, 1.3], "base": [0, 0, 1],
                       "camera": [2, 0, 1], "camera::base": [2, 0, 1]}
+    # A model's name may have a :: itself, of which another model's may be the beginning.
+    world.spawn(parse_urdf(CART), "two::front", Pose((3.0, 0.0, 1.0)))
+    assert [entities.link(name)[0].name for name in ("two::front::camera", "two::camera")] == ["two::front", "two"]
+    with pytest.raises(UnknownEntity, match="model 'two' has no link 'rear::camera'"):
+        entities.link("two::rear::camera")
     with pytest.raises(UnknownEntity, match="'lens' is no model and no link; models: one, two, camera"):
         entities.frame("lens")
 

@@ -4,9 +4,12 @@ import re
 
 import numpy as np
 import pytest
+from gazebo_msgs.srv import SetLightPropertiesRequest
 
 from gazebo_ros.entities import UnknownEntity
+from gazebo_ros.light_services import LightServices
 from gazebo_ros.world_lights import WorldLights, lights_of_links
+from loop_ros.testing import FakeRos
 from sdf_model import Light, ModelFolders, Scene, parse_sdf_model
 from urdf_model import merge_fixed, parse_urdf
 from urdf_model.transforms import pose_matrix
@@ -32,6 +35,21 @@ def test_viewers_are_told_in_the_frame_of_the_world_and_of_each_change():
         lights.change("lamp", diffuse=(1.0, 0.0, 0.0, 1.0))
     lights.delete("sun")
     assert told[-1]["lights"] == [] and len(told) == 2
+
+
+@pytest.mark.parametrize("number, word", [(float("nan"), "not finite"), (1e300, "norm of"),
+                                          (float("inf"), "not finite")])
+def test_the_service_refuses_a_pose_that_is_none_with_the_reason(number, word):
+    ros = FakeRos()
+    LightServices(WorldLights([SUN]), ros)
+    request = SetLightPropertiesRequest(light_name="sun")
+    request.pose.orientation.z = number
+    response = ros.services["/gazebo/set_light_properties"](request)
+    assert not response.success and word in response.status_message
+    request.pose.orientation.z, request.attenuation_linear = 2.0, number
+    assert "attenuation of light 'sun'" in ros.services["/gazebo/set_light_properties"](request).status_message
+    request.attenuation_linear = 1.0
+    assert ros.services["/gazebo/set_light_properties"](request).success
 
 
 def test_a_world_that_names_no_light_leaves_it_to_the_viewer():
