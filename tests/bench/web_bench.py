@@ -34,7 +34,13 @@ IMAGE = ("/cameras/%s/image/compressed" % CAMERA, "sensor_msgs/CompressedImage")
 JOINT, GOALS = "left_s0", ({"left_s0": 1.4}, {"left_s0": -0.2})
 FAST, SLOW, MOVING_ROWS, RESTING_ROWS = 0.3, 0.05, 30, 50
 COMMANDS = "/robot/limb/left/joint_command"
+#: Twists of the left hand that a page steers, in turn; a joint that is faster than the first speed moves, an arm whose
+#: joints are all slower than the second is at rest [rad/s].
+TWISTS, BEGUN, RESTS = ((0, 0, 0.4, 0, 0, 0), (0, 0, -0.4, 0, 0, 0)), 0.01, 0.002
+STATUS = ("/left_servo/status", "std_msgs/Int8")
 TIMEOUT_S = 60.0
+#: A page says this often what is held [s].
+STEERED_EVERY_S = 0.03
 
 
 # Drags the left hand's handle by steps of 1 mm from a pose, and says how long each answer took to be shown [ms].
@@ -144,6 +150,7 @@ def measure(report, quick, number):
         vanish(report, lab, web, 2 if quick else 10)
         comparison(report, lab, web)
         stop(report, web, 3 if quick else 10)
+        steer(report, lab, web, 4 if quick else 40)
 
 
 def viewers_cost(report, lab, web, seconds):
@@ -412,3 +419,35 @@ def stop(report, web, times):
             delays.append(told[0] - begin)
     states.close()
     report.add("stop to disabled, the longest", 1000.0 * max(delays), "ms", samples=times, most=50.0)
+
+
+def steer(report, lab, web, times):
+    """From a page's operation to the first joint state in which an arm that was at rest moves."""
+    lab.start("roslaunch", "moveit_servo", "baxter_servo.launch")
+    there = []
+    statuses = web.listen(*STATUS, lambda message, _time_s: there.append(message))
+    wait_until(lambda: there, "the left arm's servo", TIMEOUT_S)
+    statuses.close()
+    enable(web)
+    delays = []
+    with Operator(web) as operator, Heard(lab, JOINTS[0], JointState) as states:
+        for twist in itertools.islice(itertools.cycle(TWISTS), times):
+            wait_until(lambda: len(states.rows) >= RESTING_ROWS and left_speed(states.rows[-RESTING_ROWS:]) < RESTS,
+                       "an arm at rest", TIMEOUT_S)
+            begin = time.monotonic()
+            number = len(states.rows)
+            while left_speed(states.rows[number:]) < BEGUN and time.monotonic() - begin < TIMEOUT_S:
+                operator.socket.send(op="steer", hands={"left": twist})
+                time.sleep(STEERED_EVERY_S)
+            operator.socket.send(op="steer", hands={})
+            delays.append(next(time_s for time_s, message in states.rows[number:]
+                               if left_speed([(time_s, message)]) >= BEGUN) - begin)
+    report.add("a page steers: operation to first motion, median", 1000.0 * statistics.median(delays), "ms",
+               samples=times, most=60.0)
+    report.add("the same, the longest", 1000.0 * max(delays), "ms", samples=times)
+
+
+def left_speed(rows):
+    """The greatest speed of the left arm's joints in (time, JointState) [rad/s]."""
+    return max((abs(speed) for _, message in rows for name, speed in zip(message.name, message.velocity, strict=True)
+                if name.startswith("left_") and "gripper" not in name), default=0.0)
