@@ -46,6 +46,16 @@ def line_of(outcome: Outcome) -> str:
     return json.dumps(row, allow_nan=False)
 
 
+def _outcome(row: dict[str, Any]) -> Outcome:
+    """The reverse of `line_of`. Raises KeyError, ValueError."""
+    outcome = Outcome(row["seed"], row.get("result", {}), row.get("error", ""), row["seconds"])
+    for name, kinds in (("seed", int), ("result", dict), ("error", str), ("seconds", (int, float))):
+        value = getattr(outcome, name)
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            raise ValueError("%s is %.60r in the line of seed %.60r" % (name, value, row["seed"]))
+    return outcome
+
+
 class Records:
     """The file of one batch, which no other batch can use meanwhile. Raises RecordsError, OSError.
 
@@ -95,9 +105,8 @@ class Records:
             if lines and "batch" not in json.loads(lines[0]):
                 raise ValueError("it does not begin with a header")
             versions_there = [one.get("versions") for one in headers]
-            outcomes = [Outcome(row["seed"], row.get("result", {}), row.get("error", ""), row["seconds"])
-                        for row in rows]
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            outcomes = [_outcome(row) for row in rows]
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise RecordsError("%s is no file of results: %s; name another with --out" % (self._path, error)) from error
         for what in ("job", "parameters"):
             for there in headers:

@@ -195,6 +195,20 @@ def test_other_files_are_not_touched(tmp_path, text, message):
     assert path.read_text() == text
 
 
+@pytest.mark.parametrize("line", [
+    '{"seed": [1], "seconds": 1, "result": {}}', '{"seed": "1", "seconds": 1, "result": {}}',
+    '{"seed": 1, "seconds": 1, "result": [1]}', '{"seed": 1, "seconds": null, "result": {}}',
+    '{"seed": 1, "seconds": 1, "error": 5}', "[" * 100_000])
+def test_a_line_that_no_batch_wrote_is_named(tmp_path, line):
+    path, spec = tmp_path / "results.jsonl", Spec("a:B", {})
+    Records(path, spec, {}).close()
+    text = path.read_text() + line + "\n"
+    path.write_text(text)
+    with pytest.raises(RecordsError, match="results.jsonl is no file of results"):
+        Records(path, spec, {})
+    assert path.read_text() == text
+
+
 def test_a_file_that_another_batch_writes_is_refused(tmp_path):
     records = Records(tmp_path / "results.jsonl", SPEC, {})
     with pytest.raises(RecordsError, match="another batch is writing to .*results.jsonl"):
