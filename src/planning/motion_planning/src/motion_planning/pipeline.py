@@ -190,7 +190,7 @@ class _Planning:
                 if failure.code != Code.INVALID_MOTION_PLAN or not paths and attempt >= _MAX_PATHS:
                     raise
                 if not paths:
-                    self._look_up()
+                    self._raise_if_stopped()
                     paths.append(self._path(scene, start, goals, attempt))
         raise AssertionError("not reached")
 
@@ -201,7 +201,7 @@ class _Planning:
         scene = self._within_limits(self.query.scene)
         q = self.query.scene.state.q[self.indices]
         lead = np.empty((0, len(q))) if scene is self.query.scene else q[None]
-        self.tools.exact.prepare(scene, self.query.group, self._look_up_shapes)
+        self.tools.exact.prepare(scene, self.query.group, self._check_shapes_in_time)
         self.spared = max(0.0, self._elapsed() - (1.0 - SHARE_OF_SEARCH) * self.query.allowed_time)
         contacts = self.tools.exact.contacts(scene, scene.state, self.query.group)
         if contacts:
@@ -239,7 +239,7 @@ class _Planning:
             near = np.clip(q + reach * random.uniform(-1.0, 1.0, len(q)), low, high)
             if self.tools.exact.free(scene, scene.state.with_q(near, self.indices), self.query.group):
                 return near
-            self._look_up()
+            self._raise_if_stopped()
         return None
 
     # -- goals --------------------------------------------------------------------------------------------------
@@ -267,7 +267,7 @@ class _Planning:
         found, begin = [], self._elapsed()
         refused, path = "", self.query.path_constraints
         for q in samples:
-            self._look_up()
+            self._raise_if_stopped()
             violated = self._violated(path, scene.state.with_q(q, self.indices), scene)
             q = self._brought_back(q, goal, path, scene) if path is not None and violated else np.array(q)
             if q is None:
@@ -304,7 +304,7 @@ class _Planning:
                 break
             if q is None:
                 why = getattr(samples, "reason", None)
-                self._look_up()
+                self._raise_if_stopped()
                 by_joints = getattr(goal, "joints", ()) and not (goal.positions or goal.orientations)
                 code = Code.NO_IK_SOLUTION if why and not by_joints else Code.GOAL_CONSTRAINTS_VIOLATED
                 unreached = unreached or PlanningFailure(code, "no posture of group '%s' meets the goal: %s" % (
@@ -345,7 +345,7 @@ class _Planning:
         try:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:
-            self._look_up()
+            self._raise_if_stopped()
             late = self._used() >= 0.98 * self.query.allowed_time
             raise PlanningFailure(Code.TIMED_OUT if late else Code.PLANNING_FAILED, str(error)) from None
         self.remarks = getattr(path, "remarks", ())
@@ -362,7 +362,7 @@ class _Planning:
             # For very tight constraints: through every point of a dense path.
             ways.append(("iterative_time_parameterization", _CORNERS[-1]))
         for timing, tolerance in ways:
-            self._look_up()
+            self._raise_if_stopped()
             points = _dense(whole, 2.0 * tolerance) if timing.startswith("iterative") else whole
             timed = time_path(points, velocity, acceleration, timing, tolerance=tolerance)
             hit = self.first_hit(scene, timed, len(lead) > 0)
@@ -396,7 +396,7 @@ class _Planning:
             free = (exact.free(scene, scene.state.with_q(q, self.indices), group) for q in states)
             begin = next((number for number, one in enumerate(free) if one), len(states))
         for first in range(begin, len(states), _AT_ONCE):
-            self._look_up()
+            self._raise_if_stopped()
             some = states[first:first + _AT_ONCE]
             blocked = exact.first_blocked(scene, some, group)
             if blocked is not None:
@@ -410,7 +410,7 @@ class _Planning:
 
     def _in_between(self, scene: Scene, states: np.ndarray, from_collision: bool) -> Flaw | None:
         for begin in range(0, len(states), 512):
-            self._look_up()
+            self._raise_if_stopped()
             some = states[begin:begin + 512]
             first = first_touching(self.tools.exact, scene, self.group, some)
             if first is not None and not from_collision:
@@ -432,14 +432,14 @@ class _Planning:
         """Whether to stop: requested, or this share of the time is over."""
         return self.tools.stop() or self._used() > share * self.query.allowed_time
 
-    def _look_up_shapes(self) -> None:
-        self._look_up()
+    def _check_shapes_in_time(self) -> None:
+        self._raise_if_stopped()
         if self._elapsed() > max(self.query.allowed_time, MIN_FOR_SCENE_S):
             raise PlanningFailure(Code.TIMED_OUT, "time was over after %.2f s, while the shapes of %d objects were "
                                   "prepared; those that are done are kept, so that another request gets further"
                                   % (self._elapsed(), len(self.query.scene.objects)))
 
-    def _look_up(self) -> None:
+    def _raise_if_stopped(self) -> None:
         if self.tools.stop():
             raise PlanningFailure(Code.PREEMPTED, "planning was stopped after %.2f s" % self._elapsed())
 

@@ -13,7 +13,7 @@ import pytest
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.planners import NoPath, Run, Search, parts, plan_path, rrt_connect, shorten
-from motion_planning.planners.parts import _at_once
+from motion_planning.planners.parts import _synchronized
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.planners.trees import growing
 from motion_planning.scene import Scene, WorldObject
@@ -429,7 +429,7 @@ def test_a_posture_aside_that_cannot_be_reached_costs_one_turn_only(pair, monkey
     assert alone.valid(enclosed)[0]
     start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
     asked = []
-    monkeypatch.setattr(parts, "_aside", lambda *arguments: asked.append(arguments) or enclosed)
+    monkeypatch.setattr(parts, "_free_posture_of", lambda *arguments: asked.append(arguments) or enclosed)
     monkeypatch.setattr(parts, "_PAIRS", 0)
     run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
     path = parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
@@ -458,10 +458,10 @@ def test_one_arm_makes_room_for_the_other_and_comes_back(pair):
 
 def test_two_ways_at_once_begin_and_end_together_and_pieces_of_no_length_do_no_harm():
     straight, kinked = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[0.0], [2.0], [3.0], [3.0]])
-    points = _at_once([(np.array([0, 2]), None), (np.array([1]), None)], [straight, kinked])
+    points = _synchronized([(np.array([0, 2]), None), (np.array([1]), None)], [straight, kinked])
     assert np.allclose(points[[0, -1]], [[0.0, 0.0, 0.0], [1.0, 3.0, 1.0]])
     assert np.allclose(points[:, 0], points[:, 1] / 3.0) and np.allclose(points[:, 0], points[:, 2])
-    still = _at_once([(np.array([0]), None), (np.array([1]), None)], [np.zeros((2, 1)), np.array([[0.0], [1.0]])])
+    still = _synchronized([(np.array([0]), None), (np.array([1]), None)], [np.zeros((2, 1)), np.array([[0.0], [1.0]])])
     assert np.allclose(still, [[0.0, 0.0], [0.0, 1.0]])
 
 

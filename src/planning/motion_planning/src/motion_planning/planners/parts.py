@@ -74,9 +74,9 @@ def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, g
         since = run.clock()
         ways.append(shorten(found, alone, run, *_ALONE).points)
         shortening += run.clock() - since
-    points = _at_once(checker.parts, ways)
+    points = _synchronized(checker.parts, ways)
     if not checker.between_parts.way(points):
-        points = _past_each_other(checker, ways)
+        points = _coordinated(checker, ways)
     return points, samples, shortening
 
 
@@ -86,7 +86,7 @@ def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goa
     The searches are bounded, since the posture may be out of reach; points are None where one of them ends."""
     indices, alone = checker.parts[yielding]
     aside, arrived = start.copy(), goal.copy()
-    aside[indices] = arrived[indices] = _aside(alone, bounds[indices], run)
+    aside[indices] = arrived[indices] = _free_posture_of(alone, bounds[indices], run)
     samples, ways = 0, [start[None]]
     for moving, (begin, end) in zip((indices, np.setdiff1d(np.arange(len(start)), indices), indices),
                                     itertools.pairwise([start, aside, arrived, goal]), strict=True):
@@ -101,7 +101,7 @@ def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goa
     return np.concatenate(ways), samples
 
 
-def _aside(alone: SphereChecker, bounds: np.ndarray, run: Run) -> np.ndarray:
+def _free_posture_of(alone: SphereChecker, bounds: np.ndarray, run: Run) -> np.ndarray:
     """A random posture (j,) that is free for one part."""
     random, (low, high) = np.random.default_rng(run.seed), bounds.T
     while True:
@@ -112,7 +112,7 @@ def _aside(alone: SphereChecker, bounds: np.ndarray, run: Run) -> np.ndarray:
         run.check("a posture was looked for where one arm is out of the other's way")
 
 
-def _at_once(parts: Parts, ways: Sequence[np.ndarray]) -> np.ndarray:
+def _synchronized(parts: Parts, ways: Sequence[np.ndarray]) -> np.ndarray:
     """The points (m, k) of both parts beginning and ending at the same time."""
     (one, _), (other, _) = parts
     found = kernels.at_once(*ways)
@@ -121,7 +121,7 @@ def _at_once(parts: Parts, ways: Sequence[np.ndarray]) -> np.ndarray:
     return points
 
 
-def _past_each_other(checker: SphereChecker, ways: Sequence[np.ndarray]) -> np.ndarray | None:
+def _coordinated(checker: SphereChecker, ways: Sequence[np.ndarray]) -> np.ndarray | None:
     """The points (m, k) of the two parts moving along their paths; one waits or moves back for the other if needed.
     None if that does not help."""
     grid = _grid(checker.parts, *map(_dense, ways))
