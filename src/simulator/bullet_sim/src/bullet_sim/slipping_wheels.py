@@ -8,7 +8,7 @@ stable, that force replaces Bullet's friction, axis by axis.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .model import Model
+    from .parts import Place
 
 # A force of the slip takes over from a compliance on that is stable, and lets go below this part of it.
 _LETS_GO = 0.8
@@ -42,6 +43,21 @@ class Slip:
     longitudinal: float = 0.0
 
 
+class _Touch(NamedTuple):
+    """The contact of a wheel: where (3,), directions along the axle and across it (3,) each, the speed of the wheel's
+    surface against the other (3,), the speed of its tread, the load [N], the other's friction, and where Bullet has the
+    other, None for one that stands fast."""
+
+    wheel: Slip
+    place: np.ndarray
+    axes: tuple[np.ndarray, np.ndarray]
+    slip: np.ndarray
+    tread: float
+    load: float
+    friction: float
+    other: tuple[int, int] | None
+
+
 class SlippingWheels:
     """The :class:`Slip` of some wheels of a Model, from its making until :meth:`end`."""
 
@@ -58,24 +74,32 @@ class SlippingWheels:
             if joint is None or joint.type == "prismatic":
                 raise BulletSimError("'%s' of model '%s' is no wheel: no joint turns it" % (wheel.body, model.name))
         self._friction = {wheel.body: self._coefficients(wheel.body) for wheel in self.wheels}
+        #: The bodies that slip along both axes or not at all: Bullet has no axis of inertia for their axles.
+        self.crooked = [wheel.body for wheel in self.wheels if self._axis(wheel.body)[1] < _ALONG]
         self._begin()
 
     def _begin(self) -> None:
         """Of a multibody that is new, or has another step."""
         self._parts = self._model.parts
         self._own = {wheel.body: (False, False) for wheel in self.wheels}
-        self._least = None
+        self._least, self._touching = (0.0, 0.0), 0
 
     def step_changed(self, step_s: float) -> None:
         """From the next tick on, it lasts ``step_s`` [s]."""
-        self._step_s, self._least = step_s, None
+        self._step_s, self._touching = step_s, 0
 
     def end(self) -> None:
         """Give the contacts back to Bullet's friction."""
         for wheel in self.wheels:
             self._take(wheel, (False, False))
 
-    def _coefficients(self, body):
+    def _axis(self, body: str) -> tuple[int, float]:
+        """Which axis of a body's inertia is nearest to its axle, and the cosine between them."""
+        axes = inertial_frame(self._model.merged.links[body])[:3, :3]
+        near = np.abs(axes.T @ self._joints[body].axis)
+        return int(near.argmax()), float(near.max())
+
+    def _coefficients(self, body: str) -> tuple[float, float]:
         """(along the axle, across it) of the friction, with what ``fdir1`` says of it, which is along the axle."""
         surface, most = self._model.merged.links[body].surface, most_friction(self._joints[body])
         along = 1.0 if surface is None or surface.friction is None else surface.friction
@@ -88,88 +112,85 @@ class SlippingWheels:
         """Before a step: the forces of the slip."""
         if self._parts is not self._model.parts:
             self._begin()
-        found = [(wheel, *contact) for wheel in self.wheels for contact in self._contacts(wheel)]
-        if not found:
-            return
-        if self._least is None:
-            self._least = self._stable(found)
-        for wheel, place, axes, slip, tread, load, floor in found:
-            own, force = list(self._own[wheel.body]), np.zeros(3)
+        found = [touch for touch in map(self._touch, self.wheels) if touch is not None]
+        if len(found) > self._touching:
+            self._least, self._touching = self._stable(found), len(found)
+        for touch in found:
+            wheel, own, force = touch.wheel, list(self._own[touch.wheel.body]), np.zeros(3)
             for axis, compliance in enumerate((wheel.lateral, wheel.longitudinal)):
-                viscosity = compliance * tread / wheel.load  # [m/s/N]
+                viscosity = compliance * touch.tread / wheel.load  # [m/s/N]
                 least = self._least[axis] * (_LETS_GO if own[axis] else 1.0)
                 own[axis] = compliance > 0.0 and viscosity >= least
                 if own[axis]:
-                    most = load * floor[0] * self._friction[wheel.body][axis]
-                    force -= axes[axis] * np.clip(axes[axis] @ slip / viscosity, -most, most)
-            self._take(wheel, tuple(own))
+                    most = touch.load * touch.friction * self._friction[wheel.body][axis]
+                    force -= touch.axes[axis] * np.clip(touch.axes[axis] @ touch.slip / viscosity, -most, most)
+            self._take(wheel, (own[0], own[1]))
             if any(self._own[wheel.body]):
-                self._apply(self._model.parts.places[self._numbers[wheel.body]], force, place)
-                if floor[1] is not None:
-                    self._apply(floor[1], -force, place)
+                self._apply(self._place(wheel), force, touch.place)
+                if touch.other is not None:
+                    self._apply(touch.other, -force, touch.place)
 
-    def _apply(self, where, force, place):
+    def _place(self, wheel: Slip) -> Place:
+        return self._model.parts.places[self._numbers[wheel.body]]
+
+    def _apply(self, where: tuple[int, int], force: np.ndarray, place: np.ndarray) -> None:
         pybullet.applyExternalForce(*where, force.tolist(), place.tolist(), pybullet.WORLD_FRAME,
                                     physicsClientId=self._client)
 
-    def _contacts(self, wheel):
-        """[place (3,), (lateral, longitudinal) directions, speed of the wheel's surface against the other (3,), speed
-        of its tread, load [N], (the other's friction, its (body, link) if it moves)], one at most."""
-        place = self._model.parts.places[self._numbers[wheel.body]]
-        points = pybullet.getContactPoints(bodyA=place.body, linkIndexA=place.index, physicsClientId=self._client) or ()
+    def _touch(self, wheel: Slip) -> _Touch | None:
+        """The contact of a wheel in the last step, the mean of several; None for a wheel that touches nothing."""
+        where = self._place(wheel)
+        points = pybullet.getContactPoints(bodyA=where.body, linkIndexA=where.index, physicsClientId=self._client) or ()
         rows = []
         for point in points:
-            sign = 1.0 if (point[1], point[3]) == place else -1.0
+            sign = 1.0 if (point[1], point[3]) == where else -1.0
             other = (point[2], point[4]) if sign > 0.0 else (point[1], point[3])
             if point[9] > 0.0:
                 rows.append((point[9], np.array(point[5 if sign > 0.0 else 6]), sign * np.array(point[7]), other))
         if not rows:
-            return
+            return None
         load = sum(row[0] for row in rows)
-        at = sum(row[0] * row[1] for row in rows) / load
-        normal = sum(row[0] * row[2] for row in rows)
-        state = pybullet.getLinkState(*place, computeLinkVelocity=1, physicsClientId=self._client)
+        place = np.sum([row[0] * row[1] for row in rows], axis=0) / load
+        normal = np.sum([row[0] * row[2] for row in rows], axis=0)
+        state = pybullet.getLinkState(*where, computeLinkVelocity=1, physicsClientId=self._client)
         axle = Pose(state[4], state[5]).matrix()[:3, :3] @ self._joints[wheel.body].axis
         ahead = np.cross(axle, normal)
-        length = np.linalg.norm(ahead)
+        length = float(np.linalg.norm(ahead))
         if length < 1e-3 * load:  # it lies on its side
-            return
+            return None
         ahead /= length
-        beside = np.cross(normal / np.linalg.norm(normal), ahead)
-        turn = np.array(state[7])
-        moving = np.array(state[6]) + np.cross(turn, at - np.array(state[0]))
-        other = max(rows, key=lambda row: row[0])[3]
-        info = pybullet.getDynamicsInfo(*other, physicsClientId=self._client)
-        if info[0] > 0.0:
-            moving = moving - self._speed(other, at)
-        yield (at, (beside, ahead), moving, wheel.radius * abs(turn @ axle), load,
-               (info[1], other if info[0] > 0.0 else None))
+        turn, other = np.array(state[7]), max(rows, key=lambda row: row[0])[3]
+        slip = np.array(state[6]) + np.cross(turn, place - np.array(state[0]))
+        mass, friction = pybullet.getDynamicsInfo(*other, physicsClientId=self._client)[:2]
+        if mass > 0.0:
+            slip -= self._speed(other, place)
+        return _Touch(wheel, place, (np.cross(normal / np.linalg.norm(normal), ahead), ahead), slip,
+                      wheel.radius * abs(float(turn @ axle)), load, friction, other if mass > 0.0 else None)
 
-    def _speed(self, other, at):
+    def _speed(self, other: tuple[int, int], place: np.ndarray) -> np.ndarray:
         if other[1] < 0:
             centre = pybullet.getBasePositionAndOrientation(other[0], physicsClientId=self._client)[0]
             linear, angular = pybullet.getBaseVelocity(other[0], physicsClientId=self._client)
         else:
             state = pybullet.getLinkState(*other, computeLinkVelocity=1, physicsClientId=self._client)
             centre, linear, angular = state[0], state[6], state[7]
-        return np.array(linear) + np.cross(angular, at - np.array(centre))
+        return np.array(linear) + np.cross(angular, place - np.array(centre))
 
-    def _stable(self, found):
+    def _stable(self, found: list[_Touch]) -> tuple[float, ...]:
         """(lateral, longitudinal) [m/s/N] from which on forces of the slip are stable in explicit steps: the largest
         speed that one of them, at all wheels together, gives in a step."""
         inertia, least = mass_matrix_of(self._model), []
         for axis in range(2):
-            rows = np.stack([axes[axis] @ motion_of_point(self._model, wheel.body, place)
-                             for wheel, place, axes, *_ in found])
+            rows = np.stack([touch.axes[axis] @ motion_of_point(self._model, touch.wheel.body, touch.place)
+                             for touch in found])
             least.append(self._step_s * float(np.linalg.eigvalsh(rows @ np.linalg.solve(inertia, rows.T))[-1]))
-        return least
+        return tuple(least)
 
     def _take(self, wheel: Slip, own: tuple[bool, bool]) -> None:
         """Take Bullet's friction away (along the axle, across it) of a wheel, or give it back."""
-        axes = inertial_frame(self._model.merged.links[wheel.body])[:3, :3]
-        near = np.abs(axes.T @ self._joints[wheel.body].axis)
-        if own[0] != own[1] and near.max() < _ALONG:
-            own = (False, False)  # Bullet has no axis for the axle
+        axis, near = self._axis(wheel.body)
+        if own[0] != own[1] and near < _ALONG:
+            own = (False, False)
         if own == self._own[wheel.body]:
             return
         self._own[wheel.body] = own
@@ -177,6 +198,6 @@ class SlippingWheels:
                          for taken, value in zip(own, self._friction[wheel.body], strict=True))
         most = max(along, across)
         factors = [across / most if most else 1.0] * 3
-        factors[int(near.argmax())] = along / most if most else 1.0
-        pybullet.changeDynamics(*self._model.parts.places[self._numbers[wheel.body]], lateralFriction=most,
-                                anisotropicFriction=factors, physicsClientId=self._client)
+        factors[axis] = along / most if most else 1.0
+        pybullet.changeDynamics(*self._place(wheel), lateralFriction=most, anisotropicFriction=factors,
+                                physicsClientId=self._client)

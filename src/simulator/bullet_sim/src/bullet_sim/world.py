@@ -261,6 +261,9 @@ class World:
         """Let the contacts of ``wheels`` of a Model slip (:mod:`.slipping_wheels`); returns the
         :class:`.slipping_wheels.SlippingWheels`. Raises BulletSimError for a body that is no wheel."""
         slipping = SlippingWheels(self._client, model, wheels, self.time_step_s)
+        if slipping.crooked:
+            self._warn("model '%s': wheels %s slip along both axes or not at all, since their axles are no axes of "
+                       "their inertia" % (model.name, ", ".join(slipping.crooked)))
         self._slipping.setdefault(model, []).append(slipping)
         model.directed |= {wheel.body for wheel in wheels}
         if model in self._sliding:

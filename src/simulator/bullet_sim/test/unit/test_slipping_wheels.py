@@ -11,6 +11,7 @@ from urdf_model import parse_urdf
 
 RADIUS, MASS_KG = 0.2, 10.0
 _INERTIAL = '<inertial><mass value="%g"/><inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/></inertial>'
+WHEEL = _INERTIAL.format(0.02) % 1.0
 _HELD = '<limit lower="-900" upper="900" effort="1000" velocity="100"/>'
 # A wheel at an angle to its way, which its fork goes along; it may rise, and feels its load alone.
 RIG = """<robot name="rig"><link name="world"/><link name="x">%(light)s</link><link name="y">%(light)s</link>
@@ -24,12 +25,12 @@ RIG = """<robot name="rig"><link name="world"/><link name="x">%(light)s</link><l
 <origin xyz="0 0 0.2" rpy="-1.5707963 0 0"/></joint></robot>"""
 
 
-def rig(steer=0.0, step_s=0.001, shape='sphere radius="0.2"'):
-    world = World(time_step_s=step_s)
+def rig(steer=0.0, step_s=0.001, shape='sphere radius="0.2"', wheel=WHEEL, warn=pytest.fail):
+    world = World(time_step_s=step_s, warn=warn)
     world.add_ground_plane()
     model = world.spawn(parse_urdf(RIG % {
         "light": _INERTIAL.format(0.01) % 0.1, "heavy": _INERTIAL.format(0.1) % (MASS_KG - 1.0),
-        "wheel": _INERTIAL.format(0.02) % 1.0, "held": _HELD, "steer": steer, "shape": shape}), "rig")
+        "wheel": wheel, "held": _HELD, "steer": steer, "shape": shape}), "rig")
     return world, model, MASS_KG * 9.81
 
 
@@ -113,3 +114,11 @@ def test_a_vehicle_that_slips_stays_calm_and_is_deleted(world):
     assert abs(car.model_twist()[1][2]) < 0.02
     world.delete("car")
     world.step()
+
+
+def test_a_wheel_whose_axle_is_no_axis_of_its_inertia_is_named():
+    told = []
+    world, model, load = rig(wheel=WHEEL.replace('iyz="0"', 'iyz="0.004"'), warn=told.append)
+    world.let_slip(model, [Slip("wheel", RADIUS, load, lateral=0.2)])
+    assert len(told) == 1 and "wheels wheel slip along both axes or not at all" in told[0]
+    world.close()

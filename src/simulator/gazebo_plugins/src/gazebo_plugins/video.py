@@ -88,11 +88,11 @@ def _scale(shape: Shape) -> tuple[float, float, float]:
     """The size of a visual [m], or the scale of a mesh."""
     found = shape.geometry
     if isinstance(found, Box):
-        return tuple(found.size)
+        return found.size[0], found.size[1], found.size[2]
     if isinstance(found, Cylinder):
         return 2.0 * found.radius, 2.0 * found.radius, found.length
     if isinstance(found, Sphere):
         return (2.0 * found.radius,) * 3
     if isinstance(found, Mesh):
-        return tuple(map(abs, found.scale))
-    return (*found.size, 1.0)  # a plane
+        return abs(found.scale[0]), abs(found.scale[1]), abs(found.scale[2])
+    return found.size[0], found.size[1], 1.0  # a plane
