@@ -8,12 +8,14 @@ import pytest
 import rospy
 from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
-from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.msg import MoveGroupResult, MoveItErrorCodes
 from moveit_msgs.srv import ExecuteKnownTrajectoryRequest
 
 from disk_cache import compiler_pages
+from motion_planning.errors import PlanningError
 from motion_planning.spheres import checker, sphere_model
 from moveit_ros_move_group import settings
+from moveit_ros_move_group.capabilities import motion
 from moveit_ros_move_group.capabilities.motion import MoveAction
 from moveit_ros_move_group.planning import Planner
 
@@ -100,6 +102,26 @@ def test_looking_around_without_a_sensor_to_point_plans_as_usual_and_is_told(mon
         code, text = outcome(node.ask("move_group", goal))
     assert code == MoveItErrorCodes.SUCCESS, text
     assert len([line for line in node.logged if "look_around" in line and "sensor" in line]) == 1
+
+
+def test_an_attempt_is_used_up_by_another_way_and_not_by_none(monkeypatch):
+    """Joints for which there is no way while they move stop, and a plan from rest is tried with the same attempt."""
+    node = node_of(monkeypatch)
+    action = next(one for one in node.kept if isinstance(one, MoveAction))
+    asked, left = [], motion._Attempts(1)
+
+    def redirected(*_):
+        asked.append(True)
+        raise PlanningError("a wall")
+
+    monkeypatch.setattr(action._planner, "redirected", redirected)
+    onward = action._onward(good_requests(SIX)["move_group"].request, left, MoveGroupResult())
+    with pytest.raises(PlanningError, match="a wall"):
+        onward(None, None)
+    assert left.any() and left.take()
+    with pytest.raises(PlanningError, match="used up"):
+        onward(None, None)
+    assert len(asked) == 1
 
 
 def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):

@@ -190,10 +190,12 @@ class MoveAction:
                 result: MoveGroupResult) -> Callable[[Scene, Running], Redirection]:
         """A function that finds another way for joints that move, as RestOfTheWay asks for it."""
         def onward(scene: Scene, running: Running) -> Redirection:
-            if not left.take():
+            if not left.any():
                 raise RequestError(MoveItErrorCodes.FAILURE, "all attempts to plan again are used up")
             begin = time.monotonic()
             found = self._planner.redirected(request, scene, running, self._server.is_preempt_requested)
+            # Where there is no way while the joints move, the attempt is the plan from rest.
+            left.take()
             rospy.loginfo("move_group: something new is in the way; another one was found in %.3f s, %s",
                           time.monotonic() - begin, "without a stop" if found.overlap else "with a stop")
             result.planned_trajectory = trajectory_message(self.context.model.groups[request.group_name].joints,
@@ -218,6 +220,10 @@ class _Attempts:
 
     def __init__(self, count: int) -> None:
         self._left = count
+
+    def any(self) -> bool:
+        """Whether there is one more."""
+        return self._left > 0
 
     def take(self) -> bool:
         """Whether there was one more, which is used then."""
