@@ -135,7 +135,9 @@ def record(arm: RobotArm, way: Array, points: Array, side: str) -> Recording:
 def _stay(arm: RobotArm) -> None:
     # A robot that says nothing stops by itself: raw set-points expire.
     with suppress(SysidError):
-        arm.command(arm.next().position, raw=False)
+        position = arm.next().position
+        if np.isfinite(position).all():
+            arm.command(position, raw=False)
 
 
 def _follow(arm: RobotArm, seen: Seen, points: Array, raw: bool) -> list[tuple[Seen, Array]]:

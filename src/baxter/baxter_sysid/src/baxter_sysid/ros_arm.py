@@ -73,13 +73,19 @@ class RosArm:
 
     def others(self) -> list[str]:
         """Names of the other nodes that publish commands of this arm."""
-        publishers = _publishers(rosgraph.Master(rospy.get_name()))
+        try:
+            publishers = _publishers(rosgraph.Master(rospy.get_name()))
+        except (OSError, rosgraph.MasterException) as error:
+            raise SysidError("the ROS master at %s does not answer: %s" % (rosgraph.get_master_uri(), error)) from error
         return sorted(node for topic, nodes in publishers if topic == self._publisher.resolved_name
                       for node in nodes if node != rospy.get_name())
 
     def _trouble(self) -> str:
         if self._idle:
             return self._idle
+        for name in (each for names in self._names.values() for each in names):
+            if not np.isfinite(self._joints[name]):
+                return "joint states say that %s is at %s rad; it must be a finite number" % (name, self._joints[name])
         if self._collides:
             return "the %s arm reports a collision" % self.side
         if self._near:
@@ -133,7 +139,7 @@ def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tup
     rospy.init_node("baxter_sysid", anonymous=True, disable_signals=True)
     try:
         robot = parse_urdf(str(rospy.get_param("robot_description")), source="robot_description")
-    except (KeyError, UrdfError) as error:
+    except (KeyError, OSError, rospy.ROSException, UrdfError) as error:
         raise SysidError("robot_description on %s cannot be used: %s" % (uri, error)) from error
     space, arm = Space(robot), RosArm(side)
     if trouble := arm.next().trouble:

@@ -40,7 +40,7 @@ def numbers(found: Found) -> list[str]:
             lines.append("lag of %s, motor_damping by proportional_gain: %.4g s, +- %.2g; the two are not known" % (
                 joint, found.value(damping) / gain, found.deviations[found.names.index(damping)] / gain))
     return lines + ["%s of %s: not determined (+- %.2g), kept" % (number, joint, deviation)
-                    for (number, joint), deviation in found.refused.items()]
+                    for (number, joint), deviation in found.refused.items() if number != HELD]
 
 
 def worst_seconds(time_s: Array, error: Array, motion: Motion, names: list[str],

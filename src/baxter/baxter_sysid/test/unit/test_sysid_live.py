@@ -110,6 +110,21 @@ def test_what_ends_the_motion_leaves_the_arm_where_it_is(arm, points, event, sai
         assert not raw and np.abs(goal - arm.position).max() < 1e-9
 
 
+def test_an_arm_is_not_sent_to_where_no_number_says_that_it_is(arm, points):
+    way = straight(arm.position, points[0])
+    arm.events[len(way) + 600] = "joint states say that left_s0 is at nan rad"
+    plain = arm.next
+
+    def broken():
+        seen = plain()
+        return seen._replace(position=np.full(7, np.nan)) if seen.trouble else seen
+
+    arm.next = broken
+    with pytest.raises(Stopped, match="at nan rad"):
+        record(arm, way, points, "left")
+    assert np.isfinite([goal for goal, _ in arm.commands]).all()
+
+
 @pytest.mark.parametrize("jump", [LARGEST_GAP_S + 0.05, -1.0])
 def test_a_clock_that_stands_still_or_goes_back_ends_it(arm, points, jump):
     way = straight(arm.position, points[0])
