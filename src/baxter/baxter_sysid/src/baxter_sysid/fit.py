@@ -119,6 +119,22 @@ def deviations(slopes: Array, error: Array) -> Array:
     return found
 
 
+def instrumented(errors: Errors, other: Errors, fit: Fit, bounds: Bounds, steps: int = 4) -> Fit:
+    """A fit of a model that has noise of its own, begun at `fit`.
+
+    other: the same errors with the model's noise drawn again. Least squares is biased here, because errors and their
+    slopes have the same noise; so errors are made orthogonal to the slopes of `other` (instrumental variables,
+    L. Ljung, System Identification, 2nd edition, 1999, section 7.6).
+    """
+    numbers, error = fit.numbers, errors(fit.numbers)
+    slopes = slopes_of(other, numbers, other(numbers), bounds)
+    for _ in range(steps):
+        numbers = np.clip(numbers - _step(slopes, error, 1e-6, _pressed(numbers, slopes, error, bounds)), bounds.least,
+                          bounds.most)
+        error = errors(numbers)
+    return Fit(numbers, error, slopes, deviations(slopes, error))
+
+
 def block_slices(rows: int, count: int = BLOCKS) -> list[slice]:
     """`count` blocks of time of equal length."""
     edges = np.linspace(0, rows, count + 1).round().astype(int)

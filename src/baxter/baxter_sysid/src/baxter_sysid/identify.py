@@ -36,6 +36,8 @@ JITTER_S = 0.003
 #: The load's place on the hand's axis [m from the frame `<side>_hand`]: that of a gripper.
 LOAD_M = 0.08
 MAX_REFUSALS = 4
+#: Whose jitter is the mean of an arm's errors over several draws, and that of its slopes in the last steps.
+_DRAWS, _OTHER_DRAW = (1, 2, 3, 4), 5
 
 Name = tuple[str, str]
 
@@ -96,7 +98,7 @@ class Model:
         self.settings, self._period = settings, recording.period_s
         self.arms = [_Arm(side, arm_body(robot, side), hand_in_last(robot, side),
                           np.array([effects.per_joint(rows, number, joint_names(side)) for number in NUMBERS]),
-                          start_of(recording.sensed[side], self._period),
+                          start_of(recording.sensed[side], self._period, recording.commanded[side]),
                           recording.commanded[side], recording.sensed[side]) for side in sides]
 
     def names(self) -> list[Name]:
@@ -121,22 +123,23 @@ class Model:
                 numbers[NUMBERS.index(number), JOINTS.index(joint)] = value
         return numbers
 
-    def motions(self, names: list[Name], values: Array) -> list[Motion]:
-        """The motion of the arms with these numbers."""
+    def motions(self, names: list[Name], values: Array, draw: int = 0) -> list[Motion]:
+        """The motion of the arms with these numbers; draw: of the jitter."""
         common = dict(zip(names, values, strict=True))
         mass, found = float(common.get(MASS, self.settings.given)), []
         for arm in self.arms:
             loaded = with_load(arm.body, mass, arm.hand[:3, :3] @ [0.0, 0.0, LOAD_M] + arm.hand[:3, 3])
-            points = set_points(arm.commanded, self._period, float(common.get(DELAY, 0.0)), self.settings.jitter_s)
+            points = set_points(arm.commanded, self._period, float(common.get(DELAY, 0.0)), self.settings.jitter_s,
+                                draw)
             held = np.array([common.get((HELD, joint), 0.0) for joint in joint_names(arm.side)])
             found.append(replay(loaded, loaded if self.settings.known else arm.body, self.numbers(arm, names, values),
                                 (*arm.start, held), points, self._period))
         return found
 
-    def errors(self, names: list[Name], values: Array) -> Array:
-        """(rows, arms * 7) [rad] simulated less recorded."""
-        return np.concatenate([motion.position - arm.sensed
-                               for motion, arm in zip(self.motions(names, values), self.arms, strict=True)], axis=1)
+    def errors(self, names: list[Name], values: Array, draws: tuple[int, ...] = (0,)) -> Array:
+        """(rows, arms * 7) [rad] simulated less recorded, the mean over `draws` of the jitter."""
+        return np.mean([np.concatenate([motion.position - arm.sensed for motion, arm in zip(
+            self.motions(names, values, draw), self.arms, strict=True)], axis=1) for draw in draws], axis=0)
 
 
 def identify(model: Model) -> Found:
@@ -159,6 +162,10 @@ def identify(model: Model) -> Found:
         refused.update({name: float(deviation) for name, deviation, is_vague in zip(
             names, found.deviation, vague, strict=True) if is_vague})
         names = [name for name, is_vague in zip(names, vague, strict=True) if not is_vague]
+    if model.settings.jitter_s:
+        found = least.instrumented(lambda values: model.errors(names, values, _DRAWS),
+                                   lambda values: model.errors(names, values, (_OTHER_DRAW,)), found, bounds)
+        found = found._replace(deviation=_with_jitter(names, found))
     without = found.error.copy()
     others = _left_out(model, names, found, bounds)
     for number, block in enumerate(least.block_slices(len(without))):
@@ -177,7 +184,7 @@ def _left_out(model: Model, names: list[Name], found: least.Fit, bounds: least.B
     def errors(values: Array) -> Array:
         whole = found.numbers.copy()
         whole[free] = values
-        return model.errors(names, whole)
+        return model.errors(names, whole, _DRAWS if model.settings.jitter_s else (0,))
 
     part = least.Fit(found.numbers[free], found.error, found.slopes[free], found.deviation[free])
     return least.left_out(errors, part, least.Bounds(*(each[free] for each in bounds)))

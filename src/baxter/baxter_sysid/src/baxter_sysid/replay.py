@@ -31,9 +31,9 @@ class Motion(NamedTuple):
     effort: Array
 
 
-def set_points(commanded: Array, period_s: float, delay_s: float, jitter_s: float = 0.0) -> Array:
+def set_points(commanded: Array, period_s: float, delay_s: float, jitter_s: float = 0.0, seed: int = 0) -> Array:
     """(ticks, n) [rad] set-points of each tick, from commands (rows, n) [rad] every period_s [s] that take delay_s [s]
-    to the joints, by the mean; each takes up to half of jitter_s [s] more or less, at random.
+    to the joints, by the mean; each takes up to half of jitter_s [s] more or less, at random, by `seed`.
 
     A raw set-point is reached as long after its command came as that came after the one before, at an even pace. Before
     the first command the set-point is there already.
@@ -43,7 +43,9 @@ def set_points(commanded: Array, period_s: float, delay_s: float, jitter_s: floa
     time_s = TICK_S * (1.0 + np.arange(ticks))
     came = delay_s + period_s * np.arange(rows)
     if jitter_s > 0.0:
-        came += jitter_s * (np.random.default_rng(0).random(rows) - 0.5)
+        came += jitter_s * (np.random.default_rng(seed).random(rows) - 0.5)
+        # A loop takes commands at its ticks: the set-point waits there for whole ones, which looks like rest to it.
+        came = TICK_S * np.round(came / TICK_S)
     return _streamed(np.ascontiguousarray(commanded), came, period_s, time_s)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baxter_sysid.fit import Bounds, block_slices, least_squares, left_out, rms
+from baxter_sysid.fit import Bounds, block_slices, instrumented, least_squares, left_out, rms
 
 TIME_S = np.linspace(0.0, 4.0, 400)
 TRUE = np.array([2.0, 0.7])
@@ -38,6 +38,21 @@ def test_numbers_of_which_only_the_ratio_counts_are_uncertain():
     fit = least_squares(errors, np.array([3.0, 2.0]), BOUNDS)
     assert fit.numbers[0] / fit.numbers[1] == pytest.approx(1.0, rel=0.01)
     assert (fit.deviation > 0.3 * fit.numbers).all()
+
+
+def test_a_model_with_noise_of_its_own_is_fitted_without_bias():
+    swing, bounds = np.sin(3.0 * TIME_S), Bounds(np.array([0.0]), np.array([10.0]), np.array([0.02]))
+
+    def response(gain, draw):
+        return gain * (swing + 0.5 * np.random.default_rng(draw).standard_normal(len(TIME_S)))[:, None]
+
+    data = response(2.0, 9)
+    fit = least_squares(lambda numbers: response(numbers[0], 0) - data, np.array([3.0]), bounds)
+    assert fit.numbers[0] < 1.6
+    better = instrumented(lambda numbers: np.mean([response(numbers[0], draw) for draw in (1, 2, 3, 4)], axis=0) - data,
+                          lambda numbers: response(numbers[0], 5) - data, fit, bounds)
+    assert better.numbers[0] == pytest.approx(2.0, abs=max(0.1, 3.0 * better.deviation[0]))
+    assert better.deviation[0] < 0.15
 
 
 def test_a_number_that_changes_nothing_is_kept_and_has_no_certainty():

@@ -83,15 +83,9 @@ def test_a_hidden_robot_is_found_again(tmp_path, seed, noise, delay, mass, stick
             truth = table["lag"][number]["values"][joint]
             off[number, joint] = value / truth - 1.0, deviation / truth
     print({name: "%.1f %% +- %.1f" % (100.0 * one, 100.0 * deviation) for name, (one, deviation) in off.items()})
-    if noise:
-        # Noise leaves the ratios of w2's numbers: what it turns is too light to show their scale.
-        scale = off.pop(("proportional_gain", "w2"))[0]
-        assert abs(scale) < 0.2
-        for number in HIDDEN[1:]:
-            assert abs((1.0 + off.pop((number, "w2"))[0]) / (1.0 + scale) - 1.0) < RECOVERED
     for name, (one, deviation) in off.items():
-        # With much noise or jitter a number is as uncertain as the sheet says.
-        assert abs(one) < max(RECOVERED, 3.0 * deviation if noise or delay[1] else 0.0), name
+        # What w2 turns is so light that noise leaves the scale of its numbers as uncertain as the sheet says.
+        assert abs(one) < (max(RECOVERED, 3.0 * deviation) if noise and name[1] == "w2" else RECOVERED), name
     assert found.value(DELAY) == pytest.approx(np.mean(delay), abs=0.001)
     if mass:
         assert found.value(MASS) == pytest.approx(mass, rel=RECOVERED)
