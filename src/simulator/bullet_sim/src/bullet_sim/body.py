@@ -318,7 +318,7 @@ class Body:
         if self.static and index == BASE:
             raise BulletSimError("link '%s' of '%s' is fixed in the world; its mass has no effect" % (body, self.name))
         inertia = np.asarray(inertia, dtype=float)
-        if not (math.isfinite(mass) and mass > 0.0 and np.isfinite(inertia).all()):
+        if not (math.isfinite(mass) and mass > 0.0):
             raise BulletSimError("a mass of %g kg cannot be set; expected a positive number" % mass)
         within(bounds.MASS, mass, "the mass of link '%s'" % body)
         within(bounds.INERTIA, inertia.ravel(), "the inertia of link '%s'" % body)

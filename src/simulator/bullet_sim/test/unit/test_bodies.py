@@ -205,7 +205,7 @@ def test_the_centre_of_mass_of_a_link_on_a_joint_can_be_moved(world):
 
 @pytest.mark.parametrize("mass, inertia, message", [
     (0.0, np.eye(3), "mass of 0 kg"), (math.nan, np.eye(3), "expected a positive"),
-    (1.0, np.diag((1.0, -1.0, 1.0)), "not positive"),
+    (1.0, np.diag((1.0, -1.0, 1.0)), "not positive"), (1.0, np.diag((1.0, math.nan, 1.0)), "the inertia of link 'rod'"),
     (1.0, np.array([[1.0, 2.0, 0], [2.0, 1.0, 0], [0, 0, 1.5]]), "not positive")])
 def test_an_impossible_inertia_is_refused(world, mass, inertia, message):
     rod = world.spawn(parse_urdf(ROD), "rod", static=True)

@@ -300,6 +300,8 @@ class BodyServices:
             inertia = np.zeros((3, 3))
             for name, i, j in _INERTIA:
                 inertia[i, j] = inertia[j, i] = getattr(request, name)
+            # Before it is turned, which NaN would spread and infinity make NaN.
+            bounds.INERTIA.check(inertia.ravel(), "the inertia of link '%s'" % link)
             rotation = pose.matrix()[:3, :3]
             inertia = rotation @ inertia @ rotation.T
             if not (request.mass == old.mass and np.allclose(inertia, old.inertia, rtol=1e-12, atol=0.0)

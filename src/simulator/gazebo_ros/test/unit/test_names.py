@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of models, links and collisions, as Gazebo gives and understands them."""
 import pytest
-from gazebo_msgs.srv import GetModelPropertiesRequest
+from gazebo_msgs.srv import GetModelPropertiesRequest, SetLinkPropertiesRequest
 
 from bullet_sim import Pose, World
 from gazebo_ros.contact_messages import CollisionNames, contact_states
@@ -86,6 +86,17 @@ def test_contacts_have_the_names_of_the_collisions_that_touch(world):
     (state,) = contact_states(world.contacts(), names, about)
     assert {state.collision1_name} == about and all(normal.z > 0.99 for normal in state.contact_normals)
     assert all(position.x == pytest.approx(1.0, abs=0.11) for position in state.contact_positions)
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), 1e300])
+@pytest.mark.filterwarnings("error")
+def test_an_inertia_that_is_none_is_refused_with_the_reason(world, number):
+    ros, log = FakeRos(), FakeLog()
+    world.spawn(parse_urdf(CART), "cart")
+    GazeboServices(Simulation(world, RequestQueue(), log, FakeFaults()), None, None, ros, log)
+    answer = ros.services["/gazebo/set_link_properties"](
+        SetLinkPropertiesRequest(link_name="cart::base", mass=1.0, ixx=number, iyy=0.1, izz=0.1))
+    assert not answer.success and "the inertia of link 'base' is" in answer.status_message
 
 
 def test_models_in_a_model_are_its_children(world):
