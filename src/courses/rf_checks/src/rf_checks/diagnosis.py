@@ -6,14 +6,15 @@ import ast
 import io
 import re
 import tokenize
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from baxter_model import SIDES
 from baxter_model.readiness import UNFOLD
+from command_line.options import counted
 from rf_checks import mistakes
-from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
+from rf_checks.measures import JUMP_RAD, has_moved, largest_jump, moving_rows, path_length
 from rf_checks.recording import RECORD_S, Fault
 
 if TYPE_CHECKING:
@@ -37,6 +38,18 @@ _THREAD = re.compile(r"^(?:Current thread|Thread) 0x", re.MULTILINE)
 STRAY_RAD = 0.05
 _CODING = re.compile(rb"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", re.MULTILINE | re.ASCII)
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
+# What a program is stopped for, besides floods: how its run ended, and the Fault, which has that key.
+_EXCESSES = {fault.key: fault for fault in (
+    Fault("output", "the program printed megabytes and was stopped; print what is asked for, and not in a loop without "
+          "a pause", 0.4),
+    Fault("processes", "the program started more and more processes and was stopped", 0.0),
+    Fault("threads", "the program started more and more threads and was stopped", 0.0),
+    Fault("sockets", "the program opened more and more connections and was stopped: make publishers, subscribers and "
+          "service proxies once, before the loop", 0.0),
+    Fault("files", "the program made more and more files and was stopped", 0.0),
+    Fault("requests", "the program asked the lab's nodes, as the IK service, for more than a minute of computing and "
+          "was stopped: ask for the poses that are needed, each once", 0.0),
+    Fault("memory", "the program took more than 2 GB of memory and was stopped: perhaps a list grows for ever", 0.0))}
 
 
 def check_syntax(source: bytes, name: str) -> Fault | None:
@@ -97,7 +110,7 @@ def _loops_around(program: Path, line: int) -> list[int]:
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return []
     return sorted(node.lineno for node in ast.walk(tree)
-                  if isinstance(node, (ast.While, ast.For)) and node.lineno <= line <= node.end_lineno)
+                  if isinstance(node, (ast.While, ast.For)) and node.lineno <= line <= (node.end_lineno or 0))
 
 
 def is_flood(counts: np.ndarray) -> bool:
@@ -157,27 +170,11 @@ def _moved_otherwise(run: Run) -> Fault | None:
     return None
 
 
-def behaviour(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
+def behaviour(run: Run, sides: tuple[str, ...], limit_s: float) -> Fault | None:
     """A Fault of the program's behaviour that does not depend on the exercise, or None. sides: the arms that must
     move."""
-    if run.ended == "output":
-        return Fault("output", "the program printed megabytes and was stopped; print what is asked for, and not in a "
-                     "loop without a pause", 0.4)
-    if run.ended == "processes":
-        return Fault("processes", "the program started more and more processes and was stopped", 0.0)
-    if run.ended == "threads":
-        return Fault("threads", "the program started more and more threads and was stopped", 0.0)
-    if run.ended == "sockets":
-        return Fault("sockets", "the program opened more and more connections and was stopped: make publishers, "
-                     "subscribers and service proxies once, before the loop", 0.0)
-    if run.ended == "files":
-        return Fault("files", "the program made more and more files and was stopped", 0.0)
-    if run.ended == "requests":
-        return Fault("requests", "the program asked the lab's nodes, as the IK service, for more than a minute of "
-                     "computing and was stopped: ask for the poses that are needed, each once", 0.0)
-    if run.ended == "memory":
-        return Fault("memory", "the program took more than 2 GB of memory and was stopped: perhaps a list grows for "
-                     "ever", 0.0)
+    if run.ended in _EXCESSES:
+        return _EXCESSES[run.ended]
     if run.ended == "flood" or is_flood(run.recording.command_counts()):
         return Fault("flood", "joint commands came faster than %d a second: the robot reads some 100; end the loop "
                      "with rate.sleep() of a rospy.Rate(100)" % FLOOD_COMMANDS, 0.4)
@@ -207,14 +204,14 @@ def _at_line(run: Run) -> str:
     return " at line %d" % run.stuck_at if run.stuck_at else ""
 
 
-def _about_motion(run: Run, sides: tuple[str]) -> Fault | None:
+def _about_motion(run: Run, sides: tuple[str, ...]) -> Fault | None:
     recording = run.recording
     if not sides or not recording.records:
         return None
     slip = mistakes.command_slip(recording.commands())
     if slip:
         return Fault(*slip)
-    moved = {side: path_length(recording.arm(side)) > 0.1 for side in SIDES}
+    moved = {side: has_moved(recording.arm(side)) for side in SIDES}
     counts = dict(zip(SIDES, recording.command_counts()[-1], strict=True))
     if not any(moved.values()):
         has_tried = any(counts.values()) or recording.ik_requests() or run.exit_code is not None
@@ -229,7 +226,7 @@ def _about_motion(run: Run, sides: tuple[str]) -> Fault | None:
     return None
 
 
-def _about_end(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
+def _about_end(run: Run, sides: tuple[str, ...], limit_s: float) -> Fault | None:
     recording = run.recording
     if run.ended == "exited" and sides and recording.records:
         if not any(path_length(recording.arm(side)) > 0.02 for side in SIDES):
@@ -243,7 +240,7 @@ def _about_end(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
     return None
 
 
-def left_on_its_way(run: Run, sides: tuple[str]) -> Fault | None:
+def left_on_its_way(run: Run, sides: tuple[str, ...]) -> Fault | None:
     """A Fault for a program that ended while an arm was still moving to its target, or None."""
     recording = run.recording
     end = recording.records[-1].get("exited") if recording.records else None
@@ -252,9 +249,9 @@ def left_on_its_way(run: Run, sides: tuple[str]) -> Fault | None:
     for side in sides:
         counts = recording.command_counts()[:, SIDES.index(side)]
         if 0 < counts[-1] <= 3:
-            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended without waiting "
-                         "for the arm: send commands until it is there, as move_to_joint_positions does, and then go on"
-                         % (counts[-1], "" if counts[-1] == 1 else "s", side))
+            return Fault("early_exit", "the program sent %s to the %s arm and ended without waiting for the arm: send "
+                         "commands until it is there, as move_to_joint_positions does, and then go on"
+                         % (counted(counts[-1], "joint command"), side))
         rows = moving_rows(recording.times, recording.arm(side))
         if rows and recording.times[rows[1]] > end + _ON_ITS_WAY_S:
             return Fault("early_exit", "the program ended while the %s arm was on its way: wait until the arm is there "
@@ -262,7 +259,7 @@ def left_on_its_way(run: Run, sides: tuple[str]) -> Fault | None:
     return None
 
 
-def held_back(run: Run, sides: tuple[str]) -> Fault | None:
+def held_back(run: Run, sides: tuple[str, ...]) -> Fault | None:
     """A Fault for an arm that collision avoidance held, and that has not moved on since, or None."""
     for side in sides:
         held = run.recording.held(side)
@@ -278,21 +275,20 @@ def _last_words(run: Run) -> str:
     return "; its last line was: %s" % words[-1][:200] if words else ""
 
 
-def diagnose(run: Run, exercise: Exercise, call: Call, robot: Robot, share: float) -> Fault | Any | None:
+def diagnose(run: Run, exercise: Exercise, call: Call, robot: Robot, share: float) -> Fault | None:
     """The fault of one run, or None when all is well. share: the result of its criteria, 0 to 1."""
     fault = meddling(run) or behaviour_that_hides(run, exercise.sides, call.limit_s)
     if fault:
         return fault
     if share < 0.995:
-        foremost = getattr(exercise.task, "foremost", None)
-        fault = (foremost and foremost(call, run)
+        fault = (exercise.task.foremost(call, run)
                  or held_back(run, exercise.sides)
                  or left_on_its_way(run, exercise.sides)
                  or (exercise.task.slip(call, run, robot) if run.recording.records else None)
                  or behaviour(run, exercise.sides, call.limit_s))
     if fault is None and run.survivors:
-        fault = Fault("survivors", "%d process%s of the program went on after it had ended, and had to be killed: end "
-                      "what you start" % (run.survivors, "" if run.survivors == 1 else "es"), 0.9)
+        fault = Fault("survivors", "%s of the program went on after it had ended, and had to be killed: end what you "
+                      "start" % counted(run.survivors, "process", "processes"), 0.9)
     return fault
 
 
@@ -303,9 +299,8 @@ def of_another(fault: Fault | None, exercise: Exercise, other: Exercise, file_na
     return Fault("other_exercise", sentence + (": " + fault.sentence if fault else ""), fault.cap if fault else 1.0)
 
 
-def behaviour_that_hides(run: Run, sides: tuple[str], limit_s: float) -> Fault | None:
+def behaviour_that_hides(run: Run, sides: tuple[str, ...], limit_s: float) -> Fault | None:
     """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
     fault = behaviour(run, sides, limit_s)
-    first = ("output", "processes", "threads", "sockets", "files", "requests", "memory", "flood", "busy", "crashed",
-             "not_enabled", "wrong_arm", "repeated_names", "lengths", "degrees")
+    first = (*_EXCESSES, "flood", "busy", "crashed", "not_enabled", "wrong_arm", "repeated_names", "lengths", "degrees")
     return fault if fault and fault.key in first else None

@@ -5,10 +5,16 @@ from __future__ import annotations
 import difflib
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from baxter_model import SIDES
 from command_line.options import did_you_mean
 from rf_checks import tasks, tasks_planning, tasks_printed, tasks_steering
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from rf_checks.tasks import Task
 
 #: Points of 100 from which an exercise counts as done.
 PASS_MARK = 80.0
@@ -22,9 +28,9 @@ class Exercise:
     name: str
     title: str
     usage: str
-    task: object
-    words: tuple
-    sides: tuple = ()
+    task: Task[Any]
+    words: tuple[str, ...]
+    sides: tuple[str, ...] = ()
 
 
 class UnknownExercise(Exception):

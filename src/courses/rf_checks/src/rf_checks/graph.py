@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 import xmlrpc.client
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import rosgraph
@@ -38,13 +38,13 @@ class MasterSilent(LabFailed):
     """The ROS master takes connections, but does not answer in time."""
 
 
-def registrations(state: Any) -> set[tuple[str, Any, Any]]:
+def registrations(state: Iterable[Iterable[tuple[str, list[str]]]]) -> set[tuple[str, str, str]]:
     """{(kind, name, node)} of a master's getSystemState; kind is "publisher", "subscriber" or "service"."""
     return {(kind, name, node) for kind, part in zip(_KINDS, state, strict=True) for name, nodes in part
             for node in nodes}
 
 
-def flat(parameters: Any, prefix: str = "") -> dict[Any, Any]:
+def flat(parameters: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """A tree of parameters as {name: value}; an empty branch counts as a value."""
     found = {}
     for name, value in parameters.items():
@@ -58,21 +58,21 @@ class Graph:
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
-        self._own = frozenset()
-        self._own_parameters = {}
-        self._processes = {}
-        self.own_nodes = frozenset()
+        self._own: frozenset[tuple[str, str, str]] = frozenset()
+        self._own_parameters: dict[str, Any] = {}
+        self._processes: dict[str, Callable[[], bool]] = {}
+        self.own_nodes: frozenset[str] = frozenset()
 
-    def state(self) -> set[tuple[str, Any, Any]]:
+    def state(self) -> set[tuple[str, str, str]]:
         """The master's registrations, as `registrations` gives them. Raises LabFailed, MasterSilent."""
         return registrations(self._ask("getSystemState"))
 
-    def nodes(self) -> set[Any]:
-        """Names of all nodes: a set. Raises LabFailed, MasterSilent."""
+    def nodes(self) -> set[str]:
+        """Names of all nodes. Raises LabFailed, MasterSilent."""
         return {node for _, _, node in self.state()}
 
-    def services(self) -> set[Any]:
-        """Names of all services: a set. Raises LabFailed, MasterSilent."""
+    def services(self) -> set[str]:
+        """Names of all services. Raises LabFailed, MasterSilent."""
         return {name for kind, name, _ in self.state() if kind == "service"}
 
     def remember(self, processes: dict[str, Callable[[], bool]]) -> None:
@@ -100,10 +100,10 @@ class Graph:
                              if name not in parameters or parameters[name] != value)
         return Changes(sorted(missing), intruders, sorted(withdrawn), changed)
 
-    def _ended(self):
+    def _ended(self) -> set[str]:
         return {node for node, lives in self._processes.items() if not lives()}
 
-    def _ending(self, nodes: set[str]):
+    def _ending(self, nodes: set[str]) -> set[str]:
         """Of the nodes that lack a registration, those that are shutting down: they unregister everything before they
         end."""
         deadline = time.monotonic() + _END_S
@@ -133,10 +133,10 @@ class Graph:
             for name in self._parameters().keys() - self._own_parameters.keys():
                 self._master().deleteParam(name)
 
-    def _parameters(self):
+    def _parameters(self) -> dict[str, Any]:
         return flat(self._ask("getParam", "/"))
 
-    def _ask(self, method: str, *words):
+    def _ask(self, method: str, *words: str) -> Any:
         try:
             return getattr(self._master(), method)(*words)
         except TimeoutError as error:

@@ -18,12 +18,12 @@ import shutil
 import subprocess
 import sys
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from command_line.user_files import read_file
-from rf_checks import roster, similarity
+from rf_checks import hidden_paths, roster, similarity
 
 #: Left out: solutions, and tests that contain them or their programs.
 LEFT_OUT = ("src/courses/rf_checks/exercises/solutions", "src/courses/rf_checks/test", "src/courses/rf_lab2/test",
@@ -71,7 +71,7 @@ def stub(name: str) -> str:
     return _STUB % {"exercise": STUBBED[name], "name": Path(name).name}
 
 
-def _git(workspace: Path, *words):
+def _git(workspace: Path, *words: str) -> list[str]:
     done = subprocess.run(["git", "-C", str(workspace), "ls-files", "-z", *words], capture_output=True, check=True)
     return [os.fsdecode(name) for name in done.stdout.split(b"\0") if name]
 
@@ -84,7 +84,7 @@ def names(workspace: Path) -> list[str]:
         found = []
     if _OF_EACH not in found:
         try:
-            found = (Path(workspace) / LIST).read_text(encoding="utf-8").splitlines()
+            found = (workspace / LIST).read_text(encoding="utf-8").splitlines()
         except (OSError, ValueError):
             raise HandoutFailed(
                 "there is no list of what belongs to the workspace: git does not track %s, and there is no %s. Work in "
@@ -95,7 +95,7 @@ def names(workspace: Path) -> list[str]:
                   or os.path.isfile(os.path.join(workspace, name)))
 
 
-def left_here(workspace: Path | str) -> list[str]:
+def left_here(workspace: Path) -> list[str]:
     """Names of files that git neither tracks nor ignores; [] without git."""
     try:
         return _git(workspace, "--others", "--exclude-standard")
@@ -147,7 +147,7 @@ def people_of_table(text: str, source: str) -> dict[str, str]:
     return {name: source for name, found in owners.items() if "@" in name or len(found) == 1}
 
 
-def known_people(workspace: Path, given: Any, environment: dict) -> dict[str, str]:
+def known_people(workspace: Path, given: Iterable[Path | str], environment: Mapping[str, str]) -> dict[str, str]:
     """As `people`, of the rosters in ``given`` (paths), of all tables in the workspace, and of the user's class.
 
     Raises HandoutFailed for a given one that cannot be read.
@@ -212,8 +212,8 @@ def emptied_notebook(text: str) -> str:
     return json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
 
 
-def make(workspace: Path | str, target: Any, rosters: Sequence[Path] = (),
-         environment: dict[str, str] = os.environ) -> int:
+def make(workspace: Path, target: Path | str, rosters: Iterable[Path | str] = (),
+         environment: Mapping[str, str] = os.environ) -> int:
     """Copy the workspace into the folder `target`, which must not exist or must be empty; returns the number of files.
 
     rosters: paths of further rosters, whose names must not be in it. Raises HandoutFailed, OSError.
@@ -248,7 +248,7 @@ def make(workspace: Path | str, target: Any, rosters: Sequence[Path] = (),
     return len(kept)
 
 
-def told(target: Path, kept: list, known: dict[str, str]) -> list[str]:
+def told(target: Path, kept: list[str], known: dict[str, str]) -> list[str]:
     """Sentences on files of the copy that name students. known: as `known_people` gives it."""
     found = []
     for name in kept if known else ():
@@ -263,7 +263,7 @@ def told(target: Path, kept: list, known: dict[str, str]) -> list[str]:
     return found
 
 
-def leaks(workspace: Path, target: Any, kept: list) -> list[Any]:
+def leaks(workspace: Path, target: Path, kept: list[str]) -> list[str]:
     """Sentences on files of the copy that are, or hold, a solution."""
     library = similarity.Library(workspace)
     skeletons = library.handed_out[:library.skeleton_count]
@@ -284,7 +284,7 @@ def leaks(workspace: Path, target: Any, kept: list) -> list[Any]:
     return found
 
 
-def _is_script(path: Path):
+def _is_script(path: Path) -> bool:
     with open(path, "rb") as file:
         return file.read(64).startswith((b"#!/usr/bin/env python3", b"#!/usr/bin/python3"))
 
@@ -303,7 +303,7 @@ def main(words: list[str] | None = None) -> Any:
         options = parser.parse_args(words)
     except SystemExit as end:
         return end.code
-    workspace = os.environ.get("LAB_ROOT") or Path(__file__).resolve().parents[5]
+    workspace = hidden_paths.workspace()
     try:
         count = make(workspace, options.folder, options.roster)
     except (HandoutFailed, OSError) as error:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from processes import isolation
-from rf_checks import diagnosis, submission
+from rf_checks import diagnosis, hidden_paths, submission
 from rf_checks.exercises import meant_instead
 from rf_checks.graph import LabFailed, MasterSilent
 from rf_checks.lab import Lab, TooSlow, WhichRobot, robot_description, student_folder
@@ -50,10 +50,10 @@ class RunResult:
     """One run: the program's arguments, its Criteria, its Fault or None; end: how_it_ended, trace: the Run, both None
     when it did not run."""
 
-    arguments: tuple
-    criteria: tuple
+    arguments: tuple[str, ...]
+    criteria: tuple[Criterion, ...]
     fault: Fault | None
-    end: dict | None = None
+    end: dict[str, Any] | None = None
     trace: Run | None = None
 
     @property
@@ -66,15 +66,15 @@ class RunResult:
 class Result:
     """The result of a check. not_graded: why there are no points, or ""."""
 
-    exercise: object
+    exercise: Exercise
     program: str
     seed: int
-    runs: tuple
+    runs: tuple[RunResult, ...]
     isolation: str
     lasted_s: float
     not_graded: str = ""
     #: Sentences for the instructor, which change no points.
-    notes: tuple = ()
+    notes: tuple[str, ...] = ()
     #: On which robot it ran.
     which: WhichRobot = WhichRobot()
 
@@ -109,7 +109,7 @@ class Judge:
         self._which, self._hidden = which, tuple(map(str, hidden))
         self._description = robot_description(which.serial)
         self.robot = Robot(self._description)
-        self._lab = None
+        self._lab: Lab | None = None
         adopt_orphans()
 
     def __enter__(self) -> Judge:
@@ -160,23 +160,22 @@ class Judge:
                 not_run = (Criterion("as the run before", share, 100.0, "not run, because of the fault"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
-                      tuple(Library(_workspace()).notes(texts)), self._which)
+                      tuple(Library(hidden_paths.workspace()).notes(texts)), self._which)
 
     def run(self, program: Path, exercise: Exercise, call: Call, deadline: float = float("inf")) -> Run:
         """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
         lab = self._fresh_lab(call, deadline)
         run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
-        observer = Observer(call, lambda output: self._is_satisfied(exercise, call, run, output),
-                            lambda: self._look_at_graph(lab, run))
         clock = RunClock()
         environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost"}
         for name in ("ROS_IP", "ROS_NAMESPACE"):
             environment.pop(name, None)
         lab.watch.helpers.roots = lab.helper_pids()
         began = time.monotonic()
-        student = observer.student = Student(program, call.arguments, environment, self.has_walls,
-                                             Startup(student_folder(), clock.environment, (clock.descriptor,),
-                                                     self._hidden))
+        student = Student(program, call.arguments, environment, self.has_walls,
+                          Startup(student_folder(), clock.environment, (clock.descriptor,), self._hidden))
+        observer = Observer(call, student, lambda output: self._is_satisfied(exercise, call, run, output),
+                            lambda: self._look_at_graph(lab, run))
         lab.watch.program = tree = Tree((student.pid,))
         lab.watch.gives_up = lambda: time.monotonic() > deadline
         lab.run_clock, lab.is_hurried = clock, True
@@ -228,7 +227,7 @@ class Judge:
         raise AssertionError  # the loop above returns or raises
 
     @staticmethod
-    def _watch(lab: Any, observer: Observer, deadline: float) -> None:
+    def _watch(lab: Lab, observer: Observer, deadline: float) -> None:
         """Wait for the end of a run, and end it if no more records come."""
         began = time.monotonic()
         while not observer.wait(_LOOK_S):
@@ -245,12 +244,12 @@ class Judge:
                               % (_rounded(simulated_s / wall_s), simulated_s, wall_s))
 
     @staticmethod
-    def _is_satisfied(exercise: Exercise, call: Call, run: Run, output: Any) -> bool:
+    def _is_satisfied(exercise: Exercise, call: Call, run: Run, output: str) -> bool:
         run.output = output
         return exercise.task.is_satisfied(call, run)
 
     @staticmethod
-    def _look_at_graph(lab: Any, run: Run, with_parameters: bool = False) -> bool:
+    def _look_at_graph(lab: Lab, run: Run, with_parameters: bool = False) -> bool:
         """Whether a part of the lab is gone, or another node publishes its topics; sets `run.changes`."""
         try:
             run.changes = lab.graph.changes(with_parameters)
@@ -282,14 +281,10 @@ def _rounded(factor: float) -> str:
     return "%.2f" % factor if factor < 0.1 else "%.1f" % factor
 
 
-def _with_exit(records: list[dict[str, Any]]):
+def _with_exit(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The records; the last one has the time of the program's end."""
     records = list(records)
     ends = [record["exited"] for record in records if "exited" in record]
     if ends:
         records[-1]["exited"] = ends[-1]
     return records
-
-
-def _workspace():
-    return os.environ.get("LAB_ROOT") or str(Path(__file__).resolve().parents[5])

@@ -20,7 +20,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import rospkg
 from roslib.packages import find_node
@@ -36,6 +36,7 @@ from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, 
 from world_picture.results import ready_for
 
 if TYPE_CHECKING:
+    from rf_checks.run_clock import RunClock
     from rf_checks.tasks_planning import Obstacle
 
 #: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
@@ -60,6 +61,7 @@ OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _NAME = b"__name:="
 _ENDED_NODE = re.compile(r"\[([\w./-]+)\] process has finished cleanly")
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
+Found = TypeVar("Found")
 
 
 class TooSlow(Exception):
@@ -87,31 +89,32 @@ class Lab:
         """`description_xml`: the robot's URDF text. `walls`: in a separate sandbox, as isolation.py says. `which`:
         a WhichRobot. `obstacle`: tasks_planning.Obstacle, which comes with move_group. `steered`: with a servo of the
         left arm."""
-        self.uri = ""
+        self._port = free_port()
+        self.uri = "http://localhost:%d" % self._port
+        self.graph = Graph(self.uri)
+        #: The folder of the lab's files.
+        self.folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         self.obstacle, self.steered = obstacle, steered
-        #: The lab's Graph, once it has started.
-        self.graph = None
         self._walls, self._which = walls, which
         self.watch = Watch()
         #: Called with each record (dict), in the thread that steps the world: the world waits until it returns.
-        self.on_record = lambda record: None
+        self.on_record: Callable[[dict[str, Any]], None] = lambda record: None
         #: The RunClock of the running program, or None.
-        self.run_clock = None
+        self.run_clock: RunClock | None = None
         #: False: at most real time, because no program runs.
         self.is_hurried = False
-        self.joint_names = ()
+        self.joint_names: tuple[str, ...] = ()
         self._description = description_xml
-        self._processes = []
-        self._folder = None
-        self._order = None
-        self._done = None
-        self._connection = None
-        self._pacer = None
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._order: dict[str, list[Any]] | None = None
+        self._done: str | None = None
+        self._connection: socket.socket | None = None
+        self._pacer: threading.Thread | None = None
         self._ended = threading.Event()
         self._has_time = False
         self._may_go = threading.Event()
         self._may_go.set()
-        self._calm = None
+        self._calm = threading.Event()
         self._own_time = OwnTime(self._pids)
         self._still_time = OwnTime(lambda: self.watch.helpers.roots)
         # Number of records, and that number at the last call of stood_still_s.
@@ -126,11 +129,6 @@ class Lab:
         self.close()
 
     @property
-    def folder(self) -> Path | None:
-        """The folder of the lab's files."""
-        return self._folder
-
-    @property
     def is_alive(self) -> bool:
         """False once the simulator, or its robot, is gone."""
         return not self._ended.is_set()
@@ -138,29 +136,23 @@ class Lab:
     def start(self, deadline: float = float("inf")) -> None:
         """Start everything and wait until the robot is spawned. Raises LabFailed; TooSlow at `deadline` (monotonic,
         s)."""
-        self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
-        port = free_port()
-        self.uri = "http://localhost:%d" % port
-        self.graph = Graph(self.uri)
-        (self._folder / "sockets").mkdir()
+        (self.folder / "sockets").mkdir()
         environment = isolation.environment_of(os.environ) if self._walls else dict(os.environ)
         environment.update({"ROS_MASTER_URI": self.uri, "ROS_HOSTNAME": "localhost",
-                            "ROS_LOG_DIR": str(self._folder / "log"), SOCKETS_VARIABLE: str(self._folder / "sockets"),
+                            "ROS_LOG_DIR": str(self.folder / "log"), SOCKETS_VARIABLE: str(self.folder / "sockets"),
                             OBSERVER[0]: OBSERVER[1],
                             # What roslaunch says of the nodes is read while it runs, and it writes to a file.
                             "PYTHONUNBUFFERED": "1"})
         environment.pop("ROS_IP", None)
-        self._ended = threading.Event()
-        self._is_closed_world = False
         with socket.socket(socket.AF_UNIX) as listener:
-            listener.bind(str(self._folder / "sockets" / RECORDS))
+            listener.bind(str(self.folder / "sockets" / RECORDS))
             listener.listen(1)
             listener.settimeout(0.1)
-            description = self._folder / "robot.urdf"
+            description = self.folder / "robot.urdf"
             # First of the plugins, so that no plugin reads a message before the recorder has waited for it.
             description.write_text(re.sub(r"<robot\b[^>]*>", lambda tag: tag[0] + PLUGIN_ELEMENT, self._description,
                                           count=1), encoding="utf-8")
-            self._run(["roslaunch", "-p", str(port), str(_share() / "launch" / "lab.launch"),
+            self._run(["roslaunch", "-p", str(self._port), str(_share() / "launch" / "lab.launch"),
                        "description:=%s" % description, *("%s:=%s" % item for item in self._which._asdict().items()),
                        "steered:=%s" % str(self.steered).lower(), *self._obstacle_arguments()], environment)
             self._own_time.restart()
@@ -170,8 +162,8 @@ class Lab:
         self._pacer.start()
         self._await(self._all_there, "the nodes around the robot", deadline)
 
-    def reset(self, posture: str, deadline: float = float("inf")) -> None:
-        """Disable the robot, set its arms to `posture` (dict of joint to rad), and stop time until go_on().
+    def reset(self, posture: dict[str, float], deadline: float = float("inf")) -> None:
+        """Disable the robot, set its arms to `posture` {joint: rad}, and stop time until go_on().
 
         Raises LabFailed; TooSlow at `deadline` (monotonic, s).
         """
@@ -217,7 +209,7 @@ class Lab:
         except LabFailed:
             return False
 
-    def helper_pids(self) -> list[Any]:
+    def helper_pids(self) -> list[int]:
         """Process ids of HELPERS in this lab."""
         found = []
         for pid in self._pids():
@@ -238,7 +230,7 @@ class Lab:
 
     def log_tail(self) -> str:
         """The last lines of the output of the lab's own processes."""
-        lines = (self._folder / "output.txt").read_text(errors="replace").splitlines()
+        lines = (self.folder / "output.txt").read_text(errors="replace").splitlines()
         return "\n".join(lines[-15:])
 
     def close(self) -> None:
@@ -268,8 +260,8 @@ class Lab:
         self._still_time.close()
         deadline = time.monotonic() + STOP_TIMEOUT_S
         # Killed processes may still write their last lines.
-        while self._folder is not None and self._folder.exists() and time.monotonic() < deadline:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        while self.folder.exists() and time.monotonic() < deadline:
+            shutil.rmtree(self.folder, ignore_errors=True)
             time.sleep(0.005)
 
     # -- below
@@ -278,30 +270,30 @@ class Lab:
         if self._walls:
             ready, variables = ready_for(isolation.HOME)
             environment = {**environment, **variables}
-            binds = [*ready, *isolation.caches(os.environ, self._folder / "caches")]
-            command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
+            binds = [*ready, *isolation.caches(os.environ, self.folder / "caches")]
+            command = [*isolation.command(os.environ, [(self.folder, self.folder, True), *binds],
                                           hidden_paths.SOLVED, not isolation.has_own_network()), *command]
-        with open(self._folder / "output.txt", "ab") as output:
+        with open(self.folder / "output.txt", "ab") as output:
             # It ends with the judge in any case.
             self._processes.append(subprocess.Popen(with_parent(command, "INT"), env=environment,
                                                     stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                                                     start_new_session=True))
 
-    def _pids(self):
+    def _pids(self) -> set[int]:
         """All processes of this lab."""
         roots = {process.pid for process in self._processes if process.poll() is None}
         # Orphans become children of the judge; a student's program does not have this variable.
-        mark = ("%s=%s" % (SOCKETS_VARIABLE, self._folder)).encode()
+        mark = ("%s=%s" % (SOCKETS_VARIABLE, self.folder)).encode()
         for pid in direct_children(os.getpid()) - roots:
             with contextlib.suppress(OSError):
                 roots |= {pid} if mark in Path("/proc/%d/environ" % pid).read_bytes() else set()
         return children_of(roots)
 
-    def _dead_nodes(self):
+    def _dead_nodes(self) -> list[str]:
         """Names of nodes that ended with an error according to roslaunch: they are not restarted."""
-        return _DEAD_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))
+        return _DEAD_NODE.findall((self.folder / "output.txt").read_text(errors="replace"))
 
-    def _await(self, condition: Any, what: str, deadline: float):
+    def _await(self, condition: Callable[[], Found | None], what: str, deadline: float) -> Found:
         while True:
             found = condition()
             if found:
@@ -315,7 +307,7 @@ class Lab:
                 raise TooSlow("the check's own lab was still starting, waiting for %s" % what)
             time.sleep(0.05)
 
-    def _node_processes(self):
+    def _node_processes(self) -> dict[str, Callable[[], bool]]:
         """For each node of the lab, a function that returns whether its process lives."""
         named = {}
         for pid in self._pids():
@@ -326,10 +318,10 @@ class Lab:
         return {name: functools.partial(is_running, pid) for pid, name in named.items()
                 if not any(named[other] == name and other != pid and pid in children_of((other,)) for other in named)}
 
-    def _obstacle_arguments(self):
+    def _obstacle_arguments(self) -> list[str]:
         if self.obstacle is None:
             return []
-        file = self._folder / "obstacle.urdf"
+        file = self.folder / "obstacle.urdf"
         file.write_text(self.obstacle.urdf(), encoding="utf-8")
         return ["obstacle:=%s" % file, "obstacle_at:=-x %g -y %g -z %g" % self.obstacle.middle]
 
@@ -339,24 +331,24 @@ class Lab:
             PLANNING_SERVICE in self.graph.services() and OBSTACLE_SPAWNER not in self.graph.nodes()
             and OBSTACLE_SPAWNER[1:] in self._ended_nodes())
 
-    def _is_steerable(self, services: set) -> bool:
+    def _is_steerable(self, services: set[str]) -> bool:
         """Whether the servo is there; True where the lab has none."""
         return not self.steered or SERVO_SERVICE in services
 
-    def _ended_nodes(self):
+    def _ended_nodes(self) -> set[str]:
         """Names of nodes that ended well according to roslaunch."""
         return {name.rpartition("-")[0] for name in
-                _ENDED_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))}
+                _ENDED_NODE.findall((self.folder / "output.txt").read_text(errors="replace"))}
 
-    def _all_there(self):
+    def _all_there(self) -> bool:
         services, nodes = self.graph.services(), self.graph.nodes()
-        return (self._plans() and self._is_steerable(services)
-                and all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services for side in SIDES)
-                and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
-                # The spawner still waits for the response of a service that the first reset withdraws.
-                and SPAWNER not in nodes)
+        return bool(self._plans() and self._is_steerable(services)
+                    and all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services for side in SIDES)
+                    and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
+                    # The spawner still waits for the response of a service that the first reset withdraws.
+                    and SPAWNER not in nodes)
 
-    def _pace(self, connection: Any, ended: Callable[[], bool]) -> None:
+    def _pace(self, connection: socket.socket, ended: Callable[[], bool]) -> None:
         """Read records, wait until the watched programs are idle, then step the world."""
         lines = connection.makefile("r", encoding="utf-8")
         calm_in = None
@@ -392,13 +384,13 @@ class Lab:
             ended.set()
 
 
-def _accept(listener: Any):
+def _accept(listener: socket.socket) -> socket.socket | None:
     with contextlib.suppress(TimeoutError):
         return listener.accept()[0]
     return None
 
 
-def _share():
+def _share() -> Path:
     return Path(rospkg.RosPack().get_path("rf_checks"))
 
 

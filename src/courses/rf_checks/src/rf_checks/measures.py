@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,8 @@ STANDS_RAD_S = 0.02
 MOVES_RAD_S = 0.06
 # No joint of the robot turns faster than 4 rad/s: a larger step between two records [rad] is not a motion.
 JUMP_RAD = 0.15
+#: An arm has moved whose joint has gone farther than this [rad].
+MOVED_RAD = 0.1
 # Up to this distance from its goal a joint gets all points, from the second on none [rad].
 AT_GOAL_RAD, OFF_GOAL_RAD = 0.02, 0.25
 
@@ -27,7 +29,7 @@ def ramp(value: float, full: float, none: float) -> float:
     return float(np.clip((none - value) / (none - full), 0.0, 1.0))
 
 
-def distance_from_goal(names: tuple[str, ...], angles: ArrayLike, goal: Any) -> tuple[float, float, str]:
+def distance_from_goal(names: tuple[str, ...], angles: ArrayLike, goal: ArrayLike) -> tuple[float, float, str]:
     """(share of the points, largest distance [rad], that in words). names, angles [rad] and goal [rad]: (n,).
 
     No joint is named where all are at their goals: the farthest one would be another in each run.
@@ -81,13 +83,20 @@ def path_length(positions: np.ndarray) -> float:
     return float(np.abs(np.diff(positions, axis=0)).sum(axis=0).max()) if len(positions) > 1 else 0.0
 
 
-class SineFit:
+def has_moved(positions: np.ndarray) -> bool:
+    """Whether an arm has moved; positions (n, joints) [rad]."""
+    return path_length(positions) > MOVED_RAD
+
+
+class SineFit(NamedTuple):
     """amplitude [m], frequency [Hz], periods, r_squared (1: a perfect sine), start, end [s]."""
 
-    def __init__(self, amplitude: float, frequency: float, periods: float, r_squared: float, start: float,
-                 end: float) -> None:
-        self.amplitude, self.frequency, self.periods = amplitude, frequency, periods
-        self.r_squared, self.start, self.end = r_squared, start, end
+    amplitude: float
+    frequency: float
+    periods: float
+    r_squared: float
+    start: float
+    end: float
 
 
 NO_SINE = SineFit(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

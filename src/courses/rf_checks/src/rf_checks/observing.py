@@ -13,6 +13,7 @@ from rf_checks import diagnosis
 from rf_checks.recording import RECORD_S
 
 if TYPE_CHECKING:
+    from rf_checks.sandbox import Student
     from rf_checks.tasks import Call
 
 #: A program that is almost never idle for this much processor time counts as an endless computation [s]; "almost never"
@@ -30,22 +31,24 @@ _LOOK_AT_GRAPH, _LOOK_AT_FAMILY = 25, 5
 class Observer:
     """Takes the records of one run. When the run is over the world waits until :meth:`release`."""
 
-    def __init__(self, call: Call, is_satisfied: Callable[[], bool], look_at_graph: Callable[[], None]) -> None:
+    def __init__(self, call: Call[Any], student: Student, is_satisfied: Callable[[str], bool],
+                 look_at_graph: Callable[[], bool]) -> None:
         """`is_satisfied(output)`: whether the judge has seen enough; `look_at_graph()`: whether the lab was changed."""
-        self.records = []
+        self.records: list[dict[str, Any]] = []
         self.ended = ""
-        self.student = None
+        self.student = student
         self._call = call
         self._is_satisfied = is_satisfied
         self._look_at_graph = look_at_graph
         self._window = round(diagnosis.FLOOD_WINDOW_S / RECORD_S)
         self._busy_since, self._busy_cpu_s = 0, 0.0
-        self._exited_at = None
+        # The number of records at the program's end; 0 while it runs.
+        self._exited_at = 0
         self._over, self._released = threading.Event(), threading.Event()
         # Records come in one thread, an external end in another: the first end counts.
         self._lock = threading.Lock()
 
-    def on_record(self, record: Any, cpu_s: float) -> None:
+    def on_record(self, record: dict[str, Any], cpu_s: float) -> None:
         """One record, and the processor time that the program has used so far [s]."""
         with self._lock:
             if not self._over.is_set():
@@ -53,9 +56,9 @@ class Observer:
         if self._over.is_set():
             self._released.wait()
 
-    def _take(self, record: Any, cpu_s: float) -> None:
+    def _take(self, record: dict[str, Any], cpu_s: float) -> None:
         self.records.append(record)
-        if self._exited_at is None:
+        if not self._exited_at:
             self.ended = self._end(record, cpu_s)
             if self.ended == "exited":
                 record["exited"] = record["t"]
@@ -79,7 +82,7 @@ class Observer:
         self._over.set()
         self._released.set()
 
-    def _end(self, record: Any, cpu_s: float):
+    def _end(self, record: dict[str, Any], cpu_s: float) -> str:
         count = len(self.records)
         if self.student.exit_code is not None:
             # Check once more: a program that ended at once may have done it before.

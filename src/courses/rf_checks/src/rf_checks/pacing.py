@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from typing import Any
+from collections.abc import Callable, Collection, Iterable
 
 from processes.family import children_of
 
@@ -24,7 +24,7 @@ _LOOK_AGAIN_S, _LOOK_AGAIN_AT_MAX_S = 0.0002, 0.004
 _LOADAVG = "/proc/loadavg"
 
 
-def cpu_time_s(pids: set[int] | tuple[int]) -> float:
+def cpu_time_s(pids: Iterable[int]) -> float:
     """Processor time that the processes `pids` have used so far, all threads [s]."""
     total = 0.0
     for pid in pids:
@@ -43,9 +43,9 @@ def last_process() -> bytes:
 class Tree:
     """Some processes with all their descendants: states of their threads, and their processor time."""
 
-    def __init__(self, roots: tuple[Any, ...] = ()) -> None:
+    def __init__(self, roots: Collection[int] = ()) -> None:
         """`roots`: process ids."""
-        self.roots = tuple(roots)
+        self.roots = roots
         #: Processor time that was used since the beginning [s]; for ended processes, the last known value.
         self.used_s = 0.0
         #: Time in which it did nothing but wait for a disk [s, wall]; `Watch` counts it.
@@ -122,7 +122,7 @@ class Watch:
         #: Helpers: processes whose responses the program waits for.
         self.program, self.helpers = Tree(), Tree()
         #: Called sometimes; True ends a wait.
-        self.gives_up = lambda: False
+        self.gives_up: Callable[[], bool] = lambda: False
 
     def wait_until_rest(self) -> bool:
         """Wait until nothing runs, or the allowances are used up; True when nothing runs."""
@@ -156,7 +156,7 @@ class OwnTime:
     On an otherwise idle machine this is wall time; while they wait for a processor, it stands still.
     """
 
-    def __init__(self, roots: tuple[Any, ...]) -> None:
+    def __init__(self, roots: Callable[[], Iterable[int]]) -> None:
         """`roots`: function that returns process ids."""
         self._roots = roots
         self._tree = Tree()

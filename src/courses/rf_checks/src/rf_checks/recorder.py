@@ -16,15 +16,22 @@ from __future__ import annotations
 import json
 import os
 import socket
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rospy
 from gazebo_msgs.srv import SetModelConfigurationRequest
 from std_srvs.srv import EmptyRequest
 
 from baxter_model import SIDES
+from baxter_sim_hardware.plugin import BaxterPlugin
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from rf_checks.recorder_names import RECORDS, REQUESTS, SOCKETS_VARIABLE, changes_the_world
+
+if TYPE_CHECKING:
+    from baxter_core_msgs.msg import JointCommand as JointCommandMessage
+
+    from baxter_sim_hardware.arms.joint_command import JointCommand
+    from gazebo_ros.model_plugin import PluginContext
 
 RECORD_TICKS = 5  # 10 ms of simulation
 #: Commands listed in one record; further ones are only counted.
@@ -36,7 +43,7 @@ _RESET, _CONFIGURE = "/gazebo/reset_world", "/gazebo/set_model_configuration"
 class Recorder(ModelPlugin):
     """See the module."""
 
-    def __init__(self, context: Any) -> None:
+    def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         folder = os.environ.get(SOCKETS_VARIABLE)
         if not folder:
@@ -48,18 +55,19 @@ class Recorder(ModelPlugin):
         self._socket.connect(os.path.join(folder, RECORDS))
         self._answers = self._socket.makefile("r", encoding="utf-8")
         self._model = context.model
-        self._robot = None
-        self._commands = {side: [] for side in SIDES}
-        self._counts = dict.fromkeys(SIDES, 0)
-        self._accepted = dict.fromkeys(SIDES, 0)
+        self._robot: BaxterPlugin | None = None
+        self._commands: dict[str, list[list[Any]]] = {side: [] for side in SIDES}
+        self._counts: dict[str, int] = dict.fromkeys(SIDES, 0)
+        self._accepted: dict[str, int] = dict.fromkeys(SIDES, 0)
         self._placed = 0
         self._is_ordered = False
         self._done = []
         self._handlers = {}
+        self._has_judge = True
         self._tell({"joints": list(self._model.joint_names)})
 
     def update(self, time_s: float, step_s: float) -> None:
-        if round(time_s / step_s) % RECORD_TICKS or self._socket is None:
+        if round(time_s / step_s) % RECORD_TICKS or not self._has_judge:
             return
         self._watch_robot()
         record = {"t": round(time_s, 4), "q": [round(value, 6) for value in self._model.read_joints()[0]],
@@ -74,7 +82,7 @@ class Recorder(ModelPlugin):
         if answer:
             self._done.append(self._obey(answer, time_s))
 
-    def _more(self):
+    def _more(self) -> dict[str, Any]:
         """Further entries of a record: a dict."""
         return {}
 
@@ -86,9 +94,8 @@ class Recorder(ModelPlugin):
 
     def close(self) -> None:
         self._requests.close()
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        self._socket.close()
+        self._has_judge = False
 
     def _note_placed(self) -> None:
         if not self._is_ordered:
@@ -96,12 +103,12 @@ class Recorder(ModelPlugin):
 
     def _watch_robot(self) -> None:
         """Subscribe to the commands of the robot's plugin, which may be a new object."""
-        robot = next((plugin for plugin in self.context.plugins() if hasattr(plugin, "command_observers")), None)
+        robot = next((plugin for plugin in self.context.plugins() if isinstance(plugin, BaxterPlugin)), None)
         if robot is not self._robot and robot is not None:
             robot.command_observers.append(self._on_command)
         self._robot = robot
 
-    def _on_command(self, side: str, message: Any, command: list[str]) -> None:
+    def _on_command(self, side: str, message: JointCommandMessage, command: JointCommand | None) -> None:
         """command: the checked command, None where the robot refused it."""
         caller = (getattr(message, "_connection_header", None) or {}).get("callerid", "")
         self._counts[side] += 1
@@ -132,7 +139,7 @@ class Recorder(ModelPlugin):
                 return told
             told += json.loads(datagram)["poses"]
 
-    def _tell(self, record: Any) -> None:
+    def _tell(self, record: dict[str, Any]) -> None:
         try:
             self._socket.sendall(json.dumps(record).encode() + b"\n")
         except OSError:
@@ -177,5 +184,5 @@ class Recorder(ModelPlugin):
                 self.context.withdraw(topic)
 
 
-def _link(own: Any, model: Any, link: str):
+def _link(own: str, model: str, link: str) -> str:
     return link if model == own else "%s/%s" % (model, link)

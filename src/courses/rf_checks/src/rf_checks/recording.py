@@ -2,6 +2,7 @@
 """The record of a program's run, as plain data. Free of ROS."""
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,12 +12,14 @@ import numpy as np
 from baxter_model import SIDES, joint_names
 
 RECORD_S = 0.01
+#: A box in move_group's scene: name, pose (4, 4), edges (3,) [m].
+Box = tuple[str, np.ndarray, np.ndarray]
 
 
 class Recording:
     """The robot's motion: one record (a dict as recorder.py writes it) each RECORD_S of simulation."""
 
-    def __init__(self, joint_names: tuple[str, ...], records: list[dict[str, Any]] = ()) -> None:
+    def __init__(self, joint_names: Iterable[str], records: Iterable[dict[str, Any]] = ()) -> None:
         self.joint_names = tuple(joint_names)
         self.records = list(records)
 
@@ -85,10 +88,8 @@ class Recording:
         """Requested poses of the IK service: list of (side, frame, xyz, xyzw, verdict)."""
         return [tuple(request) for record in self.records for request in record["ik"]]
 
-
-    def scenes(self) -> list[Any]:
-        """The boxes in move_group's scene, each time they changed: list of (number of the record, [(name, pose (4, 4),
-        edges (3,) [m])])."""
+    def scenes(self) -> list[tuple[int, list[Box]]]:
+        """The boxes in move_group's scene, each time they changed, and the number of the record."""
         return [(row, [(name, np.array(pose).reshape(4, 4), np.array(edges)) for name, pose, edges in record["scene"]])
                 for row, record in enumerate(self.records) if "scene" in record]
 
@@ -101,10 +102,10 @@ class Changes:
     withdrawn: lost publications, subscriptions and services of the lab's nodes. parameters: changed or deleted.
     """
 
-    missing_nodes: list = field(default_factory=list)
-    intruders: dict = field(default_factory=dict)
-    withdrawn: list = field(default_factory=list)
-    parameters: list = field(default_factory=list)
+    missing_nodes: list[str] = field(default_factory=list)
+    intruders: dict[str, list[str]] = field(default_factory=dict)
+    withdrawn: list[str] = field(default_factory=list)
+    parameters: list[str] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         return bool(self.missing_nodes or self.intruders or self.withdrawn or self.parameters)
@@ -120,7 +121,7 @@ class Run:
     wall_s: its wall time.
     """
 
-    arguments: list
+    arguments: list[str]
     recording: Recording
     output: str = ""
     errors: str = ""

@@ -47,11 +47,12 @@ def _robot(which: WhichRobot) -> str:
 
 def as_json(result: Result) -> str:
     """The same as a JSON text."""
+    points = result.points
     return json.dumps({
         "lab": result.exercise.lab, "exercise": result.exercise.name, "program": result.program, "seed": result.seed,
         "profile": result.which.profile, "serial": result.which.serial,
         "graded": not result.not_graded, "not_graded": result.not_graded or None,
-        "points": None if result.not_graded else round(result.points, 2), "pass_mark": PASS_MARK,
+        "points": None if points is None else round(points, 2), "pass_mark": PASS_MARK,
         "passed": has_passed(result),
         "fault": result.fault.key if result.fault else None, "hint": result.fault.sentence if result.fault else None,
         "notes": list(result.notes), "isolation": result.isolation, "wall_s": round(result.lasted_s, 2),

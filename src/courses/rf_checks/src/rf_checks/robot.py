@@ -2,17 +2,16 @@
 """Poses of the robot's frames for given joint values. Free of ROS."""
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from arm_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
-from baxter_model import BASE_FRAME, joint_names, poses, tip_of
+from baxter_model import BASE_FRAME, SIDES, poses, tip_of
 from urdf_model import parse_urdf
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from rf_checks.recording import Recording
 
 # Start of inverse kinematics: the middle of the arm's usual workspace.
@@ -24,7 +23,9 @@ class Robot:
 
     def __init__(self, description_xml: str) -> None:
         self._robot = parse_urdf(description_xml)
-        self._chains = {}
+        self._arms = {side: Chain.from_robot(self._robot, base=BASE_FRAME, tip=tip_of(side)) for side in SIDES}
+        # None: no joint moves the frame.
+        self._chains: dict[str, Chain | None] = {}
 
     @property
     def frame_names(self) -> list[str]:
@@ -66,23 +67,16 @@ class Robot:
 
     def gripper_path(self, side: str, recording: Recording) -> np.ndarray:
         """(n, 3) positions of one gripper in `base` [m]."""
-        chain = self._chain(side)
-        return np.array([chain.fk(q)[:3, 3] for q in recording.arm(side)])
+        return np.array([self._arms[side].fk(q)[:3, 3] for q in recording.arm(side)])
 
     def gripper(self, side: str, recording: Recording, row: int = -1) -> np.ndarray:
         """(4, 4) pose of one gripper in `base` at a row of the recording."""
-        return self._chain(side).fk(recording.arm(side)[row])
+        return self._arms[side].fk(recording.arm(side)[row])
 
-    def solve(self, side: str, xyz: tuple[float, float, float], xyzw: ArrayLike) -> np.ndarray | NoSolution:
+    def solve(self, side: str, xyz: Sequence[float], xyzw: Sequence[float]) -> np.ndarray | NoSolution:
         """Solve an IK request: returns joint values (7,), or the NoSolution."""
         try:
-            return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=self._start(side)).q
+            start = np.array(list(poses().angles(_START, side).values()))
+            return solve(self._arms[side], pose_from_quaternion(xyz, xyzw), seed=start).q
         except NoSolution as failure:
             return failure
-
-    def _start(self, side: str) -> np.ndarray:
-        return np.array(list(poses().angles(_START, side).values()))
-
-    def _chain(self, side: str) -> Chain:
-        self.frame(tip_of(side), dict.fromkeys(joint_names(side), 0.0))
-        return self._chains[tip_of(side)]

@@ -8,7 +8,6 @@ import hashlib
 import io
 import re
 import unicodedata
-from collections.abc import Sequence
 from typing import NamedTuple
 
 #: Students of one class; more is a mistake in the command.
@@ -100,7 +99,7 @@ def _column(header: list[str], headings: tuple[str, ...]) -> int | None:
     return next((header.index(heading) for heading in headings if heading in header), None)
 
 
-def _names_of(header: list[str]) -> Sequence[int]:
+def _names_of(header: list[str]) -> list[int] | None:
     """The columns that make a student's name together, or None."""
     whole, first, last = (_column(header, headings) for headings in (_NAMES, _FIRST_NAMES, _LAST_NAMES))
     if whole is not None:
@@ -112,7 +111,7 @@ def _cell(row: list[str], column: int | None) -> str:
     return row[column] if column is not None and len(row) > column else ""
 
 
-def _in_order(name: str):
+def _in_order(name: str) -> str:
     """First and last name of "last, first"; any other name as it is."""
     last, comma, first = name.partition(",")
     return "%s %s" % (first.strip(), last.strip()) if comma and first.strip() and "," not in first else name
@@ -139,7 +138,7 @@ def _students(rows: list[tuple[int, str, str]]) -> list[Student]:
     return students
 
 
-def _number_of(full_name: str):
+def _number_of(full_name: str) -> str:
     """For a name of other letters: the same in each roster, whatever the order."""
     return "student-" + hashlib.sha256(full_name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
 

@@ -20,7 +20,7 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO
 
 import rospy_fixes
 from processes import isolation, system_calls, usage
@@ -63,8 +63,8 @@ class Startup:
     """Start-up data of every checked program: a folder for PYTHONPATH, variables, inherited descriptors, and what it
     must not see."""
 
-    def __init__(self, folder: Path, environment: dict[str, Any], descriptors: tuple[Any, ...] = (),
-                 hidden: tuple[str, str, str] = ()) -> None:
+    def __init__(self, folder: Path, environment: dict[str, str], descriptors: Sequence[int] = (),
+                 hidden: Sequence[str] = ()) -> None:
         """folder: path; environment: dict; descriptors: keep their numbers; hidden: absolute paths."""
         self.folder, self.environment, self.descriptors = str(folder), dict(environment), tuple(descriptors)
         self.hidden = tuple(hidden)
@@ -100,10 +100,10 @@ class Student:
         except BaseException:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise
-        self._streams = [_Stream(self._process.stdout), _Stream(self._process.stderr)]
+        self._streams = [_Stream(pipe) for pipe in (self._process.stdout, self._process.stderr) if pipe is not None]
 
     def _start(self, program: Path, arguments: Sequence[str], environment: dict[str, str], walls: bool,
-               startup: Startup | None, refused: tuple[list[str], tuple[int, ...]]) -> subprocess.Popen:
+               startup: Startup | None, refused: tuple[list[str], tuple[int, ...]]) -> subprocess.Popen[bytes]:
         options, descriptors = refused
         home = isolation.HOME if walls else self.folder
         names = submission.copy(program, self.folder)
@@ -112,7 +112,7 @@ class Student:
         if walls:
             # A package beside the program is one entry; for single files, their folders would have to be made first.
             tops = sorted({name.split("/")[0] for name in names})
-            binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
+            binds = [("%s/%s" % (self.folder, top), "%s/%s" % (home, top), False) for top in tops]
             if startup is not None:
                 binds.append((startup.folder, _STARTUP_FOLDER, False))
             unseen = (*hidden_paths.SOLVED, *hidden_paths.JUDGE, *(startup.hidden if startup else ()))
@@ -250,7 +250,7 @@ def _reap(pids: set[int]) -> None:
 class _Stream:
     """Reads a pipe completely, and keeps the beginning and the end of the data."""
 
-    def __init__(self, pipe: BinaryIO) -> None:
+    def __init__(self, pipe: IO[bytes]) -> None:
         self.total = 0
         self._pipe = pipe
         self._head = bytearray()

@@ -18,7 +18,6 @@ import re
 import tokenize
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 #: Tokens of a fingerprint: about two lines of code.
 SPAN = 14
@@ -117,16 +116,16 @@ class _Level(ast.NodeTransformer):
         self.generic_visit(node)
         return node
 
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> Any:
+    def visit_FunctionDef(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> ast.AST:
         node.returns = None
         return self._definition(node)
 
     visit_AsyncFunctionDef = visit_FunctionDef
 
-    def visit_ClassDef(self, node: ast.ClassDef) -> Any:
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
         return self._definition(node)
 
-    def _definition(self, node: ast.FunctionDef | ast.ClassDef) -> ast.FunctionDef | ast.ClassDef:
+    def _definition(self, node: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) -> ast.AST:
         self.generic_visit(node)
         node.name = "v"
         node.body = node.body or [ast.Pass()]
@@ -190,8 +189,8 @@ def opaque_calls(text: str) -> list[tuple[int, str]]:
         if isinstance(call, ast.Name):
             module, name = functions.get(call.id, ("", call.id))
         elif isinstance(call, ast.Attribute):
-            # A module, or the last part of a dotted one.
-            owner = getattr(call.value, "id", getattr(call.value, "attr", None))
+            # A module, or the last part of a dotted one; what a call returns is none.
+            owner = getattr(call.value, "id", getattr(call.value, "attr", "()"))
             module, name = modules.get(owner, owner), call.attr
         if name in _OPAQUE.get(module, ()):
             found.add((call.lineno, "%s.%s" % (module, name) if module else name))

@@ -1,30 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Grading of each kind of exercise: its criteria, and its typical mistakes. Free of ROS.
-
-A task has `calls(rng)`, the runs of the check; `criteria(call, run, robot)`, the grades of one run; `slip(call, run,
-robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program that does not
-end. It may have `foremost(call, run)`, a Fault that explains how the program behaved, or None.
-"""
+"""Grading of each kind of exercise: its criteria, and its typical mistakes. Free of ROS."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
 from baxter_model import SIDES, joint_names, poses
+from command_line.options import counted
 from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
 
 if TYPE_CHECKING:
     from numpy.random import Generator
-    from numpy.typing import ArrayLike
 
     from rf_checks.recording import Recording, Run
     from rf_checks.robot import Robot
+    from rf_checks.tasks_planning import Obstacle
 
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
@@ -34,21 +31,48 @@ OFF_M, OFF_RAD = (0.01, 0.1), (math.radians(2), math.radians(30))
 # A wave must have 5 cm and three periods; the window of the sine fit loses a part of both.
 AMPLITUDE_M, PERIODS = 0.045, 2.5
 
+Expected = TypeVar("Expected")
+
 
 @dataclass(frozen=True)
-class Call:
-    """One run of the program: its arguments, the arms' posture before, the time limit [sim s], and the right answer.
+class Call(Generic[Expected]):
+    """One run of the program: its arguments, the arms' posture before {joint: rad}, the time limit [sim s], and the
+    right answer.
 
     obstacle: Obstacle in a lab that has move_group, or None. steered: whether the lab has a servo of the left arm.
     """
 
-    arguments: tuple
-    posture: dict
+    arguments: tuple[str, ...]
+    posture: dict[str, float]
     limit_s: float
-    expected: object = None
-    lasts_s: float = field(default=0.0)
-    obstacle: object = None
+    expected: Expected
+    lasts_s: float = 0.0
+    obstacle: Obstacle | None = None
     steered: bool = False
+
+
+class Task(ABC, Generic[Expected]):
+    """The grading of one kind of exercise."""
+
+    @abstractmethod
+    def calls(self, rng: Generator) -> list[Call[Expected]]:
+        """The runs of the check."""
+
+    @abstractmethod
+    def criteria(self, call: Call[Expected], run: Run, robot: Robot) -> list[Criterion]:
+        """The grades of one run."""
+
+    @abstractmethod
+    def slip(self, call: Call[Expected], run: Run, robot: Robot) -> Fault | None:
+        """The mistake that one run shows, or None."""
+
+    def is_satisfied(self, call: Call[Expected], run: Run) -> bool:
+        """Whether the judge has seen enough of a program that does not end."""
+        return False
+
+    def foremost(self, call: Call[Expected], run: Run) -> Fault | None:
+        """A Fault that explains how the program behaved, or None."""
+        return None
 
 
 def postures(rng: Generator, spread: float = 0.12) -> dict[str, float]:
@@ -57,7 +81,7 @@ def postures(rng: Generator, spread: float = 0.12) -> dict[str, float]:
             for side in SIDES for name, angle in poses().angles("neutral", side).items()}
 
 
-def pose_matrix(point: Sequence[float], quaternion_xyzw: ArrayLike) -> np.ndarray:
+def pose_matrix(point: Sequence[float], quaternion_xyzw: Iterable[float]) -> np.ndarray:
     """(4, 4) of a position [m] and a quaternion x y z w of any length."""
     matrix = np.eye(4)
     x, y, z, w = quaternion_xyzw
@@ -65,7 +89,7 @@ def pose_matrix(point: Sequence[float], quaternion_xyzw: ArrayLike) -> np.ndarra
     return matrix
 
 
-def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: Call,
+def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: Call[Expected],
                     weights: tuple[float, float, float], halts_allowed: int) -> list[Criterion]:
     """Smoothness, collisions, time: weighted by the solved share of the task (`done_share`)."""
     smooth, clear, quick = weights
@@ -93,51 +117,43 @@ def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: C
     ]
 
 
-def counted(number: Any, word: str) -> str:
-    """A number with its noun: "1 time", "2 times"."""
-    return "%s %s%s" % (number, word, "" if str(number) == "1" else "s")
-
-
 def _duration(recording: Recording) -> float:
     arms = np.hstack([recording.arm(side) for side in SIDES]) if len(recording.times) else np.empty((0, 14))
     rows = measures.moving_rows(recording.times, arms)
     return float(recording.times[rows[1]] - recording.times[0]) if rows else 0.0
 
 
-class RotateGripper:
+class RotateGripper(Task[tuple[str, float]]):
     """`rotate_gripper.py AXIS DEGREES`: the left gripper to the lab's pose, then turned about its own axis."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[tuple[str, float]]]:
         return [Call((axis, "%d" % degrees), postures(rng), 45.0, (axis, math.radians(degrees)), 22.0)
                 for axis, degrees in (("z", 90), ("x", 90), ("y", -90))]
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
-
-    def _target(self, call: Call) -> tuple[np.ndarray, np.ndarray]:
+    def _target(self, call: Call[tuple[str, float]]) -> tuple[np.ndarray, np.ndarray]:
         axis, angle = call.expected
         start = pose_matrix(LAB_POINT, LAB_QUATERNION)
         target = start.copy()
         target[:3, :3] = start[:3, :3] @ mistakes.about(axis, angle)
         return start, target
 
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[tuple[str, float]], run: Run, robot: Robot) -> list[Criterion]:
         position = orientation = 0.0
         distance, angle = math.inf, math.inf
         recording = run.recording
-        if recording.records and measures.path_length(recording.arm("left")) > 0.1:
+        if measures.has_moved(recording.arm("left")):
             distance, angle = measures.pose_error(robot.gripper("left", recording), self._target(call)[1])
             position = ramp(distance, *OFF_M)
             orientation = position * ramp(angle, *OFF_RAD)
         reached = turned = "the arm did not move"
         if math.isfinite(distance):
             reached = "%.1f cm off" % (100 * distance) if position < 1.0 else "within %g cm" % (100 * OFF_M[0])
-            turned = ("%s off" % counted("%.0f" % math.degrees(angle), "degree") if angle > OFF_RAD[0] else
+            turned = ("%s off" % counted(round(math.degrees(angle)), "degree") if angle > OFF_RAD[0] else
                       "within %g degrees" % round(math.degrees(OFF_RAD[0])))
         return [Criterion("position", position, 20.0, reached), Criterion("orientation", orientation, 40.0, turned),
                 *motion_criteria(run, ("left",), min(position, orientation), call, (10.0, 15.0, 15.0), 4)]
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[tuple[str, float]], run: Run, robot: Robot) -> Fault | None:
         axis, angle = call.expected
         start, target = self._target(call)
         requests = run.recording.ik_requests()
@@ -154,10 +170,10 @@ class RotateGripper:
                 or self._missed(run, robot, start, bool(requests)))
 
     @staticmethod
-    def _missed(run: Run, robot: Robot, start: np.ndarray, has_asked: bool) -> Any:
-        """The sentence for an arm that is at another place without a known mistake."""
+    def _missed(run: Run, robot: Robot, start: np.ndarray, has_asked: bool) -> Fault | None:
+        """A Fault for an arm that is at another place without a known mistake."""
         distance = measures.pose_error(robot.gripper("left", run.recording), start)[0]
-        if distance < 0.05 or measures.path_length(run.recording.arm("left")) < 0.1:
+        if distance < 0.05 or not measures.has_moved(run.recording.arm("left")):
             return None
         text = "the left gripper ended %.0f cm from the lab's pose, where it is to be turned" % (100.0 * distance)
         if not has_asked:
@@ -199,30 +215,27 @@ class RotateGripper:
         return None
 
 
-class JointCommand:
+class JointCommand(Task[tuple[float, ...]]):
     """`joint_command.py Q0 ... Q6`: the right arm to seven angles, s0 to w2, by a stream of joint commands."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[tuple[float, ...]]]:
         goal = [round(float(angle), 3) for angle in np.array((-0.4, -0.3, 0.5, 1.1, 0.3, 0.8, 0.7))
                 + rng.uniform(-0.15, 0.15, 7)]
         return [Call(tuple(map(str, goal)), postures(rng), 30.0, tuple(goal), 12.0)]
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
-
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> list[Criterion]:
         share, found = 0.0, "the arm did not move"
         recording = run.recording
-        if recording.records and measures.path_length(recording.arm("right")) > 0.1:
+        if measures.has_moved(recording.arm("right")):
             share, off, found = measures.distance_from_goal(joint_names("right"), recording.arm("right")[-1],
                                                             call.expected)
             share = share if off < measures.OFF_GOAL_RAD else 0.6 * share
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Any:
+    def slip(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> Fault | None:
         recording = run.recording
-        if recording.records and measures.path_length(recording.arm("right")) > 0.1:
+        if measures.has_moved(recording.arm("right")):
             off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
             if off.max() > measures.AT_GOAL_RAD and run.exit_code == 0:
                 return Fault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
@@ -231,22 +244,21 @@ class JointCommand:
         return None
 
 
-class Wave:
+class Wave(Task[None]):
     """`wave.py`: both grippers to and fro along a sine path at the same time, three periods or more, then an end."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[None]]:
         return [Call((), postures(rng), 60.0, None, 40.0)]
-
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
 
     def fits(self, run: Run, robot: Robot) -> dict[str, measures.SineFit]:
         """The sine of each gripper's path: dict of side to SineFit."""
         recording = run.recording
         return {side: measures.fit_sine(recording.times, robot.gripper_path(side, recording)) for side in SIDES}
 
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
-        fits = self.fits(run, robot) if len(run.recording.times) > 50 else dict.fromkeys(SIDES, measures.NO_SINE)
+    def criteria(self, call: Call[None], run: Run, robot: Robot) -> list[Criterion]:
+        fits: dict[str, measures.SineFit] = dict.fromkeys(SIDES, measures.NO_SINE)
+        if len(run.recording.times) > 50:
+            fits = self.fits(run, robot)
         found, shares = [], []
         for side, fit in fits.items():
             share = (ramp(fit.r_squared, 0.95, 0.6) * ramp(fit.amplitude, AMPLITUDE_M, 0.01)
@@ -267,18 +279,18 @@ class Wave:
                                  4 + round(3 * max(fit.periods for fit in fits.values())))]
 
     @staticmethod
-    def _together(fits: Any) -> float:
+    def _together(fits: dict[str, measures.SineFit]) -> float:
         left, right = (fits[side] for side in SIDES)
         if not (left.periods and right.periods):
             return 0.0
         both = min(left.end, right.end) - max(left.start, right.start)
         return float(np.clip(both / min(left.end - left.start, right.end - right.start), 0.0, 1.0))
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[None], run: Run, robot: Robot) -> Fault | None:
         if len(run.recording.times) < 50:
             return None
         fits = self.fits(run, robot)
-        still = [side for side in SIDES if measures.path_length(run.recording.arm(side)) < 0.1]
+        still = [side for side in SIDES if not measures.has_moved(run.recording.arm(side))]
         if len(still) == 1:
             return Fault("one_arm", "only one arm moved; the %s arm stood still, and both are to wave" % still[0])
         none = [side for side, fit in fits.items() if not fit.periods]

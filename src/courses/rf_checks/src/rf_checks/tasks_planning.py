@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exercise on planning: an arm, a pillar in its way, and move_group. Free of ROS.
-
-The methods of a task are described in tasks.py.
-"""
+"""The exercise on planning: an arm, a pillar in its way, and move_group. Free of ROS."""
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,12 +13,12 @@ from baxter_model import joint_names, poses
 from command_line.options import counted
 from rf_checks import measures
 from rf_checks.recording import Criterion, Fault
-from rf_checks.tasks import Call, motion_criteria, postures
+from rf_checks.tasks import Call, Task, motion_criteria, postures
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from rf_checks.recording import Recording, Run
+    from rf_checks.recording import Box, Recording, Run
     from rf_checks.robot import Robot
 
 ARM, STATE = "left", "left_neutral"
@@ -52,14 +49,14 @@ _URDF = """<robot name="pillar">
 class Obstacle:
     """A box that stands fast. middle x y z, edges along x y z, in `base` [m]."""
 
-    middle: tuple
-    edges: tuple
+    middle: tuple[float, float, float]
+    edges: tuple[float, float, float]
 
     def urdf(self) -> str:
         """Its description, URDF text."""
         return _URDF % {"box": '<box size="%g %g %g"/>' % self.edges}
 
-    def is_covered(self, pose: np.ndarray, edges: Any) -> bool:
+    def is_covered(self, pose: np.ndarray, edges: np.ndarray) -> bool:
         """Whether a box with `pose` (4, 4) and `edges` (3,) stands for it: as large, or a little larger."""
         own = np.eye(4)
         own[:3, 3] = self.middle
@@ -67,55 +64,61 @@ class Obstacle:
                     and _beyond(pose, edges, own, np.array(self.edges)) < BEYOND_M)
 
 
-def _beyond(pose: np.ndarray, edges: Any, other: Any, size: Any) -> float:
+def _beyond(pose: np.ndarray, edges: np.ndarray, other: np.ndarray, size: np.ndarray) -> float:
     """How far a box with `pose` and `edges` reaches beyond the faces of one with `other` and `size` [m]."""
     corners = 0.5 * edges * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     seen = np.linalg.inv(other) @ pose
     return float((np.abs(corners @ seen[:3, :3].T + seen[:3, 3]) - 0.5 * size).max())
 
 
-class PlanAround:
+class Way(NamedTuple):
+    """Angles to reach (7,) [rad], from s0 to w2, and what is in the way."""
+
+    goal: tuple[float, ...]
+    pillar: Obstacle
+
+
+class PlanAround(Task[Way]):
     """`plan_around.py X Y Z LX LY LZ`: the left arm to `left_neutral`, past a pillar at X Y Z with edges LX LY LZ."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[Way]]:
         x, y = (round(float(value + rng.uniform(-_SPREAD_M, _SPREAD_M)), 3) for value in _PLACE_M)
         edges = _WIDTH_M, _WIDTH_M, round(_TOP_M - _FLOOR_M, 3)
         pillar = Obstacle((x, y, round(0.5 * (_FLOOR_M + _TOP_M), 3)), edges)
         posture = postures(rng, 0.05)
         posture[joint_names(ARM)[0]] = round(float(_BEGIN_RAD + rng.uniform(-_SPREAD_RAD, _SPREAD_RAD)), 4)
         words = tuple("%g" % value for value in (*pillar.middle, *pillar.edges))
-        return [Call(words, posture, 60.0, tuple(poses().angles("neutral", ARM).values()), 25.0, pillar)]
+        way = Way(tuple(poses().angles("neutral", ARM).values()), pillar)
+        return [Call(words, posture, 60.0, way, 25.0, pillar)]
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
-
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[Way], run: Run, robot: Robot) -> list[Criterion]:
         recording = run.recording
         share, found = 0.0, "the arm did not move"
-        if _has_moved(recording):
-            share, off, found = measures.distance_from_goal(joint_names(ARM), recording.arm(ARM)[-1], call.expected)
+        if measures.has_moved(recording.arm(ARM)):
+            share, off, found = measures.distance_from_goal(joint_names(ARM), recording.arm(ARM)[-1],
+                                                            call.expected.goal)
             share = share if off < measures.OFF_GOAL_RAD else 0.0
-        known = self._knows(call.obstacle, _told(recording))
+        known = self._knows(call.expected.pillar, _told(recording))
         return [Criterion(STATE, share, 40.0, found),
                 Criterion("the pillar in the scene", 1.0 if known else 0.0, 20.0,
                           "move_group knew it" if known else "move_group did not know it as it stands"),
                 *motion_criteria(run, (ARM,), share, call, (10.0, 20.0, 10.0), 3)]
 
     @staticmethod
-    def _knows(pillar: Any, told: list[Any]) -> bool:
+    def _knows(pillar: Obstacle, told: list[Box]) -> bool:
         return len(told) <= MAX_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
 
-    def foremost(self, call: Call, run: Run) -> Fault | None:
+    def foremost(self, call: Call[Way], run: Run) -> Fault | None:
         return self._about_scene(call, run) if _touched(run.recording) else None
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[Way], run: Run, robot: Robot) -> Fault | None:
         recording = run.recording
         fault = self._about_scene(call, run)
         if fault is None and not recording.accepted_count(ARM) and recording.was_enabled():
             fault = Fault("not_executed", "no joint command came, though the robot was enabled: plan() only looks for "
                           "a way; go() takes it, or execute() with the second of what plan() returns")
-        if fault is None and _has_moved(recording):
-            off = np.abs(recording.arm(ARM)[-1] - np.array(call.expected))
+        if fault is None and measures.has_moved(recording.arm(ARM)):
+            off = np.abs(recording.arm(ARM)[-1] - np.array(call.expected.goal))
             if off.max() > measures.AT_GOAL_RAD:
                 fault = Fault("far_off", "%s ended %.2f rad from `%s`, a state of the group `%s_arm`: "
                               "set_named_target(\"%s\") before go()"
@@ -123,9 +126,9 @@ class PlanAround:
         return fault
 
     @staticmethod
-    def _about_scene(call: Call, run: Run):
+    def _about_scene(call: Call[Way], run: Run) -> Fault | None:
         """A Fault for what move_group was told of the pillar, or None."""
-        pillar, told = call.obstacle, _told(run.recording)
+        pillar, told = call.expected.pillar, _told(run.recording)
         if PlanAround._knows(pillar, told):
             return None
         end = "; the arm ran into it" if _touched(run.recording) else ""
@@ -149,17 +152,13 @@ class PlanAround:
                      "on each side is a margin" % (name, _words(edges), _words(pillar.edges), end, BEYOND_M))
 
 
-def _has_moved(recording: Recording) -> bool:
-    return bool(recording.records) and measures.path_length(recording.arm(ARM)) > 0.1
-
-
 def _touched(recording: Recording) -> bool:
     return any("pillar" in link for pair in recording.contacts() for link in pair)
 
 
-def _told(recording: Recording) -> list[Any]:
-    """The different boxes in move_group's scene until the arm came to rest: list of (name, pose, edges)."""
-    rows = measures.moving_rows(recording.times, recording.arm(ARM)) if _has_moved(recording) else None
+def _told(recording: Recording) -> list[Box]:
+    """The different boxes in move_group's scene until the arm came to rest."""
+    rows = measures.moving_rows(recording.times, recording.arm(ARM)) if measures.has_moved(recording.arm(ARM)) else None
     last = rows[1] if rows else len(recording.records)
     found = {}
     for row, boxes in recording.scenes():
@@ -168,5 +167,5 @@ def _told(recording: Recording) -> list[Any]:
     return list(found.values())
 
 
-def _words(numbers: Sequence[float]) -> str:
+def _words(numbers: Iterable[float]) -> str:
     return " ".join("%.2f" % value for value in numbers)

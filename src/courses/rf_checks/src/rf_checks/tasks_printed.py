@@ -2,23 +2,23 @@
 """Exercises whose answer is printed. The truth comes from the simulated robot itself, not from topics. Free of ROS.
 
 Each answer has a form that holds one: the last matrices, as many as are asked for; the line with the verdict; one name.
-A program that prints all it could be has not answered. The methods of a task are described in tasks.py.
+A program that prints all it could be has not answered.
 """
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from arm_kinematics import NoSolution
 from baxter_model import SIDES
 from command_line.options import counted
 from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
-from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
+from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, Task, pose_matrix, postures
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -71,18 +71,18 @@ def last_matrices(text: str, count: int) -> list[np.ndarray]:
     return found[::-1]
 
 
-class TfListener:
+class TfListener(Task[tuple[tuple[str, str], ...]]):
     """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three, and no other last."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[tuple[tuple[str, str], ...]]]:
         pairs = [(a, b) for a, b in (("head", "right_hand"), ("right_hand", "head_camera"), ("left_gripper", "torso"))]
         pair = pairs[int(rng.integers(len(pairs)))]
         return [Call((), postures(rng, 0.3), 15.0, SHEET_PAIRS), Call(pair, postures(rng, 0.3), 15.0, (pair,))]
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
+    def is_satisfied(self, call: Call[tuple[tuple[str, str], ...]], run: Run) -> bool:
         return len(matrices(run.output)) >= len(call.expected)
 
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[tuple[tuple[str, str], ...]], run: Run, robot: Robot) -> list[Criterion]:
         found = last_matrices(run.output, len(call.expected))
         result = []
         for target, source in call.expected:
@@ -100,7 +100,7 @@ class TfListener:
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
         return result
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[tuple[tuple[str, str], ...]], run: Run, robot: Robot) -> Fault | None:
         found = last_matrices(run.output, len(call.expected))
         if not run.recording.records:
             return None
@@ -134,10 +134,10 @@ VERDICTS = ("SOLVED", "OUT_OF_REACH", "JOINT_LIMIT", "NOT_CONVERGED", "SELF_COLL
 _VERDICT = re.compile("|".join(VERDICTS))
 
 
-class Unreachable:
+class Unreachable(Task[tuple[float, ...]]):
     """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict on that pose, and its reason."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[tuple[float, ...]]]:
         down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
         turned = mistakes.quaternion_of(down @ mistakes.about("y", -np.pi / 2))
         kinds = ((LAB_POINT, LAB_QUATERNION), ((1.5, 0.6, 0.2), (0.0, 1.0, 0.0, 0.0)), ((0.6, 0.3, 0.3), turned))
@@ -148,14 +148,12 @@ class Unreachable:
             calls.append(Call(words, postures(rng), 12.0, tuple(float(word) for word in words)))
         return calls
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
-
-    def _truth(self, call: Call, robot: Robot) -> Any:
+    @staticmethod
+    def _truth(call: Call[tuple[float, ...]], robot: Robot) -> NoSolution | None:
         answer = robot.solve("left", call.expected[:3], call.expected[3:])
-        return answer if hasattr(answer, "reason") else None
+        return answer if isinstance(answer, NoSolution) else None
 
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> list[Criterion]:
         failure = self._truth(call, robot)
         verdict = failure.reason.name if failure else "SOLVED"
         lines = [line for line in run.output.splitlines() if _VERDICT.search(line)]
@@ -172,19 +170,19 @@ class Unreachable:
                           "counts with the right verdict")]
 
     @staticmethod
-    def _says_why(failure: Any, line: str) -> bool:
+    def _says_why(failure: NoSolution | None, line: str) -> bool:
         """Whether a line of the output gives the reason, and no other."""
         if failure is None:
             return True
-        said = line[_VERDICT.search(line).start():]
         if failure.joints:
             named = set(_JOINT.findall(line))
             return bool(named) and named <= set(failure.joints)
+        said = _VERDICT.split(line, maxsplit=1)[-1]
         numbers = [float(word) for word in _METRES.findall(said) or _NUMBER.findall(said)]
         return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m)
                    for number in numbers[:MAX_NUMBERS])
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> Fault | None:
         requests = run.recording.ik_requests()
         for _, frame, xyz, xyzw, _ in requests:
             if frame.lstrip("/") not in ("base", "world", ""):
@@ -205,15 +203,12 @@ class Unreachable:
         return None
 
 
-class IkFrame:
+class IkFrame(Task[None]):
     """`ik_frame.py`: finds out by an experiment the reference frame of poses and the frame that is moved there; prints
     both."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[None]]:
         return [Call((), postures(rng), 40.0, None, 20.0)]
-
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
 
     @staticmethod
     def answers(text: str) -> tuple[str, str]:
@@ -222,9 +217,10 @@ class IkFrame:
         for name in ("reference frame", "commanded frame"):
             said = dict.fromkeys(re.findall(name + r"\s*[:=]\s*/?([A-Za-z]\w*)", text, re.IGNORECASE))
             found.append(" and ".join([*said][:3]) + (" and others" if len(said) > 3 else ""))
-        return tuple(found)
+        reference, commanded = found
+        return reference, commanded
 
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[None], run: Run, robot: Robot) -> list[Criterion]:
         reference, commanded = self.answers(run.output)
         asked, arrived, found = self._experiment(run, robot)
         return [
@@ -238,12 +234,12 @@ class IkFrame:
         ]
 
     @staticmethod
-    def _experiment(run: Run, robot: Robot) -> Sequence[Any]:
+    def _experiment(run: Run, robot: Robot) -> tuple[bool, float, str]:
         recording = run.recording
         solved = [request for request in recording.ik_requests() if request[4] == 0]
-        best = 0.0, "no arm moved to a pose that the service had solved"
+        best: tuple[float, str] = 0.0, "no arm moved to a pose that the service had solved"
         for side, _, xyz, xyzw, _ in solved:
-            if measures.path_length(recording.arm(side)) < 0.1:
+            if not measures.has_moved(recording.arm(side)):
                 continue
             target = pose_matrix(xyz, xyzw)
             # All poses in which the arm rested.
@@ -254,9 +250,9 @@ class IkFrame:
             found = ("at the pose that was asked for" if share == 1.0 else
                      "%.1f cm from the pose that was asked for" % (100 * distance))
             best = max(best, (share, found))
-        return bool(solved), *best
+        return bool(solved), best[0], best[1]
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[None], run: Run, robot: Robot) -> Fault | None:
         reference, commanded = self.answers(run.output)
         if not reference or not commanded:
             return Fault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exercise on steering: a hand brought to a place by twists for a servo. Free of ROS.
-
-The methods of a task are described in tasks.py.
-"""
+"""The exercise on steering: a hand brought to a place by twists for a servo. Free of ROS."""
 from __future__ import annotations
 
 import math
@@ -13,7 +10,7 @@ import numpy as np
 from rf_checks import measures
 from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
-from rf_checks.tasks import OFF_M, OFF_RAD, Call, motion_criteria, postures
+from rf_checks.tasks import OFF_M, OFF_RAD, Call, Task, motion_criteria, postures
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -28,23 +25,20 @@ TWISTS = SERVO + "/delta_twist_cmds"
 _MIDDLE_M, _APART_M, _SPREAD_M = (0.68, 0.55, 0.15), (0.0, 0.12, 0.08), 0.03
 
 
-class SteerTo:
+class SteerTo(Task[tuple[float, ...]]):
     """`steer_to.py X Y Z`: the left gripper to a place in `base` by twists, with the orientation that it has."""
 
-    def calls(self, rng: Generator) -> list[Call]:
+    def calls(self, rng: Generator) -> list[Call[tuple[float, ...]]]:
         goals = [np.array(_MIDDLE_M) + side * np.array(_APART_M) + rng.uniform(-_SPREAD_M, _SPREAD_M, 3)
                  for side in (1.0, -1.0)]
         return [Call(tuple("%.3f" % value for value in goal), postures(rng, 0.05), 40.0,
                      tuple(round(float(value), 3) for value in goal), 12.0, steered=True) for goal in goals]
 
-    def is_satisfied(self, call: Call, run: Run) -> bool:
-        return False
-
-    def criteria(self, call: Call, run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> list[Criterion]:
         recording = run.recording
         position = kept = 0.0
         reached = turned = "the arm did not move"
-        if _has_moved(recording):
+        if measures.has_moved(recording.arm(ARM)):
             distance, angle = _errors(call, recording, robot)
             position = ramp(distance, *OFF_M)
             kept = position * ramp(angle, *OFF_RAD)
@@ -56,7 +50,7 @@ class SteerTo:
                           "by twists alone" if position else reached),
                 *motion_criteria(run, (ARM,), min(position, kept), call, (10.0, 10.0, 10.0), 1)]
 
-    def slip(self, call: Call, run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> Fault | None:
         recording = run.recording
         if others := _other_commanders(recording):
             return Fault("not_steered", "%s moved the arm by joint commands: steer it by geometry_msgs/TwistStamped on "
@@ -65,7 +59,7 @@ class SteerTo:
             return Fault("no_twist", "no twist moved the arm, though the robot was enabled: publish geometry_msgs/"
                          "TwistStamped on %s again and again, with header.stamp = rospy.Time.now(): each counts for "
                          "0.1 s" % TWISTS) if recording.was_enabled() else None
-        if not _has_moved(recording):
+        if not measures.has_moved(recording.arm(ARM)):
             return Fault("small_twist", "the twists were so small that the arm hardly moved: they are in m/s and rad/s")
         distance, angle = _errors(call, recording, robot)
         if distance > OFF_M[0]:
@@ -80,11 +74,7 @@ class SteerTo:
         return None
 
 
-def _has_moved(recording: Recording) -> bool:
-    return bool(recording.records) and measures.path_length(recording.arm(ARM)) > 0.1
-
-
-def _errors(call: Call, recording: Recording, robot: Robot) -> tuple[float, float]:
+def _errors(call: Call[tuple[float, ...]], recording: Recording, robot: Robot) -> tuple[float, float]:
     """How far the gripper is from its goal [m], and from the orientation that it began with [rad]."""
     goal = robot.gripper(ARM, recording, 0)
     goal[:3, 3] = call.expected
