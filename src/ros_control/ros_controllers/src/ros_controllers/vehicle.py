@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from controller_manager import ControllerContext
     from controller_manager.hardware import RobotHardware
 
+# Of the mean of velocities [ticks]: longer than any experiment.
+_LONGEST_WINDOW = 10**6
+
 
 class VehicleController(Controller):
     """Base of the controllers below. Subscribes to geometry_msgs/Twist on ``cmd_vel``, of which x [m/s] and the
@@ -44,7 +47,10 @@ class VehicleController(Controller):
         self._open_loop = context.flag("open_loop", False)
         self._limits = read_speed_limits(context, "linear/x"), read_speed_limits(context, "angular/z")
         window = self._positive("velocity_rolling_window_size", 10, "ticks")
-        self._odometry = WheelOdometry(max(1, round(window)))
+        if window > _LONGEST_WINDOW:
+            self.log.warn("parameter %s is %g; %d is used" % (context.resolve("velocity_rolling_window_size"), window,
+                                                              _LONGEST_WINDOW))
+        self._odometry = WheelOdometry(max(1, round(min(window, _LONGEST_WINDOW))))
         self._pose_covariance = self._covariance("pose_covariance_diagonal")
         self._twist_covariance = self._covariance("twist_covariance_diagonal")
         self._configure()

@@ -96,6 +96,12 @@ def test_odometry_of_a_straight_way_and_of_a_circle():
     assert vehicle.odom.twist.twist.angular.z == pytest.approx(0.8)
 
 
+def test_an_absurd_window_of_the_mean_velocity_is_bounded():
+    vehicle = diff_drive(velocity_rolling_window_size=1e300).drive(0.1, 0.5)
+    assert vehicle.odom.twist.twist.linear.x > 0.0
+    assert "velocity_rolling_window_size is 1e+300; 1000000 is used" in vehicle.context.log.of("warn")[0]
+
+
 def test_odometry_and_transform_say_the_same():
     vehicle = diff_drive(base_frame_id="foot", odom_frame_id="/start", pose_covariance_diagonal=[1, 2, 3, 4, 5, 6])
     vehicle.drive(1.0, 0.4, 0.3)
