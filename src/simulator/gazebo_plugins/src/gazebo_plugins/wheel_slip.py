@@ -35,12 +35,13 @@ class WheelSlip(ModelPlugin):
         wheels = [wheel for wheel in map(self._wheel, context.element.iterfind("wheel")) if wheel is not None]
         if not wheels:
             raise PluginError("%s: there is no <wheel link_name=\"...\"> that it can let slip" % self._what)
-        self._slipping = context.world.let_slip(context.model, wheels)
         own = (context.element.findtext("robotNamespace") or "").strip("/ \n") or "wheel_slip"
         SettingsServer(context, "/%s/%s" % (context.model.name, own), [
             Setting(_LATERAL, _AS_IT_IS, _AS_IT_IS, _MOST, "slip along the axle for a force like the load"),
             Setting(_LONGITUDINAL, _AS_IT_IS, _AS_IT_IS, _MOST, "slip across the axle for a force like the load"),
         ], self._set)
+        # Last, so that a model whose name is none in ROS keeps its friction.
+        self._slipping = context.world.let_slip(context.model, wheels)
 
     def _wheel(self, element: Any) -> Slip | None:
         """The Slip of a <wheel>, None where it cannot slip, which is named."""

@@ -5,9 +5,10 @@ import pytest
 from dynamic_reconfigure.msg import Config, DoubleParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
 
-from bullet_sim import Pose
+from bullet_sim import Pose, World
 from gazebo_plugins.wheel_slip import WheelSlip
 from gazebo_ros.model_plugin import PluginError
+from loop_ros.names import IllegalName
 
 INERTIAL = '<inertial><mass value="%g"/><inertia ixx="{0}" iyy="{0}" izz="{0}" ixy="0" ixz="0" iyz="0"/></inertial>'
 WHEEL = """<link name="w{0}">%s<collision><geometry><sphere radius="0.1"/></geometry></collision></link>
@@ -62,6 +63,14 @@ def test_a_cart_is_slower_than_its_wheels_by_their_slip_which_can_be_set(cart):
 def test_a_wheel_that_cannot_slip_is_named(cart, name, inside, words):
     lab = cart(w0=SLIP, **{name: inside})
     assert len(lab.log.of("warn")) == 1 and words in lab.log.of("warn")[0]
+
+
+def test_a_model_whose_name_is_none_in_ros_keeps_its_friction(make, monkeypatch):
+    slipped = []
+    monkeypatch.setattr(World, "let_slip", lambda *_: slipped.append(1))
+    with pytest.raises(IllegalName, match="a b"):
+        make(CART.replace('name="cart"', 'name="a b"'), WheelSlip, {}, raw='<wheel link_name="w0">%s</wheel>' % SLIP)
+    assert not slipped
 
 
 def test_a_plugin_without_such_a_wheel_is_refused(cart):
