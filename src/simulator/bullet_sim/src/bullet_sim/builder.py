@@ -51,6 +51,8 @@ _TREAD_PART, _ALONG = 0.05, 0.9999
 # A body that is slower than this for 2 s falls asleep: the square of its speed [m/s] plus that of its turn rate
 # [rad/s], here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
 _ASLEEP_M2_PER_S2 = 1e-6
+# Links of a multibody besides its root: PyBullet leaves further ones out without a word.
+_MOST_LINKS = 127
 # Mass of a link that only has a patch's shapes.
 _PATCH_KG = 1e-9
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
@@ -295,9 +297,12 @@ def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str
     return arguments
 
 
-def join_patches(merged: MergedRobot) -> None:
+def join_patches(merged: MergedRobot) -> list[str]:
     """Give the shapes of the patches of a urdf_model.MergedRobot whose surfaces are the same in Bullet to the body's
-    surface, or to one patch: each patch is a link more, which costs about a microsecond in a step."""
+    surface, or to one patch: each patch is a link more, which costs about a microsecond in a step.
+
+    Returns the bodies of which further shapes have the body's surface, since Bullet has no room for more links.
+    """
     by_child = {joint.child: joint for joint in merged.joints.values()}
     for link in merged.links.values():
         most = most_friction(by_child.get(link.name))
@@ -311,6 +316,18 @@ def join_patches(merged: MergedRobot) -> None:
             else:
                 left[built] = Patch(patch.surface, list(patch.collisions))
         link.patches[:] = left.values()
+    root_of, room = {root: root for root in merged.roots}, dict.fromkeys(merged.roots, _MOST_LINKS)
+    for joint in merged.joints.values():  # parents first
+        root_of[joint.child] = root_of[joint.parent]
+        room[root_of[joint.child]] -= 1
+    crowded = []
+    for link in merged.links.values():
+        root = root_of[link.name]
+        if len(link.patches) > room[root]:
+            crowded.append(link.name)
+            del link.patches[max(room[root], 0):]
+        room[root] -= len(link.patches)
+    return crowded
 
 
 def _as_built(surface: Surface | None, most: float) -> tuple:

@@ -200,7 +200,10 @@ class World:
             if mended:
                 self._warn("model '%s': %s" % (name, mended))
             merged = merge_fixed(robot, held=held)
-        join_patches(merged)
+        crowded = join_patches(merged)
+        if crowded:
+            self._warn("model '%s': Bullet has no room for all different surfaces of link %s; the rest of the shapes "
+                       "has the first one" % (name, ", ".join("'%s'" % link for link in crowded)))
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         asked = list(self_collision_pairs) or self_colliding(merged)
         pairs = [pair for pair in asked if all(merged.frames[link].link not in rough for link in pair)]

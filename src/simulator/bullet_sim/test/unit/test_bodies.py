@@ -396,3 +396,24 @@ def test_surfaces_of_some_links_leave_all_joints_where_they_are(world):
     velocity = dict(zip(model.joint_names, model.read_joints()[1], strict=True))
     assert velocity["to_b2"] == pytest.approx(1.0, abs=0.05)
     assert model.link_twist("b2")[1][0] - model.link_twist("b1")[1][0] == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("joints, feet, kept", [(0, 200, 127), (100, 40, 27), (3, 20, 19)])
+def test_surfaces_for_which_bullet_has_no_room_are_named(world, monkeypatch, joints, feet, kept):
+    told = []
+    monkeypatch.setattr(world, "_warn", told.append)
+    inertial = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
+    chain = "".join('<link name="c%d">%s</link><joint name="j%d" type="continuous"><parent link="%s"/>'
+                    '<child link="c%d"/></joint>' % (k, inertial, k, "c%d" % (k - 1) if k else "base", k) for k in range(joints))
+    balls = "".join(
+        '<link name="f{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link><joint name="k{0}" '
+        'type="fixed"><parent link="base"/><child link="f{0}"/><origin xyz="{0} 0 0"/></joint><gazebo reference="f{0}">'
+        '<mu1>{1}</mu1></gazebo>'.format(k, k / 1000) for k in range(feet))
+    world.add_ground_plane()
+    robot = parse_urdf('<robot name="r"><link name="base">%s</link>%s%s</robot>' % (inertial, chain, balls))
+    model = world.spawn(robot, "r", Pose((0, 0, 0.0995)))
+    assert len(model.parts.patches[-1]) == kept
+    assert [text for text in told if "no room for all different surfaces of link 'base'" in text] == told
+    assert len(told) == (kept < feet - 1)
+    step(world, 1)
+    assert {round(touch.position[0]) for touch in world.contacts(model)} >= set(range(feet))
