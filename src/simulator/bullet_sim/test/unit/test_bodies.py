@@ -404,7 +404,8 @@ def test_surfaces_for_which_bullet_has_no_room_are_named(world, monkeypatch, joi
     monkeypatch.setattr(world, "_warn", told.append)
     inertial = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>'
     chain = "".join('<link name="c%d">%s</link><joint name="j%d" type="continuous"><parent link="%s"/>'
-                    '<child link="c%d"/></joint>' % (k, inertial, k, "c%d" % (k - 1) if k else "base", k) for k in range(joints))
+                    '<child link="c%d"/></joint>' % (k, inertial, k, "c%d" % (k - 1) if k else "base", k)
+                    for k in range(joints))
     balls = "".join(
         '<link name="f{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link><joint name="k{0}" '
         'type="fixed"><parent link="base"/><child link="f{0}"/><origin xyz="{0} 0 0"/></joint><gazebo reference="f{0}">'
