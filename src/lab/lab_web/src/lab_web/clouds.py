@@ -32,7 +32,7 @@ def points_of(message: PointCloud2, most: int = MAX_POINTS) -> tuple[np.ndarray,
     """(points [m], float32 (n, 3); colours, uint8 (n, 3) red first) of a PointCloud2: every k-th row and column, so
     that at most ``most`` remain, without those that were not measured. Raises CloudError.
     """
-    fields = {field.name: field for field in message.fields}
+    fields = {field.name: field for field in message.fields or ()}
     missing = [name for name in "xyz" if name not in fields or fields[name].datatype not in _FLOATS]
     if missing:
         raise CloudError("it has no %s as floats; its fields are %s"

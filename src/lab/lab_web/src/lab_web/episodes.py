@@ -4,7 +4,6 @@ recorder is a separate process.
 """
 from __future__ import annotations
 
-import contextlib
 import io
 import subprocess
 import sys
@@ -17,6 +16,7 @@ import numpy as np
 
 from demonstrations import editing, layout
 from demonstrations.frames import MARKS, PICTURES, DemonstrationError
+from lab_web.child import HeardChild
 from lab_web.lab import RobotError
 from processes import keeper
 
@@ -39,10 +39,8 @@ class Process:
 
     def __init__(self, command: Sequence[str], said: Callable[[str], object], ended: Callable[[], object]) -> None:
         self._runtime = tempfile.TemporaryDirectory(prefix="lab-episodes-")
-        # A separate session: Ctrl-C in a terminal reaches only the owner, which then ends it once.
-        self._process = subprocess.Popen(
-            [sys.executable, keeper.__file__, str(Path(self._runtime.name) / "state"), *command],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+        self._process = HeardChild(
+            [sys.executable, keeper.__file__, str(Path(self._runtime.name) / "state"), *command], subprocess.STDOUT)
         self._thread = threading.Thread(target=self._follow, args=(said, ended))
         self._thread.start()
 
@@ -56,8 +54,7 @@ class Process:
 
     def end(self) -> None:
         """Ask it to end; does not wait."""
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        self._process.end()
 
     def join(self) -> None:
         """Wait until it has ended."""
@@ -91,7 +88,7 @@ class Episodes:
                 recorder = self._recorder
             if recorder is not None:
                 recorder.end()
-        elif do in MARKS:
+        elif isinstance(do, str) and do in MARKS:
             if self._recorder is None:
                 raise RobotError("nothing is recorded now; press the record button first")
             self._mark(do)

@@ -105,7 +105,7 @@ class Hands:
             measured = self._measured()
             seed = chain.posture_by_name(list(measured), list(measured.values()))
             if "position" in question:
-                pose = pose_from_quaternion(question["position"], question.get("orientation"))
+                pose = pose_from_quaternion(question["position"], question.get("orientation", ()))
                 q = solve(chain, pose, seed, budget=_BUDGET).q
             else:
                 q, pose = seed, chain.fk(seed)
@@ -125,7 +125,7 @@ def ghost(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) ->
     upper three rows, 12 numbers. None where the scene has no such arm.
     """
     found = _body_of(picture, joints)
-    if found is None:
+    if picture is None or found is None:
         return None
     first, body = found
     moved = body.moved(joints)

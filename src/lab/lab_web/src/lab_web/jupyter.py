@@ -13,7 +13,6 @@ import os
 import shutil
 import signal
 import socket
-import subprocess
 import sys
 import tempfile
 import time
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from disk_cache.files import replace_text
+from lab_web.child import HeardChild
 from processes import keeper
 
 if TYPE_CHECKING:
@@ -93,13 +93,10 @@ class Server:
     """
 
     def __init__(self, root: str | Path, base_url: str) -> None:
-        # A separate session: Ctrl-C in a terminal reaches only the owner, which then ends the server once.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "lab_web.jupyter", str(root), base_url], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, start_new_session=True)
+        self._process = HeardChild([sys.executable, "-P", "-m", "lab_web.jupyter", str(root), base_url])
         self._base_url = base_url
         self._deadline = time.monotonic() + START_TIMEOUT_S
-        self.socket = None
+        self.socket: Path | None = None
 
     @property
     def has_ended(self) -> bool:
@@ -124,8 +121,7 @@ class Server:
 
     def close(self) -> None:
         """End it, with all of its kernels, terminals and simulators."""
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        self._process.end()
         self._process.wait()
 
 

@@ -53,7 +53,7 @@ class Lab:
         self._clock = clock
         self._lock = threading.Lock()
         self._control = Control(silence_s)
-        self._motion = Motion({})
+        self._motion: Motion | Playback | Steering = Motion({})
         self._is_stream = True
         self._standstill = Standstill()
         # Of the last step of the motion.
@@ -256,9 +256,11 @@ class Lab:
     def _aim(self, client: int, targets: dict[str, float], is_stream: bool) -> None:
         with self._lock:
             self._require_ready(client, is_stream)
-            if not isinstance(self._motion, Motion) or self._motion.limits != self._robot.limits:
-                self._replace(Motion(self._robot.limits))
-            self._motion.aim(targets, self._measured())
+            motion = self._motion
+            if not isinstance(motion, Motion) or motion.limits != self._robot.limits:
+                motion = Motion(self._robot.limits)
+                self._replace(motion)
+            motion.aim(targets, self._measured())
             self._begin(is_stream)
 
     def _require_ready(self, client: int, is_stream: bool) -> None:

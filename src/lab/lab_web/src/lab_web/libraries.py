@@ -109,10 +109,11 @@ def _unpack(archive: bytes, target: Path) -> None:
     with tarfile.open(fileobj=io.BytesIO(archive)) as files:
         for member in files:
             inside = Path(*Path(member.name).parts[1:])
-            if member.isfile() and ".." not in inside.parts:
+            content = files.extractfile(member) if member.isfile() else None
+            if content is not None and ".." not in inside.parts:
                 file = target / inside
                 file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_bytes(files.extractfile(member).read())
+                file.write_bytes(content.read())
 
 
 @contextlib.contextmanager

@@ -49,7 +49,7 @@ def limits_of(joints: Mapping[str, Joint], names: Iterable[str]) -> dict[str, Li
     """
     limits = {name: joints[name].limit for name in names if name in joints}
     return {name: Limits(limit.lower, limit.upper, limit.velocity) for name, limit in limits.items()
-            if limit is not None and None not in (limit.lower, limit.upper) and limit.velocity}
+            if limit is not None and limit.lower is not None and limit.upper is not None and limit.velocity}
 
 
 class MotionError(Exception):

@@ -17,6 +17,7 @@ from lab_web.planning import Plan, PlanFailed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import Any
 
     from moveit_msgs.msg import MoveGroupResult
 
@@ -37,35 +38,34 @@ class MoveGroup:
     """One goal at a time."""
 
     def __init__(self) -> None:
-        self._client = None
+        self._client: actionlib.SimpleActionClient | None = None
         self._cancelled = threading.Event()
 
     def plan(self, targets: Mapping[str, float]) -> Plan:
         """The Plan to ``targets`` {joint: [rad]} of the arms. Waits. Raises PlanFailed."""
         self._cancelled.clear()
         goal = goal_of(targets)
-        if self._client is None:
-            self._client = actionlib.SimpleActionClient(ACTION, MoveGroupAction)
-        self._require_server()
+        client = self._client = self._client or actionlib.SimpleActionClient(ACTION, MoveGroupAction)
+        self._require_server(client.action_client)
         done = threading.Event()
-        self._client.send_goal(goal, done_cb=lambda *_: done.set())
+        client.send_goal(goal, done_cb=lambda *_: done.set())
         deadline = time.monotonic() + _ANSWER_S
         # Until it is done: rospy's own waits end by simulated time.
         while not done.wait(0.05):
             if self._cancelled.is_set() or rospy.is_shutdown():
-                self._client.cancel_goal()
+                client.cancel_goal()
                 raise PlanFailed("preempted", "the planning was stopped")
             if time.monotonic() > deadline:
-                self._client.cancel_goal()
+                client.cancel_goal()
                 raise PlanFailed("no_answer", "move_group has not answered for %g s" % _ANSWER_S)
-        return plan_of(self._client.get_state(), self._client.get_result(), self._client.get_goal_status_text())
+        return plan_of(client.get_state(), client.get_result(), client.get_goal_status_text())
 
     def cancel(self) -> None:
         """End the wait of ``plan`` in another thread."""
         self._cancelled.set()
 
-    def _require_server(self) -> None:
-        client, deadline = self._client.action_client, time.monotonic() + _CONNECT_S
+    def _require_server(self, client: actionlib.ActionClient) -> None:
+        deadline = time.monotonic() + _CONNECT_S
         while not (client.pub_goal.get_num_connections() and client.result_sub.get_num_connections()):
             if time.monotonic() > deadline or self._cancelled.is_set():
                 raise PlanFailed("no_answer", "there is no move_group to plan with")
@@ -94,10 +94,10 @@ def goal_of(targets: Mapping[str, float]) -> MoveGroupGoal:
 def plan_of(state: int, result: MoveGroupResult | None, text: str) -> Plan:
     """The Plan in a result of the action. Raises PlanFailed."""
     code = result.error_code.val if result is not None else MoveItErrorCodes.FAILURE
-    if state != GoalStatus.SUCCEEDED or code != MoveItErrorCodes.SUCCESS:
+    if result is None or state != GoalStatus.SUCCEEDED or code != MoveItErrorCodes.SUCCESS:
         name = _CODES.get(code, "failure")
         raise PlanFailed(name, text.removeprefix(name.upper()).lstrip(": ") or "code %d" % code)
-    trajectory = result.planned_trajectory.joint_trajectory
+    trajectory: Any = result.planned_trajectory.joint_trajectory
     points = trajectory.points
     if len(points) < 2:
         raise PlanFailed("already_there", "the arms are there")

@@ -15,7 +15,6 @@ import time
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
@@ -75,6 +74,8 @@ from world_picture.snapshot import SnapshotError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from baxter_conformance.comparison import Finding
 
 FIRST_PORT = 8090
 _LARGEST_PORT = 65535
@@ -175,33 +176,38 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
     loop_thread = LoopThread("lab_web")
     forwarded = forwarded_address(os.environ, port)
     access = Access({tokens[0]: True, tokens[1]: False}, [forwarded] if forwarded else ())
-    pages = Pages(access, loop_thread)
     robot = Baxter(lambda text: pages.tell(None, "refused", text))
-    pages.lab = Lab(robot, pages.control_changed, pages.tell,
-                    rested=lambda client: pages.answer(client, {"op": "rested"}))
-    faults = Faults(SimpleNamespace(error=rospy.logerr))
+    pages = Pages(access, loop_thread, Lab(
+        robot, lambda: pages.control_changed(), lambda client, code, text: pages.tell(client, code, text),
+        rested=lambda client: pages.answer(client, {"op": "rested"})))
+    faults = Faults(_Log())
     equipment = _equip(pages, robot, faults)
 
-    def is_needed():
+    def is_needed() -> bool:
         return len(pages) > 0 or equipment.recorder.is_running
 
     graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
     clock = SimClock(lambda: is_needed() or clients.need_time)
-    clients = Clients(bridge, loop_thread, SocketOptions(access), lambda connected: clients.need_time and clock.need())
 
-    def listen():
+    def clients_changed(_connected: list) -> None:
+        if clients.need_time:
+            clock.need()
+
+    clients = Clients(bridge, loop_thread, SocketOptions(access), clients_changed)
+
+    def listen() -> None:
         robot.listen()
         equipment.servos.listen()
 
-    def rest():
+    def rest() -> None:
         robot.rest()
         equipment.servos.rest()
 
     states = Demand(listen, rest, LINGER_S, is_needed)
 
-    def watch(ends):
+    def watch(ends: Callable[[], bool]) -> None:
         while not ends():
             if is_needed():
                 clock.need()
@@ -274,8 +280,15 @@ def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
     return made
 
 
-def _notebook_routes(notebooks, access):
+def _notebook_routes(notebooks: Notebooks | None, access: Access) -> list[tuple[str, type, dict[str, Any]]]:
     return [] if notebooks is None else [(PATH + ".*", NotebookHandler, {"door": Door(access, notebooks)})]
+
+
+class _Log:
+    """rospy's, for :class:`loop_ros.faults.Faults`."""
+
+    def error(self, text: str) -> None:
+        rospy.logerr(text)
 
 
 class _Equipment(NamedTuple):
@@ -288,7 +301,7 @@ class _Equipment(NamedTuple):
     overlay_topics: OverlayTopics
     servos: Servos
     episodes: Episodes
-    loops: dict
+    loops: dict[str, Callable[[Callable[[], bool]], object]]
 
 
 def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
@@ -338,7 +351,7 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
 
-def _findings():
+def _findings() -> list[Finding]:
     return findings_of(physical_robot(), lambda robot: read(robot, _MESSAGES_S), rosgraph.is_master_online, NO_ANSWER)
 
 
@@ -497,7 +510,8 @@ def _follow(pages: Pages, ends: Callable[[], bool]) -> None:
         try:
             if follower is None or not follower.is_alive:
                 follower, picture = SceneFollower(_snapshot_folder(), rospy.logwarn), None
-            if follower.follow() or follower.picture is not picture:
+            is_new = follower.follow()
+            if follower.picture is not None and (is_new or follower.picture is not picture):
                 picture = follower.picture
                 pages.show_poses(picture, follower.poses())
         # No simulator, or it is just starting or ending.

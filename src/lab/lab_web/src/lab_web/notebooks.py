@@ -167,7 +167,7 @@ class NotebookHandler(PassingHandler):
             self.set_header("Refresh", str(_AGAIN_S))
             self.refuse(503, "JupyterLab is starting.")
         else:
-            await self.pass_to(notebooks.socket, notebooks.below + self.request.uri)
+            await self.pass_to(str(notebooks.socket), notebooks.below + self.request.uri)
 
     def _go_on_with_cookie(self) -> None:
         """The same address without the token, which would get into histories."""

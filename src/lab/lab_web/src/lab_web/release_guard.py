@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import subprocess
 import sys
 from typing import TYPE_CHECKING
+
+from lab_web.child import Child
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -21,9 +22,8 @@ class ReleaseGuard:
     """The server's side; one thread at a time."""
 
     def __init__(self) -> None:
-        # A session of its own: what ends the server's group of processes does not end this one.
-        self._process = subprocess.Popen([sys.executable, "-m", "lab_web.release_guard"], stdin=subprocess.PIPE,
-                                         start_new_session=True)
+        # What ends the server's group of processes does not end this one.
+        self._process = Child([sys.executable, "-m", "lab_web.release_guard"])
 
     def pressed(self, names: Iterable[str]) -> None:
         """These buttons are pressed now."""
@@ -32,8 +32,7 @@ class ReleaseGuard:
     def close(self) -> None:
         """The server has released everything by itself."""
         self.pressed([])
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        self._process.end()
         self._process.wait()
 
     def _write(self, line: bytes) -> None:

@@ -48,13 +48,13 @@ class SceneFollower(WorldFollower):
     def __init__(self, folder: str | PathLike[str], warn: Callable[[str], object]) -> None:
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         super().__init__(folder, warn)
-        self._shown = None  # poses that follow() told of
+        self._shown = np.empty((0, 3, 4))  # poses that follow() told of
         #: The newest :class:`Picture`, or None.
-        self.picture = None
+        self.picture: Picture | None = None
 
     def follow(self) -> bool:
         """Read the newest state. Returns whether there is anything new to see. Raises SnapshotError."""
-        if not super().follow():
+        if not super().follow() or self.revision is None:
             return False
         poses = self._matrices()
         if self.picture is None or self.picture.revision != self.revision:
@@ -65,10 +65,10 @@ class SceneFollower(WorldFollower):
         return True
 
     def poses(self) -> bytes:
-        """Bytes: the revision [uint32], then for each link in the scene's order the upper three rows of its pose in the
-        world [float32, (3, 4)].
+        """Bytes: the revision [uint32, 0 before the first], then for each link in the scene's order the upper three
+        rows of its pose in the world [float32, (3, 4)].
         """
-        return np.uint32(self.revision).astype("<u4").tobytes() + self._matrices().astype("<f4").tobytes()
+        return np.uint32(self.revision or 0).astype("<u4").tobytes() + self._matrices().astype("<f4").tobytes()
 
     def _matrices(self) -> np.ndarray:
         return np.concatenate([np.empty((0, 3, 4)), *(body.matrices[:, :3, :] for body in self.mirror.bodies.values())])

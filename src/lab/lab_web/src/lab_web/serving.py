@@ -12,6 +12,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from tornado import web
+from tornado.http1connection import HTTP1Connection
 
 from demonstrations.frames import DemonstrationError
 from lab_web.control import HEARTBEAT_S, PAGE_HANGS_S
@@ -27,9 +28,11 @@ if TYPE_CHECKING:
 
     from lab_web import scene
     from lab_web.episodes import Episodes
+    from lab_web.lab import Lab
     from lab_web.playback import Recorder
     from web_bridge.access import Access
     from web_bridge.loop_thread import LoopThread
+    from web_bridge.outgoing import OutgoingBuffer
 
 #: Pages at a time.
 MAX_PAGES = 100
@@ -54,20 +57,21 @@ def policy(page_text: str = "") -> str:
 
 
 class Pages:
-    """The connected pages. ``access``: web_bridge.access.Access; ``lab``: set by the owner before the first page."""
+    """The connected pages of a Lab. ``access``: web_bridge.access.Access."""
 
-    def __init__(self, access: Access, loop_thread: LoopThread) -> None:
+    def __init__(self, access: Access, loop_thread: LoopThread, lab: Lab) -> None:
         self.access = access
         self.loop_thread = loop_thread
-        self.lab = None
+        self.lab = lab
         #: The scene of now (:class:`lab_web.scene.Picture`) and its newest poses, or None.
-        self.picture = self.poses = None
+        self.picture: scene.Picture | None = None
+        self.poses: bytes | None = None
         #: Called with the number of a page that has gone, in the loop; does not wait.
-        self.when_closed = lambda number: None
+        self.when_closed: Callable[[int], object] = lambda number: None
         #: Set while there is a page.
         self.present = threading.Event()
-        self._shared = {"robot": {"op": "robot"}}
-        self._sockets = {}
+        self._shared: dict[str, dict[str, Any]] = {"robot": {"op": "robot"}}
+        self._sockets: dict[int, PageSocket] = {}
 
     def __len__(self) -> int:
         return len(self._sockets)
@@ -117,13 +121,13 @@ class Pages:
         """New poses of the scene ``picture``."""
         self.picture, self.poses = picture, poses
         for socket in list(self._sockets.values()):
-            socket.outgoing.offer([poses], "poses", 1)
+            socket.out.offer([poses], "poses", 1)
 
     def show(self, number: int, data: bytes) -> None:
         """Bytes to one page, in the place of older ones that it has not got yet."""
         socket = self._sockets.get(number)
         if socket is not None:
-            socket.outgoing.offer([data], "points", 1)
+            socket.out.offer([data], "points", 1)
 
     # In the loop.
 
@@ -132,7 +136,7 @@ class Pages:
             socket.send(operation)
 
     def _send_one(self, number: int | None, operation: dict[str, Any]) -> None:
-        if number in self._sockets:
+        if number is not None and number in self._sockets:
             self._sockets[number].send(operation)
 
     def _send_control(self) -> None:
@@ -142,9 +146,11 @@ class Pages:
                          "pages": len(self._sockets)})
 
     def _tell(self, number: int | None, code: str, text: str) -> None:
-        sockets = self._sockets.values() if number is None else filter(None, [self._sockets.get(number)])
-        for socket in sockets:
-            socket.send({"op": "told", "code": code, "text": text})
+        operation = {"op": "told", "code": code, "text": text}
+        if number is None:
+            self._send_all(operation)
+        else:
+            self._send_one(number, operation)
 
 
 class _WithToken(web.RequestHandler):
@@ -193,7 +199,7 @@ class Shape(_WithToken):
     """The triangles of one shape of the scene."""
 
     def get(self, name: str) -> None:
-        content = self.pages.picture and self.pages.picture.shapes.get(name)
+        content = None if self.pages.picture is None else self.pages.picture.shapes.get(name)
         if content is None:
             self.set_status(404)
             return
@@ -225,11 +231,12 @@ class Upload(_WithToken):
             self.set_status(403)
             self.finish(str(error) + "\n")
             return
-        if may_act:
-            self.request.connection.set_max_body_size(_LARGEST_UPLOAD)
-        else:
+        connection = self.request.connection
+        if not may_act:
             self.set_status(403)
             self.finish("this address only watches\n")
+        elif isinstance(connection, HTTP1Connection):
+            connection.set_max_body_size(_LARGEST_UPLOAD)
 
     def data_received(self, chunk: bytes) -> None:
         self._body += chunk
@@ -328,6 +335,8 @@ class Files(web.StaticFileHandler):
 class PageSocket(BufferedSocket):
     """One page: operations of :class:`lab_web.lab.Lab` and heartbeats come in; control, robot and poses go out."""
 
+    #: Its outgoing frames, once it is open.
+    out: OutgoingBuffer
     _numbers = iter(range(1, 1 << 62))
 
     def initialize(self, pages: Pages) -> None:
@@ -338,18 +347,18 @@ class PageSocket(BufferedSocket):
         self.let_in(self._pages.access, self._pages.is_full, MAX_PAGES)
 
     def open(self, *_: str) -> None:
-        self.start_writing(self._pages.loop_thread)
+        self.out = self.start_writing(self._pages.loop_thread)
         self.send({"op": "hello", "number": self.number, "may_act": self.may_act,
                    "heartbeat_ms": 1000.0 * HEARTBEAT_S, "hangs_ms": 1000.0 * PAGE_HANGS_S})
         for operation in self._pages.shared:
             self.send(operation)
         if self._pages.poses is not None:
-            self.outgoing.offer([self._pages.poses], "poses", 1)
+            self.out.offer([self._pages.poses], "poses", 1)
         self._pages.opened(self)
 
     def send(self, operation: dict[str, Any]) -> None:
         """An operation to the page."""
-        self.outgoing.keep([json.dumps(operation)])
+        self.out.keep([json.dumps(operation)])
 
     async def on_message(self, message: str | bytes) -> None:
         lab = self._pages.lab

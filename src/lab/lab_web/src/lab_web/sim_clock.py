@@ -26,8 +26,9 @@ class SimClock:
 
     def __init__(self, is_needed: Callable[[], bool]) -> None:
         """Without the parameter use_sim_time, rospy's time is the wall's."""
-        self._has_come, self._until, self._subscriber = threading.Event(), 0.0, None
-        self._demand = Demand(self._listen, lambda: self._subscriber.unregister(), LINGER_S, is_needed)
+        self._has_come, self._until = threading.Event(), 0.0
+        self._rest: Callable[[], object] = lambda: None
+        self._demand = Demand(self._listen, lambda: self._rest(), LINGER_S, is_needed)
         self._is_simulated = bool(rospy.get_param("/use_sim_time", False))
         if self._is_simulated:
             rospy.rostime._set_rostime(rospy.Time())
@@ -40,7 +41,7 @@ class SimClock:
 
     def _listen(self) -> None:
         self._has_come.clear()
-        self._subscriber = rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=1, tcp_nodelay=True)
+        self._rest = rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=1, tcp_nodelay=True).unregister
         self._until = time.monotonic() + _FIRST_S
 
     def _on_clock(self, message: Clock) -> None:

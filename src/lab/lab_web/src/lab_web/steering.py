@@ -7,7 +7,7 @@
 - ``reason``: why it holds the arm back, or ""
 """
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -29,7 +29,9 @@ class Servo(Protocol):
     """What steers one arm."""
 
     reason: str
-    speeds: tuple[float, float]
+
+    @property
+    def speeds(self) -> Sequence[float]: ...
 
     @property
     def is_there(self) -> bool: ...
@@ -66,9 +68,10 @@ class _Way:
         leap = led.motion[:3, 3] - self._last[:3, 3]
         turn = _turn_of(led.motion[:3, :3] @ self._last[:3, :3].T)
         self._last = led.motion
-        return led.number == self._number and np.linalg.norm(leap) < _LEAP_M and np.linalg.norm(turn) < _LEAP_RAD
+        return bool(led.number == self._number and np.linalg.norm(leap) < _LEAP_M
+                    and np.linalg.norm(turn) < _LEAP_RAD)
 
-    def twist(self, led: Led, pose: np.ndarray, speeds: tuple[float, float]) -> np.ndarray:
+    def twist(self, led: Led, pose: np.ndarray, speeds: Sequence[float]) -> np.ndarray:
         """(6,) the shares of the speeds that lead ``pose`` there, each of both in its direction."""
         shift = self._shift + led.motion[:3, 3] - pose[:3, 3]
         turn = _turn_of(led.motion[:3, :3] @ self._turn @ pose[:3, :3].T)
@@ -86,7 +89,7 @@ class Steering:
     #: Joints that the lab itself holds when the motion ends; none, since the servos bring them to rest.
     limits: Mapping[str, Any] = {}
 
-    def __init__(self, servos: Callable[[], dict[str, Servo]], explain: Callable[[str], None],
+    def __init__(self, servos: Callable[[], Mapping[str, Servo]], explain: Callable[[str], None],
                  pose: Callable[[str, Mapping[str, float]], np.ndarray | None]) -> None:
         self._servos, self._explain, self._pose = servos, explain, pose
         self._led: dict[str, Led] = {}
@@ -139,7 +142,7 @@ class Steering:
             self._explain(side)
 
 
-def operation(lab: Lab, steering: Steering, servos: Callable[[], dict[str, Servo]]) -> Callable[[int, dict], None]:
+def operation(lab: Lab, steering: Steering, servos: Callable[[], Mapping[str, Servo]]) -> Callable[[int, dict], None]:
     """Return ``serve`` of the operation "steer" for :meth:`lab_web.lab.Lab.add`: ``hands`` {side: six numbers} that
     something holds now, ``tool``: in the axes of each hand itself; ``led`` {side: {number, shift (3), turn (x, y, z,
     w)}}: hands that follow a device, and its motion since it was gripped. Raises RobotError, NotInControl.

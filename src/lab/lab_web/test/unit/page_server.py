@@ -174,9 +174,9 @@ class Server:
         self._ended = threading.Event()
         self._sockets = set()
         self.loop = LoopThread()
-        self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop)
-        self.lab = self.pages.lab = Lab(self.robot, self.pages.control_changed, self.pages.tell,
-                                        rested=lambda client: self.pages.answer(client, {"op": "rested"}))
+        self.lab = Lab(self.robot, lambda: self.pages.control_changed(), lambda *told: self.pages.tell(*told),
+                       rested=lambda client: self.pages.answer(client, {"op": "rested"}))
+        self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop, self.lab)
         hands = Hands(self.robot.measured, lambda chain, joints: ghost(self.pages.picture, chain, joints),
                       self.pages.answer)
         description = parse_urdf(URDF, source="robot")

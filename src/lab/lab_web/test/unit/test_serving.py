@@ -45,8 +45,7 @@ class Server:
         (libraries / "three").mkdir()
         (libraries / "three" / "LICENSE").write_text("MIT")
         self.loop = LoopThread()
-        self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop)
-        self.pages.lab = FakeLab()
+        self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop, FakeLab())
         self.recorder = Recorder(lambda state: None)
         self.serving = Serving(self.loop, web.Application(
             [*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, self.recorder)]), 0, "127.0.0.1")

@@ -7,7 +7,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from rospy_fixes.ports.event_log import EventLog
 
@@ -21,11 +21,16 @@ STATUS_NAME = "threads"
 _MAX_PLACES, _LONGEST_TEXT = 100, 300
 
 
-def lasting(faults: ThreadFaults, place: str, loop: Callable, retry_s: float = RETRY_S) -> Callable:
+class Noting(Protocol):
+    """Counts errors: :class:`ThreadFaults` or ``loop_ros.faults.Faults``."""
+
+    def note(self, place: str, error: BaseException, consequence: str) -> object: ...
+
+
+def lasting(faults: Noting, place: str, loop: Callable, retry_s: float = RETRY_S) -> Callable:
     """A function of ``ends`` that runs ``loop(ends)`` until it returns, and again after each error.
 
-    ``faults``: its ``note(place, error, consequence)`` counts them: :class:`ThreadFaults` or
-    ``loop_ros.faults.Faults``.
+    ``faults`` counts them.
     """
     def run(ends: Callable[[], bool]) -> None:
         while True:
