@@ -401,8 +401,8 @@ class ServoNode:
     def _tell_without_steps(self, now: float) -> None:
         """At ``now`` of wall time [s]: while no steps are made, say what is refused, and that nothing moves."""
         if now - self._came < _STANDS_S < self._came - self._stepped:
-            self._refuse("no step has been made for %.0f s: ROS time stands at %.3f s; is the simulation paused, or "
-                         "has it ended?" % (self._came - self._stepped, rospy.get_time()))
+            self._refuse("no step has been made for %.0f s: ROS time stands at %.3f s; is the simulation paused or "
+                         "ended, or does it hardly run?" % (self._came - self._stepped, rospy.get_time()))
         if now - self._stepped > _STANDS_S:
             self._tell(Status.NO_WARNING, "")
 
