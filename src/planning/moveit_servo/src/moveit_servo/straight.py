@@ -12,7 +12,7 @@ from urdf_model.transforms import axis_rotation
 
 # Time in which the hand takes the direction of a new twist [s]; rate at which it then returns to its way [1/s], and the
 # greatest share of the twist that this takes.
-_SETTLED_S, _RETURN_RATE, _MAX_SHARE = 0.15, 6.0, 0.1
+_SETTLED_S, _RETURN_RATE, _MAX_SHARE = 0.15, 14.0, 0.1
 # A turn [rad] that counts as much as a shift [m] where one is weighed against the other.
 _LEVER_M = 0.25
 
