@@ -269,6 +269,9 @@ def start(physics: Physics, rng: np.random.Generator) -> tuple[list[Thing], Scen
     indices = np.concatenate([model.groups[group].indices for group in physics.arms])
     bounds = model.bounds[indices]
     stretched = [k for k, index in enumerate(indices) if model.variables[index].endswith(STRETCHED)]
+    # Fingers, for instance, are where they are.
+    others = {model.index[name]: at for name, at in physics.joints()[0].items() if name in model.index}
+    known, others = np.array(list(others)), np.array(list(others.values()))
     floor = WorldObject("floor", _at(physics.floor_m - UNDER_FLOOR_M - 0.05),
                         ((Box((4.0, 4.0, 0.1)), np.eye(4)),))
     while True:
@@ -276,7 +279,7 @@ def start(physics: Physics, rng: np.random.Generator) -> tuple[list[Thing], Scen
         if rng.random() < 0.25:
             q[stretched] = np.clip(0.0, *bounds[stretched].T)
         empty = physics.parts.added_to(Scene(model).with_objects([floor]))
-        state = empty.state.with_q(q, indices)
+        state = empty.state.with_q(others, known).with_q(q, indices)
         if not exact.free(empty, state):
             continue
         kept = [one for one in things if exact.free(
