@@ -2,6 +2,9 @@
 """A small policy learns from a small set of the real format; contracts, files and figures are checked."""
 import dataclasses
 import json
+import os
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -177,6 +180,16 @@ def test_gradients_are_those_of_finite_differences():
             losses.append(network.gradients(inputs, wanted, share**2)[0])
             value[at] -= sign * step
         assert gradient[at] == pytest.approx((losses[0] - losses[1]) / (2 * step), abs=2e-3)
+
+
+def test_products_are_computed_in_one_thread():
+    """Several wait for each other busily: a step of training took twelve times the processor time beside other work."""
+    program = ("import os, sys; sys.path[:0] = %r; import numpy as np; before = len(os.listdir('/proc/self/task')); "
+               "from robot_learning import network; one = np.ones((300, 300), np.float32); network.product(one, one); "
+               "assert 'OPENBLAS_NUM_THREADS' not in os.environ; "
+               "sys.exit(len(os.listdir('/proc/self/task')) - before)" % sys.path)
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    assert subprocess.run([sys.executable, "-c", program], env=environment, timeout=60).returncode == 0
 
 
 def test_a_quaternion_and_its_negative_are_the_same_input():
