@@ -15,13 +15,13 @@ from .arm_body import TICK_S, Array
 from .errors import SysidError
 
 #: Larger files and longer recordings would take hours.
-MOST_BYTES, MOST_S = 100_000_000, 600.0
+MAX_BYTES, MAX_S = 100_000_000, 600.0
 #: The largest step between two rows [s]: the robot takes raw set-points that come more slowly for single ones.
-MOST_STEP_S = 0.05
+MAX_STEP_S = 0.05
 #: So far beyond its limits [rad] a joint may be, so far may a command be, so far apart may the two be on the average.
 BEYOND_RAD, COMMANDED_BEYOND_RAD, APART_RAD = 0.1, 0.5, 0.5
 #: A recording shows nothing in which no joint is commanded to go farther than this [rad].
-LEAST_WAY_RAD = 0.02
+MIN_WAY_RAD = 0.02
 
 #: A replay begins with the arm's own speed if it moves faster than this [rad/s].
 MOVING = 0.05
@@ -48,7 +48,7 @@ class Recording(NamedTuple):
         its rows are put into equal steps of whole ticks. Raises SysidError where it cannot be used.
         """
         try:
-            lines = read_text(path, MOST_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines()
+            lines = read_text(path, MAX_BYTES, pipe_wait_s=PIPE_WAIT_S).splitlines()
         except UnicodeDecodeError as error:
             raise SysidError("%s is no text, and must be a CSV file: %s" % (path, error)) from error
         except OSError as error:
@@ -72,14 +72,14 @@ class Recording(NamedTuple):
             raise SysidError("%s has %d rows with a time; it must have %d or more" % (
                 name, len(self.time_s), 2 * _AHEAD_ROWS))
         steps = np.diff(self.time_s)
-        wrong = ~((steps > 0.0) & (steps < 1.001 * MOST_STEP_S))
+        wrong = ~((steps > 0.0) & (steps < 1.001 * MAX_STEP_S))
         if wrong.any():
             row = int(np.argmax(wrong))
             raise SysidError("%s: after row %d time_s goes from %.10g to %.10g; times must rise by %g s or less from "
-                             "row to row" % (name, row + 1, self.time_s[row], self.time_s[row + 1], MOST_STEP_S))
-        if self.time_s[-1] - self.time_s[0] > MOST_S:
+                             "row to row" % (name, row + 1, self.time_s[row], self.time_s[row + 1], MAX_STEP_S))
+        if self.time_s[-1] - self.time_s[0] > MAX_S:
             raise SysidError("%s is %.0f s long; it must be %.0f s or less: a minute of motion is enough" % (
-                name, self.time_s[-1] - self.time_s[0], MOST_S))
+                name, self.time_s[-1] - self.time_s[0], MAX_S))
         for kind, arms in (("commanded", self.commanded), ("sensed", self.sensed)):
             for side, rows in arms.items():
                 if not np.isfinite(rows).all():
@@ -108,7 +108,7 @@ class Recording(NamedTuple):
                                      "less would be right. Are the columns of the same joint, in rad?" % (
                                          name, joint, apart, APART_RAD))
             way = np.ptp(self.commanded[side], axis=0)
-            if way.max() < LEAST_WAY_RAD:
+            if way.max() < MIN_WAY_RAD:
                 raise SysidError("%s: no joint of the %s arm is commanded to go farther than %.2g rad; a motion shows "
                                  "its numbers if each joint that is fitted goes some 0.1 rad or more" % (
                                      name, side, way.max()))

@@ -425,7 +425,7 @@ def test_a_fake_controllers_old_way_says_nothing_after_the_new_one(monkeypatch):
 
     def publish(message):
         if message.position[0] >= 0.0 and not said:
-            new_has_spoken.wait(0.3)  # in vain: the new one waits for this
+            new_has_spoken.wait(0.3)  # it does not: the new one waits for this
         said.append(message.position[0])
         if message.position[0] < 0.0:
             new_has_spoken.set()

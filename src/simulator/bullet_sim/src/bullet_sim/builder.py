@@ -52,7 +52,7 @@ _TREAD_PART, _ALONG = 0.05, 0.9999
 # [rad/s], here of 1 mm/s. Bullet's own 0.05 stops what moves at 0.2 m/s, as on a conveyor belt.
 _ASLEEP_M2_PER_S2 = 1e-6
 # Links of a multibody besides its root: PyBullet leaves further ones out without a word.
-_MOST_LINKS = 127
+_MAX_LINKS = 127
 # Mass of a link that only has a patch's shapes.
 _PATCH_KG = 1e-9
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
@@ -316,7 +316,7 @@ def join_patches(merged: MergedRobot) -> list[str]:
             else:
                 left[built] = Patch(patch.surface, list(patch.collisions))
         link.patches[:] = left.values()
-    root_of, room = {root: root for root in merged.roots}, dict.fromkeys(merged.roots, _MOST_LINKS)
+    root_of, room = {root: root for root in merged.roots}, dict.fromkeys(merged.roots, _MAX_LINKS)
     for joint in merged.joints.values():  # parents first
         root_of[joint.child] = root_of[joint.parent]
         room[root_of[joint.child]] -= 1

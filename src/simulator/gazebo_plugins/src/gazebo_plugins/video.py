@@ -20,7 +20,7 @@ _ABOVE = 0.51
 # Channels of a pixel, and which of them are red, green and blue.
 _ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)),
               "bgra8": (4, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0))}
-_MOST_PIXELS = 4096
+_MAX_PIXELS = 4096
 
 
 class Video(ModelPlugin):
@@ -54,9 +54,9 @@ class Video(ModelPlugin):
             value = int(text)
         except ValueError:
             value = 0
-        if not 0 < value <= _MOST_PIXELS:
+        if not 0 < value <= _MAX_PIXELS:
             raise PluginError("%s: <%s> is '%s', expected a number of pixels from 1 to %d"
-                              % (self._what, tag, text, _MOST_PIXELS))
+                              % (self._what, tag, text, _MAX_PIXELS))
         return value
 
     def update(self, time_s: float, dt: float) -> None:
