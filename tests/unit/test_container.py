@@ -233,7 +233,7 @@ def test_a_wrong_choice_is_told_and_none_leaves_the_machine_alone(machine):
 
 
 def test_questions_and_the_doctor_make_no_image(machine):
-    for words in (("help",), ("sim", "--help"), ("check", "--list")):
+    for words in (("help",), ("sim", "--help"), ("check", "--help")):
         assert baxter(machine, *words).returncode == 0
     assert calls(machine) == []
     done = baxter(machine, "doctor")
