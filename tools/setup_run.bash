@@ -168,7 +168,9 @@ nothing_half_done() {
 
 interrupted() {
     trap - INT
-    stop_watching
+    # It is not waited for: in a trap that has interrupted `wait`, bash may wait for another child instead.
+    if [[ -n $watcher ]]; then kill "$watcher" 2>/dev/null; fi
+    if [[ -t 1 ]]; then printf '\r\033[K'; fi
     echo >&2
     echo "Set-up was interrupted in step '${TITLES[${step_name:-none}]:-start}' (log: ${step_log:-none});" \
          "./baxter.sh setup continues from there." >&2
