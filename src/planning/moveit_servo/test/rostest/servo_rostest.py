@@ -18,7 +18,7 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Int8, String
 from std_srvs.srv import Empty
 
-from baxter_interface import RobotEnable
+from baxter_interface import Limb, RobotEnable
 from lab_testing.waiting import stretched, wait_for_time, wait_until
 
 SIDES = ("left", "right")
@@ -140,23 +140,25 @@ class ServoTest(unittest.TestCase):
 
     def test_5_an_object_of_the_scene_is_not_touched(self):
         arm = self.arms["left"]
+        Limb("left").move_to_neutral()  # the hand points downwards, and nothing of the arm is below
+        arm.wait_for_rest()
         where = arm.position
         box = CollisionObject(id="shelf", operation=CollisionObject.ADD)
         box.header.frame_id = "base"
-        box.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[1.0, 1.0, 0.1])]
+        box.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.4, 0.4, 0.1])]
         box.primitive_poses = [Pose()]
         box.primitive_poses[0].position.x, box.primitive_poses[0].position.y = where[:2]
-        box.primitive_poses[0].position.z = where[2] + 0.45
+        box.primitive_poses[0].position.z = where[2] - 0.25
         box.primitive_poses[0].orientation.w = 1.0
         objects = rospy.Publisher("collision_object", CollisionObject, queue_size=1, latch=True)
         objects.publish(box)
         wait_until(lambda: objects.get_num_connections() >= 2, "both servos to hear of the shelf", 20.0)
         arm.statuses.clear()
         arm.reasons.clear()
-        self.stream(lambda: arm.twists.publish(twist(z=0.2)), lambda: any("shelf" in text for text in arm.reasons),
+        self.stream(lambda: arm.twists.publish(twist(z=-0.2)), lambda: any("shelf" in text for text in arm.reasons),
                     "the servo to name the shelf")
         self.assertTrue({3, 4} & set(arm.statuses))
-        self.stream(lambda: arm.twists.publish(twist(z=-0.2)), lambda: arm.position[2] < where[2] + 0.1, "the way back")
+        self.stream(lambda: arm.twists.publish(twist(z=0.2)), lambda: arm.position[2] > where[2], "the way back")
         objects.publish(CollisionObject(id="shelf", operation=CollisionObject.REMOVE, header=box.header))
         arm.wait_for_rest()
 
