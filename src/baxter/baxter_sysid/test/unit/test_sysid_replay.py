@@ -155,8 +155,9 @@ def test_a_hidden_robot_with_a_weight_and_late_messages_is_found_again(found):
     truth, _, result = found
     for (number, joint), value, deviation in zip(result.names, result.values, result.deviations, strict=True):
         if number in truth and truth[number][joint] > 0.1:
-            # Twelve seconds show friction as well as the sheet says.
-            most = max(0.05 * truth[number][joint], 3.0 * deviation if number == "friction" else 0.0)
+            # Twelve seconds show the wrist, which carries least, to 6 %, and friction as well as the sheet says.
+            most = max((0.06 if joint == "w2" else 0.05) * truth[number][joint],
+                       3.0 * deviation if number == "friction" else 0.0)
             assert value == pytest.approx(truth[number][joint], abs=most), (number, joint)
             assert deviation < 0.1 * truth[number][joint]
     assert result.value(MASS) == pytest.approx(0.8, rel=0.05) and result.value(DELAY) == pytest.approx(0.012, rel=0.05)
@@ -198,7 +199,7 @@ def test_a_recording_is_what_was_written(tmp_path, robot, rows):
 @pytest.mark.parametrize("text, said", [
     ("time_s,left_s0_commanded_rad\n0,0\n", "has no column"), ("time_s,left\n0,0\n", "seven joints"),
     ("time_s," + ",".join("left_%s_%s_rad" % (joint, kind) for joint in JOINTS for kind in ("commanded", "sensed"))
-     + "\n" + 40 * ("0," + ",".join(["0.1"] * 14) + "\n"), "equal steps")])
+     + "\n" + 40 * ("0," + ",".join(["0.1"] * 14) + "\n"), "times must rise")])
 def test_a_file_that_is_no_recording_is_refused(tmp_path, text, said):
     path = tmp_path / "bad.csv"
     path.write_text(text)
