@@ -20,7 +20,7 @@ __all__ = ["Arm", "Baxter", "CommandRefused", "Event", "Gripper", "Head", "Mode"
 
 #: An arm is there when each joint is so near [rad], and so slow [rad/s].
 ARRIVED_RAD, AT_REST_RAD_S = 0.0087, 0.02
-MOVE_S, GRIP_S = 15.0, 3.0  # [simulated s] that a motion may take
+MOVE_S, GRIP_S, CALIBRATION_S = 15.0, 3.0, 10.0  # [simulated s] that a motion may take
 #: A gripper tells of a command's motion after so many ticks.
 _NOTICED_TICKS = 10
 
@@ -73,6 +73,15 @@ class Gripper:
         NotReached."""
         self.command("grip")
         self._rest()
+
+    def calibrate(self) -> None:
+        """Find the ends of the fingers' travel, and wait: the electric one of the physical robot's profile takes no other
+        command before. Nothing is done where they are known. Raises CommandRefused, NotReached."""
+        if self._hand.gripper.flags.get("calibrated", True):
+            return
+        self.command("calibrate")
+        self._wait(lambda: self._hand.gripper.flags["calibrated"], CALIBRATION_S,
+                   "the calibration of the %s gripper" % self._side)
 
     def _rest(self):
         ticks = iter(range(_NOTICED_TICKS))

@@ -84,6 +84,8 @@ class Core:
         start = robosuite_start() if self.task.POSE is None else {
             side: np.array(list(table.angles(self.task.POSE, side).values())) for side in SIDES}
         self.lab.robot.enable()
+        for arm in self.lab.robot.arms.values():
+            arm.gripper.calibrate()
         self.lab.robot.put(start)
 
     @property

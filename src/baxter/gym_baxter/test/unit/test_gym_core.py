@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from baxter_lab import Options, pose
+from baxter_lab import Options, Which, pose
 from gym_baxter.controls import CONTROLS, action_size
 from gym_baxter.core import Choices, Core
 from gym_baxter.tasks import TABLE_TOP_M, TASKS
@@ -120,6 +120,17 @@ def test_success_is_told(made):
     tilted = pose((0.66, 0.0, TABLE_TOP_M + core.task.HALF_M + 0.12), (1.0, 0.0, 0.0))
     core.task.pot.put(tilted)
     assert core.task.succeeded() and core.task.reward() < 0.5
+
+
+def test_the_grippers_of_the_physical_robots_profile_move():
+    """They take no command before they are calibrated."""
+    core = Core("PickPlace", Choices(options=Options(which=Which(profile="robot"), with_meshes=False)))
+    core.reset(np.random.default_rng(1))
+    for arm in core.lab.robot.arms.values():
+        arm.gripper.open()
+        arm.gripper.close()
+        assert arm.gripper.position < 5.0
+    core.close()
 
 
 @pytest.mark.parametrize(("task", "choices", "named"), [
