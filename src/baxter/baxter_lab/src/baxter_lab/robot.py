@@ -75,8 +75,8 @@ class Gripper:
         self._rest()
 
     def calibrate(self) -> None:
-        """Find the ends of the fingers' travel, and wait; nothing where they are known. The electric one of the physical
-        robot's profile takes no other command before. Raises CommandRefused, NotReached."""
+        """Find the ends of the fingers' travel, and wait; nothing where they are known. The physical robot's takes no
+        other command before. Raises CommandRefused, NotReached."""
         if self._hand.gripper.flags.get("calibrated", True):
             return
         self.command("calibrate")
