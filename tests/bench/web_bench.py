@@ -434,11 +434,9 @@ def steer(report, lab, web, times):
         for twist in itertools.islice(itertools.cycle(TWISTS), times):
             wait_until(lambda: len(states.rows) >= RESTING_ROWS and left_speed(states.rows[-RESTING_ROWS:]) < RESTS,
                        "an arm at rest", TIMEOUT_S)
-            begin = time.monotonic()
-            number = len(states.rows)
-            while left_speed(states.rows[number:]) < BEGUN and time.monotonic() - begin < TIMEOUT_S:
-                operator.socket.send(op="steer", hands={"left": twist})
-                time.sleep(STEERED_EVERY_S)
+            begin, number = time.monotonic(), len(states.rows)
+            wait_until(lambda twist=twist, number=number: operator.socket.send(op="steer", hands={"left": twist})
+                       or left_speed(states.rows[number:]) >= BEGUN, "an arm that moves", TIMEOUT_S, STEERED_EVERY_S)
             operator.socket.send(op="steer", hands={})
             delays.append(next(time_s for time_s, message in states.rows[number:]
                                if left_speed([(time_s, message)]) >= BEGUN) - begin)
