@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What MoveIt's commander wraps: objects that take and give messages as bytes and poses as lists.
+"""The objects that MoveIt's commander wraps: they take and give messages as bytes and poses as lists.
 
 Programs reach for them (``group._g``, ``robot._r``, ``scene._psi``). Here it is the other way round: they wrap the
 commander. Every method that is not here is the commander's own of that name.
@@ -33,16 +33,20 @@ if TYPE_CHECKING:
     from .robot import RobotCommander
 
 
-class WrappedGroup:
-    """``_g`` of a MoveGroupCommander. Methods that set something tell whether that was possible, and raise nothing."""
+class _Wrapped:
+    """Has all that its commander has, but for what is the commander's own."""
 
-    def __init__(self, commander: MoveGroupCommander) -> None:
-        self._commander = commander
+    def __init__(self, commander: MoveGroupCommander | RobotCommander | PlanningSceneInterface) -> None:
+        self._commander: Any = commander
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self._commander, name)
+
+
+class WrappedGroup(_Wrapped):
+    """``_g`` of a MoveGroupCommander. Methods that set something tell whether that was possible, and raise nothing."""
 
     # -- state ------------------------------------------------------------------------------------------------------
 
@@ -229,11 +233,8 @@ class WrappedGroup:
         return self._commander.place(object_name, where, plan_only) == MoveItErrorCodes.SUCCESS
 
 
-class WrappedRobot:
+class WrappedRobot(_Wrapped):
     """``_r`` of a RobotCommander. Unknown names give empty lists."""
-
-    def __init__(self, commander: RobotCommander) -> None:
-        self._commander = commander
 
     def __getattr__(self, name: str) -> Any:
         # A robot's groups, joints and links are attributes of the commander alone.
@@ -312,16 +313,8 @@ class WrappedRobot:
         return names(name) if self._commander.has_group(name) else []
 
 
-class WrappedScene:
+class WrappedScene(_Wrapped):
     """``_psi`` of a PlanningSceneInterface."""
-
-    def __init__(self, commander: PlanningSceneInterface) -> None:
-        self._commander = commander
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        return getattr(self._commander, name)
 
     def get_object_poses(self, names: Sequence[str]) -> dict[str, bytes]:
         """Return {name: Pose} of objects in the world."""
