@@ -279,6 +279,8 @@ class SceneMonitor:
 
     def tf_frame(self, name: str, stamp: rospy.Time = _NEWEST) -> np.ndarray:
         """Return the pose (4, 4) of a tf frame in the planning frame at ``stamp``. Raises PlanningError."""
+        if "\0" in name:  # where tf2's library raises ValueError
+            raise MessageError("%r is not a frame: it has a zero in it" % name)
         self._listen_to_tf()
         given_up = getattr(self._asking, "given_up", None)
         deadline = time.monotonic() + _FRAME_TIMEOUT_S

@@ -26,7 +26,7 @@ from motion_planning.errors import PlanningError
 from moveit_ros_move_group.context import RequestError, answered, tell
 from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
 from moveit_ros_move_group.planning import scene_with_diff
-from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
+from moveit_ros_move_group.rest_of_the_way import NewWay, RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ class MoveAction:
         self.context, self._planner, self._may_execute = context, planner, may_execute
         self.replan_attempts = rospy.get_param("~plan_execution/max_replan_attempts", _REPLAN_ATTEMPTS)
         self._changed = threading.Event()
+        self._told = ""
         context.monitor.on_change(self._changed.set)
         self._server = actionlib.SimpleActionServer("move_group", MoveGroupAction, self._run, auto_start=False)
         self._server.start()
@@ -161,7 +162,8 @@ class MoveAction:
             watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options),
                                  self._onward(request, left, result) if options.replan else None,
                                  executor.began)
-            outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
+            outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested,
+                                       self._telling(watch.hit))
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
             again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
@@ -193,6 +195,7 @@ class MoveAction:
             if not left.any():
                 raise RequestError(MoveItErrorCodes.FAILURE, "all attempts to plan again are used up")
             begin = time.monotonic()
+            self._feedback("PLANNING")
             found = self._planner.redirected(request, scene, running, self._server.is_preempt_requested)
             # Where there is no way while the joints move, the attempt is the plan from rest.
             left.take()
@@ -205,14 +208,26 @@ class MoveAction:
 
         return onward
 
+    def _telling(self, hit: Callable[[], str | NewWay | None]) -> Callable[[], str | NewWay | None]:
+        """``hit``, after which a client knows that another way is followed."""
+        def told() -> str | NewWay | None:
+            found = hit()
+            if isinstance(found, NewWay) and not found.stops:
+                self._feedback("MONITOR")
+            return found
+
+        return told
+
     def _pause(self, seconds: float) -> None:
         end = time.monotonic() + max(0.0, min(seconds, 60.0))
         while time.monotonic() < end and not self._server.is_preempt_requested() and not rospy.is_shutdown():
             time.sleep(0.01)
 
     def _feedback(self, state: str) -> None:
-        if self._server.is_active():
+        """Tell the client what is done now. A plan from rest after none was found on the way is one state."""
+        if state != self._told and self._server.is_active():
             self._server.publish_feedback(MoveGroupFeedback(state))
+        self._told = state
 
 
 class _Attempts:
