@@ -147,7 +147,7 @@ class SeeingArm(LabArm):
         super()._grip(percent)
 
     def _settle(self):
-        """What the motors gave way comes back at rest."""
+        """The motors' deflection comes back at rest."""
         self._run(SETTLING_S)
 
 

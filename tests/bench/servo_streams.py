@@ -298,7 +298,7 @@ def _at(height: float) -> np.ndarray:
 
 @dataclass
 class Found:
-    """What a stream showed. cpu_s, together_s: of each step of one arm, and of all arms at a time [s]; share: the
+    """The figures of a stream. cpu_s, together_s: of each step of one arm, and of all arms at a time [s]; share: the
     greatest velocity, acceleration or jerk in shares of its limit; force_n: the greatest of a contact; shift_m,
     turn_rad: the greatest distances of a set-point from the way that was asked for, while nothing was held back;
     hand_m, hand_rad: the same of the hand in the physics; dead_ends: times at which every direction was refused [s]."""

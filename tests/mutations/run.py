@@ -162,7 +162,7 @@ def _end(child: subprocess.Popen, run_id: str) -> None:
 
 
 def problems(faults: list[Fault], root: Path = ROOT) -> list[str]:
-    """What is wrong with the faults: those that do not apply any more, and tests that do not exist."""
+    """Faults that do not apply any more, and tests that do not exist."""
     found = []
     inventory = take_inventory(root)
     for fault in faults:

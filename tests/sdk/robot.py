@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person beside the robot sees and does: joints, grippers, lights; buttons, pushes, arms moved."""
+"""A person beside the robot: sees joints, grippers, lights; presses buttons, pushes, moves arms."""
 import itertools
 from xml.etree import ElementTree
 from xmlrpc.client import ServerProxy

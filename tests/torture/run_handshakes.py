@@ -78,7 +78,7 @@ class Node:
         return connection
 
     def problems(self):
-        """What is wrong with the node: a list of texts."""
+        """Flaws of the node: a list of texts."""
         found = []
         for what, check in (("subscriber", self._subscribes), ("request", self._answers), ("call", self._calls),
                             ("publisher", self._hears)):

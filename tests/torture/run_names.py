@@ -124,7 +124,7 @@ class Gazebo:
         return ["%s answers nothing to %s" % (service, str(request)[:300])]
 
     def take(self):
-        """What came to the log and was noted as a fault since the last call."""
+        """Faults that were noted in the log since the last call."""
         noted = ["%s: %s: %s" % (place, type(error).__name__, error) for place, error in self.ros.faults.noted]
         self.ros.faults.noted.clear()
         self._log.lines.clear()

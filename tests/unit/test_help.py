@@ -22,7 +22,7 @@ PARAMETER = re.compile(r"""(?:get_param|has_param|wait_for_param|number|switch)\
 
 
 def programs() -> list[str]:
-    """What the packages install as executables, relative to the workspace."""
+    """Executables that the packages install, relative to the workspace."""
     found = []
     for name, folder in packages().items():
         text = (ROOT / folder / "CMakeLists.txt").read_text()

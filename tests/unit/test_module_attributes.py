@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a module imports and uses of another of this workspace exists; a linter checks only one file at a time."""
+"""Names that a module uses of another of this workspace exist; a linter checks only one file at a time."""
 import ast
 from collections import defaultdict
 from functools import cache
@@ -38,7 +38,7 @@ def package_folders():
 
 
 class Facts(NamedTuple):
-    """What one file defines and uses. Trees are not kept: millions of nodes would slow all later tests down."""
+    """The definitions and uses of one file. Trees are not kept: millions of nodes would slow all later tests down."""
 
     names: frozenset  # that it defines or imports, at any depth: a superset of its attributes
     modules: dict  # of this workspace that it imports: {name here: file}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said of the package.xml of a user's own packages, before a command of ROS fails by them."""
+"""Messages about the package.xml of a user's own packages, before a command of ROS fails by them."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `pip install .` brings: complete, and without ROS."""
+"""The library of `pip install .`: complete, and without ROS."""
 import ast
 import os
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""No module is imported for a side effect, and no function has too many parameters."""
+"""No module is imported for a side effect, no function has too many parameters, no docstring asks a question."""
 
 import ast
 import re
@@ -27,6 +27,24 @@ def test_no_module_is_imported_for_its_side_effects():
 def test_bounds_are_called_max_and_min():
     bounds = re.compile(r"(?<![A-Z])(?:MOST|LEAST)_[A-Z]")
     assert [name for name, text in product_code() if bounds.search(text)] == []
+
+
+def riddles(name, text):
+    """"file:line" of docstrings that begin with a word of questions."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            if re.match(r"\s*(?:What|Who)\b", ast.get_docstring(node, clean=False) or ""):
+                yield f"{name}:{node.body[0].lineno}"
+
+
+def test_docstrings_say_what_a_thing_is_or_does():
+    texts = ((name, (ROOT / name).read_text(encoding="utf-8")) for name in own_files() if is_python(name))
+    assert [one for name, text in texts for one in riddles(name, text)] == []
+
+
+@pytest.mark.parametrize("text", ['"""What it is."""', 'class A:\n    """Who comes."""', 'def a():\n    """What\n    it is."""'])
+def test_a_question_is_noticed(text):
+    assert len(list(riddles("a.py", text))) == 1
 
 
 def crowded(name, text):

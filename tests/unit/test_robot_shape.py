@@ -171,7 +171,7 @@ def whole_robot(robot, number):
 
 
 def link_alone(robot, name, parts, full, number, only=None):
-    """What `compared` says of ``number`` views of a link, or ``only`` of those numbers."""
+    """The result of `compared` for ``number`` views of a link, or ``only`` of those numbers."""
     alone = Alone({"link": Body([(name, parts)], [])}, robot.mirror.light)
     low, high = full.min(axis=(0, 1)), full.max(axis=(0, 1))
     away = np.linalg.norm(high - low)

@@ -76,7 +76,7 @@ class Machine:
         return done.stdout
 
     def doctor(self, host):
-        """What the doctor prints; its exit code says whether anything is wrong."""
+        """The doctor's output; its exit code says whether anything is wrong."""
         command = ["ip", "netns", "exec", self.namespace, str(ROOT / "baxter.sh"), "doctor", host]
         return subprocess.run(command, capture_output=True, text=True, timeout=COMMAND_LIMIT_S).stdout
 

@@ -308,7 +308,7 @@ def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
 
 
 def own_packages(root: Path) -> list[str]:
-    """What is wrong with the package.xml of the user's own packages, in sentences."""
+    """Faults in the package.xml of the user's own packages, in sentences."""
     script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; own_folders'
     command = ["bash", "-c", script, "own", str(root)]
     listed = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)

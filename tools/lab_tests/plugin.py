@@ -116,7 +116,7 @@ def file_of(nodeid: str) -> str:
 
 @functools.cache
 def unit_of(root: Path, nodeid: str) -> str:
-    """What one worker runs in one go: the test's file, or the name of the lab that several .test files share."""
+    """The key of a worker's share of tests: the test's file, or the name of the lab that several .test files share."""
     lab = lab_of(root / file_of(nodeid))
     return file_of(nodeid) if lab is None else f"lab {hashlib.sha256(lab.encode()).hexdigest()[:12]}"
 

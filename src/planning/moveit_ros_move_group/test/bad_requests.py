@@ -68,7 +68,7 @@ def outcome(answer):
 
 
 def flaws_of(case, code, sentences):
-    """What is wrong with the answer to a Case. code: None where the answer has none; sentences: the failures' texts."""
+    """Flaws of the answer to a Case. code: None where the answer has none; sentences: the failures' texts."""
     flaws = []
     if code is not None and code not in KNOWN_CODES:
         flaws.append("%s is not an error code" % code)

@@ -33,7 +33,7 @@ IDENTITY = Quaternion(0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Robot:
-    """What requests name. joints of the group, their upper limits, values where nothing touches and some to go to; its
+    """A robot in requests. joints of the group, their upper limits, values where nothing touches and some to go to; its
     last link, where that is at ``aside`` (x, y, z and the quaternion's x, y, z, w) in the planning frame ``frame``."""
 
     group: str

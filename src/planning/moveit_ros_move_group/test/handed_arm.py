@@ -59,7 +59,7 @@ def _along(way, x):
 
 
 def thing():
-    """What stands where the hand goes."""
+    """The object where the hand goes."""
     ahead = there(SIX)
     return box(SIX, "thing", 0.01, (ahead.pose.position.x, ahead.pose.position.y, ahead.pose.position.z + 0.12))
 

@@ -143,7 +143,7 @@ class Browser:
         return tuple(node.get(what, {}).get("value", "") for what in ("role", "name"))
 
     def picture(self):
-        """What the window shows, uint8 (height, width, 3), red first."""
+        """The window's picture, uint8 (height, width, 3), red first."""
         # What has been drawn is on the screen one picture later.
         self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         png = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
@@ -192,7 +192,7 @@ class Browser:
 
 
 def _result(method, frame):
-    """What the answer to a DevTools command holds. Raises AssertionError, PageLeft."""
+    """The result in the answer to a DevTools command. Raises AssertionError, PageLeft."""
     error = frame.get("error")
     if error is not None and _LEFT in error.get("message", ""):
         raise PageLeft("%s: %s" % (method, error))

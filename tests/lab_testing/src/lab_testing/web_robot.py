@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a test's web clients find on the graph, and where they find the server."""
+"""The robot on the graph for a test's web clients, and where they find the server."""
 import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the driver of the browser makes of its answers; the browser is a list of them."""
+"""The driver of the browser and its answers; the browser is a list of them."""
 import json
 
 import pytest

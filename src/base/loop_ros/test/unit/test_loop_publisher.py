@@ -12,7 +12,7 @@ from loop_ros.publisher import STOPPED_RETRY_S, STOPPED_S, LoopPublisher, Peer, 
 
 
 class FakeTransport:
-    """What rospy hands over for one subscriber."""
+    """The connection that rospy hands over for one subscriber."""
 
     def __init__(self, impl):
         self._impl = impl

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What counts as a starting simulator; master, roslaunch and nodes answer as ROS's own do."""
+"""Which processes count as a starting simulator; master, roslaunch and nodes answer as ROS's own do."""
 import socket
 import threading
 from xmlrpc.server import SimpleXMLRPCServer

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What nodes and roslaunch no longer import, and that it is there when it is used."""
+"""The modules that nodes and roslaunch no longer import at their start; they are there when they are used."""
 import os
 import subprocess
 import sys

@@ -15,7 +15,7 @@ REASON = {"error": "topic types do not match"}
 
 @pytest.fixture
 def said(monkeypatch):
-    """What is logged by connections of a module that was amended once."""
+    """The log of connections of a module that was amended once."""
     lines = []
     monkeypatch.setattr(tcpros_base, "logerr", lambda text, *args: lines.append(text % args))
     monkeypatch.setattr(tcpros_base.TCPROSTransport, "_validate_header",

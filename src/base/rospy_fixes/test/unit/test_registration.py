@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a publisher, a service and the master's calls may send to a node."""
+"""The data that a publisher, a service and the master's calls may send to a node."""
 import io
 import socket
 import struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What roslaunch starts beside a master: ROS's own node, without the clock."""
+"""The nodes that roslaunch starts beside a master: ROS's own, without the clock."""
 import roslaunch.config
 import roslaunch.xmlloader
 

@@ -12,7 +12,7 @@ from rospy_nodes import start
 
 @pytest.fixture
 def parameters(monkeypatch):
-    """What is set; a value that is a list comes after as many questions as it is long."""
+    """The parameters that are set; a value that is a list comes after as many questions as it is long."""
     values = {}
 
     def has(name):

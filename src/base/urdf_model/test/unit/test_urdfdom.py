@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What urdfdom accepts is accepted, with its repairs and a warning; Debian's check_urdf is the oracle."""
+"""The parser accepts what urdfdom accepts, with its repairs and a warning; Debian's check_urdf is the oracle."""
 
 import math
 import shutil

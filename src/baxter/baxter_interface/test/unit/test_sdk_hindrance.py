@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What keeps a robot from doing what a program asks, without ROS connections."""
+"""Reasons why a robot does not do what a program asks, without ROS connections."""
 from baxter_interface.hindrance import IgnoredCommands
 
 WHY = "the robot is not enabled"

@@ -44,7 +44,7 @@ def test_the_output_s_name_must_be_one_that_a_serial_can_be(command, capsys):
 
 
 def refused(command, capsys, *argv):
-    """What the parser says of arguments that it refuses, before anything moves or is fitted."""
+    """The parser's text about arguments that it refuses, before anything moves or is fitted."""
     with pytest.raises(SystemExit) as caught:
         command.main(list(argv))
     assert caught.value.code == 2
@@ -109,7 +109,7 @@ def test_what_was_there_is_kept_beside_what_is_written(tmp_path):
 
 
 def processor_s(pid):
-    """What a process has had of the processor [s]."""
+    """The processor time that a process has had [s]."""
     fields = Path("/proc/%d/stat" % pid).read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

@@ -39,7 +39,7 @@ def hidden(seed, sticky):
 
 
 def recorded(path, side, seed, noise, delay, mass):
-    """What this robot does; delay: least and most [s] of each command."""
+    """A recording of this robot; delay: least and most [s] of each command."""
     random, way = np.random.default_rng(seed), motion(side, SECONDS)
     tools = (Tool(side, WEIGHT % mass, (0.0, 0.0, LOAD_M)),) if mass else ()
     which = Which("robot", "lag,noise,safety", str(path))

@@ -132,7 +132,7 @@ HELD_NM = -0.35
 
 
 def record(robot, rows, side, seed, mass=0.0, delay=0.0, seconds=12.0):
-    """What a robot with these numbers does, in counts with noise. It came to its start so that w0's friction bears."""
+    """A recording of a robot with these numbers, in counts with noise; at its start, w0's friction bears."""
     body, hand = arm_body(robot, side), hand_in_last(robot, side)
     loaded = with_load(body, mass, hand[:3, :3] @ [0.0, 0.0, LOAD_M] + hand[:3, 3])
     commanded = motion(side, seconds)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What all tasks share. All in `base`, SI units."""
+"""The base of all tasks. All in `base`, SI units."""
 from __future__ import annotations
 
 import math

@@ -84,7 +84,7 @@ def test_sockets_are_counted_once(monkeypatch):
 
 
 def watcher(**values):
-    """What a supervisor's watches need, with one lab that runs."""
+    """A supervisor for its watches, with one lab that runs."""
     found = SimpleNamespace(labs=Labs(["anna"], 1, None), done=[], _now=lambda: 0.0, **values)
     found.labs["anna"].state = State.RUNNING
     found._do = found.done.append

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the supervisor measures in folders that students write to, and that its loops outlive any error."""
+"""The supervisor's measurements of folders that students write to; its loops outlive any error."""
 import asyncio
 import os
 import tempfile

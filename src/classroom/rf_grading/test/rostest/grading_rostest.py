@@ -44,7 +44,7 @@ class Graded(unittest.TestCase):
         return {**os.environ, "TMPDIR": str(self.folder / "tmp")}
 
     def grade(self):
-        """What one start prints."""
+        """The output of one start."""
         done = subprocess.run(self._command, env=self._environment, capture_output=True, text=True, timeout=LIMIT_S)
         print(done.stdout + done.stderr, flush=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)

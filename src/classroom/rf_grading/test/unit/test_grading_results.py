@@ -160,7 +160,7 @@ def test_the_median_of_two_is_between_them(found):
 
 
 def test_pages_suit_dark_windows_telephones_and_paper(found):
-    """What is written on a page has no colour but the style's, in which each has a second value for dark windows."""
+    """Pages have no colour but the style's, in which each has a second value for dark windows."""
     row = found.rows[1]
     row.cells["wave"].verdict["runs"][0]["output"] = "it said this"
     page = pages.feedback(found, row, {"b": [motion.of_run(FakeRecording(5), FakeRobot())]})

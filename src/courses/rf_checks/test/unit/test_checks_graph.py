@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a program may do at the master of the judge's lab, and what not. The master is a real one."""
+"""The calls that a program may make at the master of the judge's lab, and those refused. The master is a real one."""
 import pytest
 from rosmaster.master import Master
 

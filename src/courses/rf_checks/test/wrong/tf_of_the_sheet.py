@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: tf_listener
-"""What the sheet's listing does, not yet adapted to the exercise: base and head, x y z w to quat2mat, for ever."""
+"""The sheet's listing, not yet adapted to the exercise: base and head, x y z w to quat2mat, for ever."""
 import numpy as np
 import rospy
 import tf2_ros

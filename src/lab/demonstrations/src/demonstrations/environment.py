@@ -40,7 +40,7 @@ _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
 
 
 class Student(Protocol):
-    """What an expert corrects: a policy that acts on (n,) numbers, the robot's and those of the things."""
+    """A policy for an expert to correct: it acts on (n,) numbers, the robot's and those of the things."""
 
     def begin(self) -> None:
         """An episode begins."""

@@ -67,7 +67,7 @@ class Recorder:
 
     @property
     def waits(self) -> str:
-        """What the episode waits for, "" while it is recorded."""
+        """The condition that the episode waits for, "" while it is recorded."""
         return self._waits
 
     def take(self, key: str, value: Any, stamp: float | None = None) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the plugins use of LeRobot, for tests without it. `../checked_by_lerobot.py` compares it with the real one."""
+"""The plugins' part of LeRobot, for tests without it. `../checked_by_lerobot.py` compares it with the real one."""
 import abc
 import enum
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot says becomes frames on an exact grid; marks keep and drop episodes; silence is named."""
+"""A robot's messages become frames on an exact grid; marks keep and drop episodes; silence is named."""
 import json
 
 import numpy as np

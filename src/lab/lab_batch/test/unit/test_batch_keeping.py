@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What episodes take and leave: limits of memory, and processes that end with their worker, whoever is killed."""
+"""Memory and processes of episodes: limits, and processes that end with their worker, whoever is killed."""
 import os
 import shlex
 import signal

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a batch says while it runs: how far it is, and that nothing has ended for long."""
+"""A batch's messages while it runs: how far it is, and that nothing has ended for long."""
 import io
 
 from lab_batch import Outcome, command
@@ -11,7 +11,7 @@ class Terminal(io.StringIO):
 
 
 def progress_of(stream, step_s, count=4):
-    """What Progress writes when an episode ends every ``step_s`` [s]; the second one fails."""
+    """The text that Progress writes when an episode ends every ``step_s`` [s]; the second one fails."""
     now = iter(step_s * k for k in range(count + 1))
     progress = command.Progress(count, stream, lambda: next(now))
     for seed in range(count):

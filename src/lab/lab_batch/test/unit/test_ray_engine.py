@@ -42,7 +42,7 @@ say([child.name() for child in psutil.Process().children(recursive=True)])
 
 
 class LateRay:
-    """What the engine uses of Ray, at its worst: an actor with the seed ``deadly`` dies before any of its outcomes has
+    """The engine's part of Ray, at its worst: an actor with the seed ``deadly`` dies before any of its outcomes has
     arrived, and one at the seed ``hanging`` never ends it. ``first``: the place of what is reported first among all
     that is ready. ``start_s``: how long the start of a job takes, which does not count as an episode."""
 

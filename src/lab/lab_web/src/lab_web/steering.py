@@ -26,7 +26,7 @@ _LED_RATE, _LEAP_M, _LEAP_RAD = 6.0, 0.15, 0.7
 
 
 class Servo(Protocol):
-    """What steers one arm."""
+    """The controls of one arm's servo."""
 
     reason: str
 

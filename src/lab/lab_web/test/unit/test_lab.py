@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who may move the robot, how it moves, and what stops it. A clock and a robot of the test's own."""
+"""The page's users and the robot: who may move it, how it moves, what stops it. Clock and robot are the test's own."""
 import pytest
 
 from lab_web.control import CONNECTION_SILENCE_S, HEARTBEAT_S, SILENCE_S

@@ -146,7 +146,7 @@ class Hall:
         return self._processes[-1]
 
     def said(self, what):
-        """What the robot got of a kind: lists of values."""
+        """The values that the robot got of a kind: a list of lists."""
         rows = [json.loads(line) for line in list(self.robot.lines) if line.startswith("[\"")]
         return [values for kind, *values in rows if kind == what]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who reaches JupyterLab through the page's server, with a small server in its place; and what that server is told."""
+"""Requests for JupyterLab through the page's server, with a small server in its place; the headers that reach it."""
 import http.client
 import json
 import threading

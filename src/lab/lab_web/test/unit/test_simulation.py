@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a page is told when the simulation cannot be asked."""
+"""The page's message when the simulation cannot be asked."""
 import errno
 import os
 

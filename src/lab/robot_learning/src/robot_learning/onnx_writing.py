@@ -54,7 +54,7 @@ class Graph:
 
 
 def graph_of(policy: Policy) -> Graph:
-    """What `Policy.chunks` computes."""
+    """The graph that computes `Policy.chunks`."""
     graph, taken, contract = Graph(), policy.inputs, policy.contract
 
     def columns(index: Sequence[int]) -> str:

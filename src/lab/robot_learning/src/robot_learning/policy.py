@@ -31,7 +31,7 @@ class PolicyError(Exception):
 
 @dataclass(frozen=True)
 class Contract:
-    """What a policy needs and gives.
+    """The inputs and outputs of a policy.
 
     task: of gym_baxter; control: kind of its actions; rate_hz: actions a second; observation, units: names of the
     observation's numbers, in order, and their units; action: names of an action's numbers; robosuite_order: whether the
@@ -167,11 +167,11 @@ class Policy:
 
 
 class Acting(Protocol):
-    """What a `Runner` runs."""
+    """A policy as a `Runner` runs it."""
 
     @property
     def contract(self) -> Contract:
-        """What it takes in and gives out."""
+        """Its inputs and outputs."""
 
     def chunks(self, observations: np.ndarray) -> np.ndarray:
         """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What touches what, where and how deep: exact checks against what can be told without one, and against PyBullet."""
+"""Contacts, their places and depths: exact checks against what can be told without one, and against PyBullet."""
 import math
 
 import numpy as np

@@ -112,7 +112,7 @@ def lab(probot, checker):
 
 
 def assert_valid(lab, found, resolution=0.01):
-    """What a controller would play: from the start to rest, within the limits, touching nothing."""
+    """The trajectory for a controller goes from the start to rest, within the limits, and touches nothing."""
     model, timed = lab.scene.model, found.timed
     q, v, a = timed.sampled(np.linspace(0.0, timed.duration, max(500, int(timed.duration / 0.002))))
     assert (np.abs(v) <= model.velocity * 1.001).all() and (np.abs(a) <= model.acceleration * 1.001).all()

@@ -518,7 +518,7 @@ def test_time_that_is_over_and_a_stop_are_told_apart(snake, exact):
 
 
 def test_warming_up_compiles_all_that_planning_needs(tmp_path):
-    """What set-up runs fills the cache; planning afterwards compiles nothing."""
+    """Set-up's warm-up fills the cache; planning afterwards compiles nothing."""
     code = """
 import runpy, sys
 runpy.run_module("motion_planning", run_name="__main__")

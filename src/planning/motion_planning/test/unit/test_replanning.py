@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What enters the way of joints that move: another way without a stop, or the reason why they have to stop."""
+"""Obstacles in the way of joints that move: another way without a stop, or the reason why they have to stop."""
 import itertools
 
 import numpy as np

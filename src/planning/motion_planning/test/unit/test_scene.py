@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each change of a scene means, and that none changes a scene that there is."""
+"""Each change of a scene makes a new scene with that change, and leaves the old one as it is."""
 import numpy as np
 import pytest
 

@@ -345,7 +345,7 @@ def test_a_tree_leads_past_everything_to_each_of_its_objects():
 
 
 def test_a_scene_without_time_is_coarse_and_gets_better_with_the_next_request():
-    """What was made in a hurry is not kept."""
+    """Spheres that were made in a hurry are not kept."""
     model = PlanningModel.from_xml(ROD, "<robot name='rod'><group name='g'><chain base_link='base' tip_link='ball'/>"
                                         "</group></robot>")
     spheres, group = SphereModel.of(model, None), model.groups["g"]

@@ -26,7 +26,7 @@ GOAL_MARKER = "EE:goal_tool0"
 
 
 class Rviz(MarkerClient):
-    """What rviz knows: the markers to drag, and those that are drawn."""
+    """Rviz's side: the markers to drag, and those that are drawn."""
 
     def __init__(self):
         self._drawing = threading.Lock()

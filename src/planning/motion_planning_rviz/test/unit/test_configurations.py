@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What rviz is told to show is what the panel publishes."""
+"""The topics in the configurations of rviz are those that the panel publishes."""
 from pathlib import Path
 
 import pytest

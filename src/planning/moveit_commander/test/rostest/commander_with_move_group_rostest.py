@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What programs for MoveIt do with PROBOT, on move_group itself."""
+"""Programs for MoveIt with PROBOT, on move_group itself."""
 import unittest
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is read from the parameter server; names that programs look for in the package."""
+"""The description from the parameter server; names that programs look for in the package."""
 import pytest
 import rospy
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What programs reach for inside commanders: messages as bytes, poses as lists."""
+"""Uses of the wrapped objects inside commanders: messages as bytes, poses as lists."""
 import pytest
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import (

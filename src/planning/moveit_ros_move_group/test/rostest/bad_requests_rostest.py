@@ -122,7 +122,7 @@ class BadRequestsTest(unittest.TestCase):
             self.services["apply_planning_scene"](scene)
 
     def flaws(self, case):
-        """What is wrong with the answer to a Case, and how long it took [s]."""
+        """Flaws of the answer to a Case, and how long it took [s]."""
         self.failures.clear()
         begin = time.monotonic()
         code, text = outcome(self.ask(case.endpoint, case.message))

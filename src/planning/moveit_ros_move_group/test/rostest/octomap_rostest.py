@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a camera sees is planned around, and forgotten when it is cleared."""
+"""Points of a camera are planned around, and forgotten when they are cleared."""
 import unittest
 
 import numpy as np

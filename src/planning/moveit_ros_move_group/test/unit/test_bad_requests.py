@@ -71,7 +71,7 @@ def test_poses_of_what_is_held_and_of_its_subframes_are_solved(node):
 
 
 def asked(node, case):
-    """What is wrong with the answer to a Case, as one text; empty where all is as it should be."""
+    """Flaws of the answer to a Case, as one text; empty where all is as it should be."""
     node.published.clear()
     node.logged.clear()
     code, text = outcome(node.ask(case.endpoint, case.message))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers are spoken to by."""
+"""The handles of controllers: actions and their goals."""
 from unittest.mock import Mock
 
 import actionlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What comes to stand in the way of a running trajectory is seen, however thin it is and wherever it stands."""
+"""Objects in the way of a running trajectory are seen, however thin they are and wherever they stand."""
 import numpy as np
 import pytest
 import rospy

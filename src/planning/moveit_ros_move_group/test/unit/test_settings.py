@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the parameter server says is understood; what cannot be is said."""
+"""Settings from the parameter server: valid ones are understood, others are refused with the reason."""
 import pytest
 
 from moveit_ros_move_group import ros_control, settings

@@ -74,7 +74,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Command:
-    """What is wanted: one of twist (6,) [m/s, rad/s], joint velocities (k,) [per s], and a pose (4, 4) of the tip in
+    """A command: one of twist (6,) [m/s, rad/s], joint velocities (k,) [per s], and a pose (4, 4) of the tip in
     the model's frame; none of them: to stop. axes (3, 3): those of the twist, as columns in the model's frame. drift
     (6,) bool: rows of the twist that do not matter."""
 
@@ -89,7 +89,7 @@ class Command:
 
 
 class _Wanted(NamedTuple):
-    """What is wanted and possible: velocity (k,); together: as for Motion.follow; slope (m, k) @ velocity >= least (m,)
+    """A motion that is possible: velocity (k,); together: as for Motion.follow; slope (m, k) @ velocity >= least (m,)
     keeps what is near from coming too near."""
 
     velocity: np.ndarray
@@ -301,7 +301,7 @@ class Servo:
     # -- why -----------------------------------------------------------------------------------------------------
 
     def _status(self, of_motion, found, lost, condition, bounds: Possible) -> tuple[Status, str]:
-        """What takes most of the motion: its Status, and a sentence. of_motion: see ``shares``."""
+        """The greatest reduction of the motion: its Status, and a sentence. of_motion: see ``shares``."""
         taken, left, nearest = of_motion
         low, high = bounds.low, bounds.high
         if taken > _NOTICED and taken >= lost:

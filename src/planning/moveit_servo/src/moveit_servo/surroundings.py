@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an arm may run into: its scene as tables, and the bounds on joint velocities that keep it clear."""
+"""The objects that an arm may run into: its scene as tables, and the bounds on joint velocities that keep it clear."""
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a servo says of itself: of the commands that it refuses, and why steps are not those wanted. Free of ROS."""
+"""A servo's reports: of the commands that it refuses, and why steps are not those wanted. Free of ROS."""
 from __future__ import annotations
 
 import math

@@ -27,7 +27,7 @@ AT_REST = 0.01  # [rad/s]
 
 
 class Arm:
-    """What one arm does, and its servo's topics."""
+    """The state of one arm, and its servo's topics."""
 
     def __init__(self, side):
         self.side, self.position, self.speed, self.time = side, None, 0.0, 0.0

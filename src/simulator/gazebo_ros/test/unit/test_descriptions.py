@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is read in URDF and world files."""
+"""The reader of URDF and world files."""
 import math
 import subprocess
 import sys

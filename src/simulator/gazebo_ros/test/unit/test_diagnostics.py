@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What goes out on /diagnostics, and when."""
+"""The messages on /diagnostics, and when they are sent."""
 from types import SimpleNamespace
 
 from diagnostic_msgs.msg import DiagnosticStatus

@@ -275,7 +275,7 @@ def test_the_meter_counts_no_time_before_a_restart(clock):
 
 
 def watched(clock, factors, **settings):
-    """What a watch says second by second: [(second, news)]."""
+    """The news of a watch, second by second: [(second, news)]."""
     watch = SlownessWatch(clock=clock, **settings)
     said = []
     for second, factor in enumerate(factors):

@@ -13,7 +13,7 @@ TOUCH = Contact("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0),
 
 
 class World:
-    """What Publications looks at, run at a factor of wall time that the test chooses."""
+    """The part of the world that Publications looks at, run at a factor of wall time that the test chooses."""
 
     def __init__(self, monkeypatch, factor, paused=False, asked=None, clock_rate=500.0):
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0

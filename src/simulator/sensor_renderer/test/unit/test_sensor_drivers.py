@@ -131,7 +131,7 @@ class Opened:
 
 
 class Ros:
-    """What cameras have opened, and the parameters that they find."""
+    """The topics that cameras have opened, and the parameters that they find."""
 
     def __init__(self, monkeypatch):
         self.opened, self.parameters = [], {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a physical camera makes of the ideal picture: exposure, gain, noise; and what the Kinect makes of depth."""
+"""A physical camera's picture of the ideal one: exposure, gain, noise; and the Kinect's noise of depth."""
 import numpy as np
 import pytest
 

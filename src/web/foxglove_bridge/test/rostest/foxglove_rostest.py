@@ -29,7 +29,7 @@ def address():
 
 
 class RobotOnTheGraph(WebRobot):
-    """What the client uses."""
+    """The robot's topics and services that the client uses."""
 
     def __init__(self):
         super().__init__()

@@ -81,7 +81,7 @@ def depths():
 
 
 class Graph:
-    """What the page shows."""
+    """The topics and frames that the page shows."""
 
     def __init__(self):
         self.buffer = tf2_ros.Buffer()

@@ -65,7 +65,7 @@ def address():
 
 
 class RobotOnTheGraph(WebRobot):
-    """What the clients use."""
+    """The robot's topics and services that the clients use."""
 
     def __init__(self):
         super().__init__()
@@ -167,7 +167,7 @@ class RosbridgeTest(unittest.TestCase):
         client, numbers = Client(), itertools.count()
 
         def heard():
-            """What is heard of a new topic; nothing where the machine takes more than its first second to connect."""
+            """The messages of a new topic; none where the machine takes more than its first second to connect."""
             topic, found = "/lab/first%d" % next(numbers), []
             rospy.Subscriber(topic, Int64, lambda message: found.append(message.data))
             client.send("advertise", topic=topic, type="std_msgs/Int64")

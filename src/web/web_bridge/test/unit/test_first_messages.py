@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is kept of a new topic's first messages."""
+"""The store of a new topic's first messages."""
 from web_bridge.publications import FirstMessages
 
 

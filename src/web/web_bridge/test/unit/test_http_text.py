@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is passed on to another server and back, and what not."""
+"""The headers that are passed on to another server and back, and those that are not."""
 import pytest
 from tornado.httputil import HTTPHeaders
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What clients without a token can cost a server: memory, connections, time."""
+"""The limits for clients without a token: memory, connections, time."""
 import contextlib
 import socket
 

@@ -44,7 +44,7 @@ class Lab:
 
 
 class AnyClient:
-    """What clients of both protocols do. ``REASON``: the field with the text of a status."""
+    """The operations of clients of both protocols. ``REASON``: the field with the text of a status."""
 
     REASON = ""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands on the table for a seed, and how a block in it can be grasped."""
+"""The objects on the table for a seed, and how a block among them can be grasped."""
 import itertools
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the arms tell of their efforts with the physical robot's actuators."""
+"""The efforts that the arms report with the physical robot's actuators."""
 import numpy as np
 import pytest
 

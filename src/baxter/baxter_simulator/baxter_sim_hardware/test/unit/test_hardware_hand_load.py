@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the arms' controllers know of the weight in a hand, and how an arm droops that does not know it."""
+"""The weight in a hand that the arms' controllers assume, and how an arm droops whose controllers assume none."""
 import json
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What processes load, and when."""
+"""The modules that processes load, and when."""
 import json
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the plugin publishes: rates, names, fields; and how it handles messages."""
+"""The plugin's topics: rates, names, fields; and how it handles messages."""
 import inspect
 import random
 from pathlib import Path

@@ -52,7 +52,7 @@ def above_a_table(make_lab):
 
 
 class Press:
-    """What happens while s1 of the left arm is sent down at 0.3 rad/s, until some time after contact.
+    """Both sides of a contact: s1 of the left arm is sent down at 0.3 rad/s until some time after it.
 
     Attributes: contact_s, stopped_s, reported_s: when [s]; force: [N] of each tick since contact.
     """

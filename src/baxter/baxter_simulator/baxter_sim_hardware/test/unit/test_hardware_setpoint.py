@@ -57,7 +57,7 @@ def fast_points(count):
 
 
 def smoothed(stairs, ticks=10):
-    """What comes out of `follow` for set-points that jump from one of `stairs` (m, n) to the next, tick by tick."""
+    """The results of `follow` for set-points that jump from one of `stairs` (m, n) to the next, tick by tick."""
     points, at_zero = fast_points(stairs.shape[1]), np.zeros(stairs.shape[1])
     average = MovingAverage(ticks, at_zero)
     out = []

@@ -112,7 +112,7 @@ class BaxterTeleop(Teleoperator):
         return {name: found[name] for name in wire.NUMBERS}
 
     def get_teleop_events(self) -> dict[Any, Any]:
-        """What its user has said of the demonstration on /steering/mark since the last call."""
+        """Marks of the demonstration that its user has sent on /steering/mark since the last call."""
         said = [message["data"] for message in self._bridge.drain(wire.MARKS)] if self._bridge else []
         last = said[-1] if said else ""
         return {TeleopEvents.IS_INTERVENTION: False, TeleopEvents.TERMINATE_EPISODE: bool(last),

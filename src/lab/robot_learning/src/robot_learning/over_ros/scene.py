@@ -70,7 +70,7 @@ class RosThing:
 
 
 class RosLab:
-    """What tasks see of a lab: `robot`, and things, which are put up unless they are there or no simulator is. Raises
+    """The tasks' view of a lab: `robot`, and things, which are put up unless they are there or no simulator is. Raises
     GazeboInterfaceError."""
 
     def __init__(self, robot: RosRobot):

@@ -254,7 +254,7 @@ def boxes_meet(turn_a: np.ndarray, centre_a: np.ndarray | Triple, half_a: np.nda
 @compiled
 def _along(turn_a: np.ndarray, axis: int, x: float, y: float, z: float,
            turn_b: np.ndarray) -> tuple[float, float, float, float]:
-    """What (x, y, z) and the three axes of b are along an axis of a."""
+    """The components of (x, y, z) and of the three axes of b along an axis of a."""
     u, v, w = turn_a[0, axis], turn_a[1, axis], turn_a[2, axis]
     return (u * x + v * y + w * z, u * turn_b[0, 0] + v * turn_b[1, 0] + w * turn_b[2, 0],
             u * turn_b[0, 1] + v * turn_b[1, 1] + w * turn_b[2, 1],

@@ -204,7 +204,7 @@ def between(tables: Tables) -> Tables:
 
 
 class _Split(NamedTuple):
-    """What ``split`` and ``between`` need of a robot alone. parts: [(indices, joints, pairs, maps)]; between: the pairs
+    """The tables of ``split`` and ``between`` for a robot. parts: [(indices, joints, pairs, maps)]; between: the pairs
     of clusters of different branches; table: the robot's, whose identity is the key."""
 
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
