@@ -20,7 +20,7 @@ from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import LOG, BulletSimError
 from .gathered import Part, corners, gathered, without_margin
-from .limited import MESHES, LimitError
+from .limited_process import MESHES, LimitError
 from .mesh_loading import MAX_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
 

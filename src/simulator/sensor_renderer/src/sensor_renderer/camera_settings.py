@@ -14,7 +14,7 @@ from sensor_renderer.exposure import GAINS_DB, LONGEST_S, ExposureSettings
 from sensor_renderer.topics import ReconfigureServer
 
 if TYPE_CHECKING:
-    from sensor_renderer.imager import Imager
+    from sensor_renderer.camera_sensor import CameraSensor
     from sensor_renderer.topics import LearningTopics
 
 #: Parameters below this name are for all cameras, those below a camera's own name for this one.
@@ -71,10 +71,10 @@ class CameraSettings:
         return ExposureSettings(**{field.name: self._values[field.name]
                                    for field in dataclasses.fields(ExposureSettings)})
 
-    def apply(self, imager: Imager, learning: LearningTopics) -> None:
-        """Pass the values on to a :class:`sensor_renderer.imager.Imager` and to its LearningTopics."""
-        imager.exposure = self.exposure
-        imager.set_noise(self._values["noise_mean"], self._values["noise_stddev"])
+    def apply(self, camera: CameraSensor, learning: LearningTopics) -> None:
+        """Pass the values on to a :class:`sensor_renderer.camera_sensor.CameraSensor` and to its LearningTopics."""
+        camera.exposure = self.exposure
+        camera.set_noise(self._values["noise_mean"], self._values["noise_stddev"])
         learning.open(self._values["learning_topics"])
 
     def close(self) -> None:

@@ -14,9 +14,9 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
 from loop_ros.reconfigure import Setting
 from sensor_renderer import convert
+from sensor_renderer.camera_sensor import CameraSensor
 from sensor_renderer.camera_settings import CameraSettings
 from sensor_renderer.errors import SensorError
-from sensor_renderer.imager import Imager
 from sensor_renderer.pictures import Cloud, millimetres, within
 from sensor_renderer.structured_light import StructuredLight
 from sensor_renderer.topics import ColourTopics, LearningTopics, Topic, Trigger
@@ -106,7 +106,7 @@ class Camera(Driver):
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
             learning = LearningTopics(self.name(folder))
             info = convert.camera_info(entry.stated(camera.pinhole), entry.baseline_m(camera), camera.distortion)
-            self._cameras.append((Imager(camera, self.seed(camera.name)), topics, learning, info))
+            self._cameras.append((CameraSensor(camera, self.seed(camera.name)), topics, learning, info))
             self.topics += [*topics.all, learning]
         first = cameras[0]
         self._settings = CameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
@@ -120,16 +120,16 @@ class Camera(Driver):
     def _apply(self, settings):
         self._pace.rate = settings.value("imager_rate")
         self.memory_s = settings.exposure.exposure_time
-        for imager, _, learning, _ in self._cameras:
-            settings.apply(imager, learning)
+        for sensor, _, learning, _ in self._cameras:
+            settings.apply(sensor, learning)
 
     def publish(self, moment: Moment) -> None:
-        for number, (imager, topics, learning, info) in enumerate(self._cameras):
+        for number, (sensor, topics, learning, info) in enumerate(self._cameras):
             if not self.takes(number):
                 continue
-            middle, picture, _ = imager.taken(moment, topics.want_picture, False)
-            topics.publish(middle.time_s, self._frame, picture, imager.camera.encoding, info)
-            learning.publish(middle, imager.camera, self._frame)
+            middle, picture, _ = sensor.taken(moment, topics.want_picture, False)
+            topics.publish(middle.time_s, self._frame, picture, sensor.camera.encoding, info)
+            learning.publish(middle, sensor.camera, self._frame)
 
 
 class TriggeredCamera(Camera):
@@ -177,7 +177,7 @@ class DepthCamera(Driver):
         self._points = topic("pointCloudTopicName", "depth/points", PointCloud2)
         self._learning = LearningTopics(self.name(base))
         self._cloud = Cloud(pinhole, self._camera.lens and self._camera.lens.rays)
-        self._imager = Imager(self._camera, self.seed(base))
+        self._sensor = CameraSensor(self._camera, self.seed(base))
         self._pattern = None
         distortion = self._camera.distortion
         stated = entry.stated(pinhole)
@@ -190,7 +190,7 @@ class DepthCamera(Driver):
     def _apply(self, settings):
         self._pace.rate = settings.value("imager_rate")
         self.memory_s = settings.exposure.exposure_time
-        settings.apply(self._imager, self._learning)
+        settings.apply(self._sensor, self._learning)
         if not settings.value("depth_noise"):
             self._pattern = None
         elif self._pattern is None:
@@ -201,7 +201,7 @@ class DepthCamera(Driver):
         want_colour, want_depth = points or self._colour.want_picture, points or self._depth.has_listeners
         pattern, picture, depth = self._pattern, None, None
         if want_colour or want_depth:
-            moment, picture, depth = self._imager.taken(moment, want_colour, want_depth)
+            moment, picture, depth = self._sensor.taken(moment, want_colour, want_depth)
         time_s = moment.time_s
         if depth is not None:
             if pattern is not None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sensor_renderer.drawn_links import Links, visible
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.floor import Floor
-from sensor_renderer.links import Links, visible
 from sensor_renderer.programs import Programs, draw, draw_textured, matrix_bytes, uniform
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
@@ -165,8 +165,8 @@ class GlRenderer:
         self._context.release()
 
     def _draw(self, seen, textured, pinhole):
-        """Draw ``seen``, (:class:`sensor_renderer.links.Arrays`, matrix, packed matrix,
-        :class:`sensor_renderer.links.Link`, distance of its sphere), ``textured`` as
+        """Draw ``seen``, (:class:`sensor_renderer.drawn_links.Arrays`, matrix, packed matrix,
+        :class:`sensor_renderer.drawn_links.Link`, distance of its sphere), ``textured`` as
         :func:`sensor_renderer.programs.draw_textured` takes them, and the floor last."""
         draw(self._programs.solid, [(arrays.colour, packed) for arrays, _, packed, link, _ in seen
                                     if not link.is_mesh and arrays.colour is not None])

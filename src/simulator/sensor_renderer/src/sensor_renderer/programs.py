@@ -12,8 +12,8 @@ from sensor_renderer import shaders
 if TYPE_CHECKING:
     import moderngl
 
+    from sensor_renderer.drawn_links import VertexArray
     from sensor_renderer.light import Light
-    from sensor_renderer.links import VertexArray
     from sensor_renderer.mirror import Material
     from sensor_renderer.shadows import Shadows
     from sensor_renderer.textures import Textures

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensor_renderer.links import Link, visible
+from sensor_renderer.drawn_links import Link, visible
 from sensor_renderer.programs import matrix_bytes, uniform
 
 if TYPE_CHECKING:

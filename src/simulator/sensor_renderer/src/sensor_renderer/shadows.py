@@ -15,8 +15,8 @@ from sensor_renderer.programs import draw, matrix_bytes, uniform
 if TYPE_CHECKING:
     import moderngl
 
+    from sensor_renderer.drawn_links import Link
     from sensor_renderer.light import Light
-    from sensor_renderer.links import Link
     from sensor_renderer.mirror import Mirror
     from sensor_renderer.pinhole import Pinhole
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sensor_renderer import structured_light
+from sensor_renderer.camera_sensor import CameraSensor
 from sensor_renderer.exposure import Exposure, ExposureSettings
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.imager import Imager
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World, blended
 from sensor_renderer.pinhole import OPTICAL, Pinhole
@@ -110,10 +110,10 @@ def red(picture):
 
 def test_what_moves_is_blurred_along_its_way_and_the_stamp_is_the_middle(passing):
     camera = CameraElement("eye", PINHOLE, OPTICAL, "rgb8", 0.0)
-    imager, now = Imager(camera), Moment(passing, "eye", "eye", 0.04)
-    sharp = imager.taken(now.at(0.03), True, False)[1]
-    imager.exposure = ExposureSettings(exposure_time=0.02, blur_pictures=16)
-    middle, blurred, depth = imager.taken(now, True, True)
+    sensor, now = CameraSensor(camera), Moment(passing, "eye", "eye", 0.04)
+    sharp = sensor.taken(now.at(0.03), True, False)[1]
+    sensor.exposure = ExposureSettings(exposure_time=0.02, blur_pictures=16)
+    middle, blurred, depth = sensor.taken(now, True, True)
     assert middle.time_s == pytest.approx(0.03) and depth[120, 160] == pytest.approx(1.0, abs=1e-3)
     pixels_m = PINHOLE.fx / 1.0
     assert red(sharp)[0] == pytest.approx(0.1 * pixels_m, abs=2) and red(sharp)[1] == pytest.approx(159.5, abs=1.0)
@@ -127,13 +127,13 @@ def test_what_stands_still_is_drawn_once(passing, monkeypatch):
     calls = []
     true = passing.renderer.render
     monkeypatch.setattr(passing.renderer, "render", lambda *arguments: calls.append(1) or true(*arguments))
-    imager = Imager(CameraElement("eye", PINHOLE, OPTICAL, "rgb8", 0.0))
-    imager.exposure = ExposureSettings(exposure_time=0.02)
+    sensor = CameraSensor(CameraElement("eye", PINHOLE, OPTICAL, "rgb8", 0.0))
+    sensor.exposure = ExposureSettings(exposure_time=0.02)
     still = np.array([0, 0, 0, 0, 0, 0, 1.0, 1.05, 0, 0, 0, 0, 0, 1.0])
     passing.forget()
     for step in range(11):
         passing.remember(0.004 * step, still, 0.1)
-    imager.taken(Moment(passing, "eye", "eye", 0.04), True, False)
+    sensor.taken(Moment(passing, "eye", "eye", 0.04), True, False)
     assert len(calls) == 1
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lab_testing.meshes import sphere
+from sensor_renderer.drawn_links import Link, visible
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.links import Link, visible
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.sides import Sides, indexed

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
-from bullet_sim.limited import LimitedProcess, LimitError
+from bullet_sim.limited_process import LimitedProcess, LimitError
 from world_picture.drawing import LIMITS, DrawingCache
 
 #: Smaller files are waited for, within :data:`PATIENCE_S`: one of this size [bytes] has about 100,000 triangles, and

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bullet_sim.limited import LimitedProcess, LimitError
+from bullet_sim.limited_process import LimitedProcess, LimitError
 from bullet_sim.mesh_loading import MAX_BYTES, MAX_BYTES_BESIDE, WHOLE
 from disk_cache.files import DRAFT, remove_drafts, spare_folder, try_room
 from urdf_model import read_file
@@ -84,7 +84,7 @@ class DrawingCache:
 
     def __init__(self, folder: str | os.PathLike[str] | None = None, process: LimitedProcess | None = None) -> None:
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``; ``process``: a
-        ``bullet_sim.limited.LimitedProcess``, by default one for all caches of this program."""
+        ``bullet_sim.limited_process.LimitedProcess``, by default one for all caches of this program."""
         self._process = process
         self._folder = Path(folder or cache_folder(_FOLDER))
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from bullet_sim.limited import LimitedProcess, LimitError
+from bullet_sim.limited_process import LimitedProcess, LimitError
 from lab_testing.meshes import sphere
 from lab_testing.waiting import wait_until
 from world_picture import background, drawing

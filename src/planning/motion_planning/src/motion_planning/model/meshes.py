@@ -78,7 +78,7 @@ def _triangles(file: str | Path) -> TriangleMesh:
 
 def _made(path: str | Path) -> TriangleMesh:
     """The TriangleMesh of a file, read now. Raises ValueError, OSError."""
-    from bullet_sim.limited import MESHES, LimitError  # loads PyBullet
+    from bullet_sim.limited_process import MESHES, LimitError  # loads PyBullet
 
     handle, target = tempfile.mkstemp(prefix="motion_planning_", suffix=".npz")
     os.close(handle)

@@ -22,10 +22,10 @@ from baxter_sim_hardware.errors import HardwareError
 from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, CaptureSettings, Rack
 from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer import convert
+from sensor_renderer.camera_sensor import CameraSensor
 from sensor_renderer.camera_settings import CameraSettings
 from sensor_renderer.drivers import Driver
 from sensor_renderer.errors import SensorError
-from sensor_renderer.imager import Imager
 from sensor_renderer.lens import Lens
 from sensor_renderer.topics import ColourTopics, LearningTopics
 from sim_time.pace import Pace
@@ -185,8 +185,8 @@ class BaxterCamera(Driver):
             [self.name("%s/%s" % (self.camera_name, name)) for name in ("camera_info", "camera_info_std")])
         distortion = self._camera.distortion
         lens = Lens(pinhole, distortion) if any(distortion) else None
-        imager = Imager(self._camera._replace(pinhole=pinhole, lens=lens), self.seed(self.camera_name))
-        self._use = topics, settings, imager, convert.camera_info(settings.turned(pinhole), 0.0, distortion)
+        sensor = CameraSensor(self._camera._replace(pinhole=pinhole, lens=lens), self.seed(self.camera_name))
+        self._use = topics, settings, sensor, convert.camera_info(settings.turned(pinhole), 0.0, distortion)
         self._pace = Pace(settings.rate)
         self._apply(self._settings)
         self.topics = [*topics.all, self._learning]
@@ -201,12 +201,12 @@ class BaxterCamera(Driver):
         use = self._use
         if use is None:
             return  # closed by a client since the node asked
-        topics, settings, imager, info = use
-        middle, picture, _ = imager.taken(moment, topics.want_picture, False)
+        topics, settings, sensor, info = use
+        middle, picture, _ = sensor.taken(moment, topics.want_picture, False)
         if picture is not None:
-            picture = settings.developed(self._optics.seen(picture, imager.camera.pinhole, middle.time_s))
+            picture = settings.developed(self._optics.seen(picture, sensor.camera.pinhole, middle.time_s))
         topics.publish(middle.time_s, self._frame, picture, self._encoding, info)
-        self._learning.publish(middle, imager.camera, self._frame, settings.turns)
+        self._learning.publish(middle, sensor.camera, self._frame, settings.turns)
 
     def close(self) -> None:
         self._settings.close()

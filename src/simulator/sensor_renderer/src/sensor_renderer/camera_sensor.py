@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sensor_renderer.sensor_element import CameraElement
 
 
-class Imager:
+class CameraSensor:
     """Takes the pictures of one :class:`sensor_renderer.sensor_element.CameraElement`. ``exposure``: its
     :class:`sensor_renderer.exposure.ExposureSettings`, which may be replaced at any time."""
 

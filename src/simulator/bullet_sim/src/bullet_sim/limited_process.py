@@ -35,7 +35,7 @@ _NICENESS = 5
 # A call that has used less of a processor than this part of the wall time does nothing; on a busy machine, a process of
 # the lowest priority has more.
 _WORKS_SHARE = 0.002
-_START = "from bullet_sim.limited import serve; serve()"
+_START = "from bullet_sim.limited_process import serve; serve()"
 
 
 class LimitError(Exception):

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from bullet_sim.limited import LimitedProcess, LimitError
+from bullet_sim.limited_process import LimitedProcess, LimitError
 from lab_testing.waiting import wait_until
 
 
