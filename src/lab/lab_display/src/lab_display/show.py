@@ -184,6 +184,10 @@ def _frames(buffer: tf2_ros.Buffer) -> dict[str, str]:
 
 
 def _transform(buffer: tf2_ros.Buffer, target: str, source: str) -> np.ndarray:
+    for name in (target, source):
+        if "\0" in name:  # where tf2's library raises an error that does not name it
+            raise ShowError("%r is not a frame: it has a zero in it" % name)
+
     def known() -> bool:
         return bool(buffer.can_transform_core(target, source, rospy.Time())[0])
 

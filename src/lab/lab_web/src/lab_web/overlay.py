@@ -116,7 +116,7 @@ class Overlay:
         base, pose = self._graph.base(), self._graph.pose(message.header.frame_id)
         try:
             if base is None or pose is None:
-                raise CloudError("tf does not know its frame %s" % message.header.frame_id)
+                raise CloudError("tf does not know its frame %r" % message.header.frame_id)
             data, wrong = packed(*points_of(message), base @ pose), ""
         except CloudError as error:
             data, wrong = b"", "%s: %s" % (topic, error)

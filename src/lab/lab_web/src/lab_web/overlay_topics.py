@@ -56,7 +56,8 @@ class OverlayTopics:
         """A frame in the robot's base frame (4 x 4), or None where tf does not know it."""
         try:
             found = self._tf().lookup_transform(BASE_FRAME, frame.lstrip("/"), rospy.Time()).transform
-        except tf2_ros.TransformException:  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
+        # ValueError: a name with a zero in it.
+        except (tf2_ros.TransformException, ValueError):  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
             return None
         turn, move = found.rotation, found.translation
         return rigid(matrix_from_quaternion((turn.x, turn.y, turn.z, turn.w)), (move.x, move.y, move.z))

@@ -4,10 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import rospy
+import tf2_ros
 
 from lab_web.clouds import MARK
 from lab_web.lab import RobotError
 from lab_web.overlay import CLOUD_S, Overlay
+from lab_web.overlay_topics import OverlayTopics
 
 
 def cloud(frame="camera", count=2):
@@ -86,7 +89,7 @@ def test_what_is_wrong_is_told_once(scene):
         scene.now += CLOUD_S
         scene.graph.taken["/kinect/points"](cloud("attic"))
     scene.overlay.settle()
-    assert scene.told[1:] == [(1, "refused", "/kinect/points: tf does not know its frame attic")]
+    assert scene.told[1:] == [(1, "refused", "/kinect/points: tf does not know its frame 'attic'")]
     with pytest.raises(RobotError, match="must be"):
         scene.overlay.watch(1, {"points": 3})
 
@@ -101,3 +104,11 @@ def test_frames_that_tf_knows_go_to_the_pages_that_want_them(scene):
     scene.graph.lifted = None
     scene.overlay.send_frames()
     assert len(scene.answers) == 1
+
+
+@pytest.mark.parametrize("frame", ["attic", "at\0tic", ""])
+def test_a_frame_that_is_none_has_no_pose(monkeypatch, frame):
+    """tf2's library raises an error of its own for a name with a zero."""
+    topics, core = OverlayTopics(lambda: None), tf2_ros.BufferCore(rospy.Duration(10))
+    monkeypatch.setattr(topics, "_tf", lambda: SimpleNamespace(lookup_transform=core.lookup_transform_core))
+    assert topics.pose(frame) is None

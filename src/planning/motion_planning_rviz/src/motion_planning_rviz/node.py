@@ -170,6 +170,8 @@ class PanelNode:
         frame = frame.lstrip("/")
         if frame in ("", self._model.root):
             return np.eye(4)
+        if "\0" in frame:  # where tf2's library raises an error that does not name it
+            raise InteractionError("%r is not a frame: it has a zero in it" % frame)
         if self._buffer is None:
             self._buffer = tf2_ros.Buffer()
             self._listener = tf2_ros.TransformListener(self._buffer)

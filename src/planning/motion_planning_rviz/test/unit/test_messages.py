@@ -2,12 +2,16 @@
 """Markers and what is read from messages."""
 import numpy as np
 import pytest
+import rospy
+import tf2_ros
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, DisplayTrajectory, ObjectColor, PlanningScene
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 from visualization_msgs.msg import InteractiveMarkerControl, Marker, MenuEntry
 
 from motion_planning_rviz import drawing, handles, menu, messages
+from motion_planning_rviz.interaction import InteractionError
+from motion_planning_rviz.node import PanelNode
 from urdf_model import Box
 from urdf_model.transforms import pose_matrix
 
@@ -107,3 +111,11 @@ def test_menu_entries_come_back_by_number():
     found = handles.menu_entries(entries)
     assert [entry.id for entry in found] == [entry.number for entry in entries]
     assert {entry.command_type for entry in found} == {MenuEntry.FEEDBACK}
+
+
+def test_a_frame_with_a_zero_is_refused_at_once_by_name(probot):
+    """tf2's library raises an error of its own for such names."""
+    node = object.__new__(PanelNode)
+    node._model, node._buffer = probot, tf2_ros.BufferCore(rospy.Duration(10))
+    with pytest.raises(InteractionError, match=r"^'no\\x00where' is not a frame"):
+        node._in_root("no\0where")

@@ -13,6 +13,7 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
 from lab_testing.waiting import wait_until
+from motion_planning.errors import PlanningError
 from motion_planning.model import PlanningModel
 from moveit_ros_move_group import monitor as module
 from moveit_ros_move_group.monitor import SceneMonitor
@@ -154,3 +155,14 @@ def test_joint_states_of_unequal_lists_are_left_out(make):
     monitor = make()
     monitor._on_joint_state(JointState(name=["turn", "reach"], position=[1.0]))
     assert monitor.joint_values() == {}
+
+
+def test_a_frame_with_a_zero_is_refused_at_once_by_name(make, monkeypatch):
+    """tf2's library raises an error of its own for such names."""
+    monkeypatch.setattr(module, "_FRAME_TIMEOUT_S", PATIENCE_S)
+    monitor = make()
+    with pytest.raises(PlanningError, match=r"^'no\\x00where' is not a frame"):
+        monitor.tf_frame("no\0where")
+    assert monitor.apply(scene(box("crate", "no\0where"), box("tray", "world")), "test") == [
+        "ADD of collision object 'crate' refused: 'no\\x00where' is not a frame: it has a zero in it"]
+    assert list(monitor.scene().objects) == ["tray"]

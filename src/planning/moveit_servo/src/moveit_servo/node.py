@@ -181,8 +181,6 @@ class ServoNode:
             since = -math.inf
         frame = header.frame_id.lstrip("/")
         try:
-            if "\0" in frame:  # tf's library has an error of its own for it
-                raise CommandIgnored("%r is not a frame, it has a zero in it" % frame)
             # What tf alone knows is looked up once for each command, which keeps it.
             of_robot = not frame or frame in self.model.link_index or frame == self.model.frame
             place = frame if of_robot else self.monitor.tf_frame(frame)
@@ -437,7 +435,7 @@ def _is_topic(name: Any) -> bool:
 
 
 def _of_scene(scene: Any) -> tuple:
-    """What of a scene a Surroundings depends on; equal as long as nothing but joints has changed."""
+    """The parts of a scene that a Surroundings depends on; equal as long as nothing but joints has changed."""
     held = tuple((name, body.link, id(body)) for name, body in scene.state.attached.items())
     return (tuple(map(id, scene.objects.values())), id(scene.octomap), id(scene.allowed), held,
             tuple(scene.link_padding.items()), tuple(scene.link_scale.items()), scene.state.base.tobytes())

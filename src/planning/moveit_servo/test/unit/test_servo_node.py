@@ -51,9 +51,7 @@ def node(monkeypatch):
         log.append(text % parts if parts else text)
 
     def tf_frame(name):
-        if "\0" in name:  # as tf2's library does
-            raise ValueError("embedded null character")
-        raise PlanningError("there is no frame '%s'" % name)
+        raise PlanningError("there is no frame %r" % name)
     monkeypatch.setattr(module, "rospy", SimpleNamespace(
         Publisher=Topic, Subscriber=nothing, Service=nothing, get_param=lambda name, default: default,
         get_time=lambda: 5.0, get_name=lambda: "/lab/servo_server", is_shutdown=lambda: True, logwarn=say,

@@ -39,7 +39,7 @@ class TransformSource:
         """The newest pose (4, 4) of the frame ``source`` in ``target``, or None where it is not known."""
         try:
             found = self._buffer.lookup_transform_core(target, source, Time(0)).transform
-        except TransformException:
+        except (TransformException, ValueError):  # ValueError: a name with a zero in it
             return None
         turn, shift = found.rotation, found.translation
         return rigid(matrix_from_quaternion((turn.x, turn.y, turn.z, turn.w)), (shift.x, shift.y, shift.z))

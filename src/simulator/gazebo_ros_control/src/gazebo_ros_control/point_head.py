@@ -155,7 +155,7 @@ class PointHead(GoalController):
             if self._time_s - self._asked_s > LATE_S:
                 self._waiting = None
                 self._stop_listening()
-                handle.reject(text="the target's frame '%s' is no link of the robot, nor connected with one by tf"
+                handle.reject(text="the target's frame %r is no link of the robot, nor connected with one by tf"
                                    % frame)
             return
         self._waiting = None

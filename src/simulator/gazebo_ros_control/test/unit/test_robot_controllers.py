@@ -305,10 +305,12 @@ def test_a_point_in_another_frame_waits_for_its_transform(robot):
 
 
 def test_a_frame_that_nobody_knows_and_a_point_that_is_none_are_rejected(robot):
-    goal = robot.look("nowhere", (1.0, 0.0, 0.0))
-    robot.run(1.2)
-    assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
-    assert "frame 'nowhere' is no link of the robot" in robot.ros.publishers[POINT + "/result"].messages[-1].status.text
+    for frame, written in (("nowhere", "'nowhere'"), ("no\0where", "'no\\x00where'")):
+        goal = robot.look(frame, (1.0, 0.0, 0.0))
+        robot.run(1.2)
+        assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
+        text = robot.ros.publishers[POINT + "/result"].messages[-1].status.text
+        assert "frame %s is no link of the robot" % written in text
     for x in (math.nan, -math.inf, 1e308):
         goal = robot.look("base_link", (x, 0.0, 0.0))
         robot.run(0.01)

@@ -51,8 +51,9 @@ class Proxy:
             return
         try:
             found = self._buffer.lookup_transform(self._frame, one.header.frame_id.lstrip("/"), rospy.Time(0)).transform
-        except tf2_ros.TransformException as error:  # pyright: ignore[reportAttributeAccessIssue]
-            rospy.logwarn_throttle(10.0, "marker %s stays in frame %s: %s", one.name, one.header.frame_id, error)
+        # ValueError: a name with a zero in it.
+        except (tf2_ros.TransformException, ValueError) as error:  # pyright: ignore[reportAttributeAccessIssue]
+            rospy.logwarn_throttle(10.0, "marker %s stays in frame %r: %s", one.name, one.header.frame_id, error)
             return
         move, turn, place, orientation = found.translation, found.rotation, one.pose.position, one.pose.orientation
         position, quaternion = moved((move.x, move.y, move.z), (turn.x, turn.y, turn.z, turn.w),
