@@ -263,6 +263,9 @@ def _run(faults: list[Fault], trial: Trial, out: Path | None) -> int:
 
 
 if __name__ == "__main__":
+    # A script's background job ignores Ctrl-C, and an end by SIGTERM would leave the tests of a fault running.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         sys.exit(main(sys.argv[1:]))
     except KeyboardInterrupt:

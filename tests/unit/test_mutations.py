@@ -2,10 +2,14 @@
 """tests/mutations: every fault fits the code as it is; the runner tells found from survived and leaves no trace."""
 
 import importlib.util
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from lab_testing.waiting import stretched, wait_until
 
 MUTATIONS = Path(__file__).resolve().parents[1] / "mutations"
 sys.path.insert(0, str(MUTATIONS))
@@ -150,6 +154,28 @@ def test_a_fault_that_hangs_is_found_and_its_processes_end(workspace, trial, mon
         "print('1 passed, 0 failed, 0 skipped, 0 long not run')\n")
     monkeypatch.setenv("PROBE_OF_THIS_TEST", str(workspace))
     assert run.Trial(workspace, limit_s=4.0).run(WRONG_SIGN).outcome == outcome
+    assert run.processes.marked(str(workspace), "PROBE_OF_THIS_TEST") == {}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_its_tests_end_with_it(workspace, trial, monkeypatch, tmp_path, tmp_path_factory, number):
+    """Also in a script's background job, where Ctrl-C is ignored."""
+    began = tmp_path_factory.mktemp("beside") / "began"  # not in the workspace, over which the overlay is
+    (workspace / "tools/run_tests.py").write_text(
+        f"import pathlib, time\npathlib.Path({str(began)!r}).touch()\ntime.sleep(600)\n")
+    (tmp_path / "list.yaml").write_text(
+        "- {id: sign, file: src/alpha/code_of_alpha.py, kind: sign, seen: zeros, by: unit, tests: [alpha], old: x + x,"
+        " new: x - x}\n")
+    monkeypatch.setenv("PROBE_OF_THIS_TEST", str(workspace))
+    command = [sys.executable, str(MUTATIONS / "run.py"), "--root", str(workspace), "--faults",
+               str(tmp_path / "list.yaml")]
+    with subprocess.Popen(command, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN)) as running:
+        try:
+            wait_until(began.exists, "the fault's tests to begin", stretched(30.0))
+            running.send_signal(number)
+            assert running.wait(stretched(30.0)) == 130
+        finally:
+            running.kill()
     assert run.processes.marked(str(workspace), "PROBE_OF_THIS_TEST") == {}
 
 
