@@ -74,7 +74,9 @@ class Model(Body):
         count = len(joints)
         self._all = list(range(count))
         self._packing = struct.Struct("%dd" % (3 * count))
-        self._told = None  # bytes of the last `drive_position`, if no other drive has come since
+        # Of the last `drive_position` of some joints, as bytes, if no other drive of one of them has come since: the
+        # joints -> (their numbers, the rest).
+        self._told: dict[bytes, tuple[frozenset[int], list[bytes | None]]] = {}
         self._reading, self._read_at = None, -1  # the last result of `read_joints`, and the number of steps then
         self._sizes = 0.0, 0.0, 0.0  # lengths of Bullet's vectors of positions, velocities and efforts then
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
@@ -139,9 +141,11 @@ class Model(Body):
         ``position`` is the set-point at the end of the step. With ``velocity`` (k,), the set-point's own velocity, a
         moving set-point is followed without lag.
         """
-        told = [None if values is None else values.tobytes() for values in (index, position, max_effort, velocity)]
-        if told == self._told:
-            return  # Bullet's motors keep what they were told, and a robot at rest is told the same at each tick
+        joints = index.tobytes()
+        told = [None if values is None else values.tobytes() for values in (position, max_effort, velocity)]
+        before = self._told.get(joints)
+        if before is not None and before[1] == told:
+            return  # Bullet's motors keep what they were told, and joints at rest are told the same at each tick
         self._drive_otherwise(index)
         gains = len(index)
         if velocity is not None:
@@ -158,11 +162,13 @@ class Model(Body):
             positionGains=[POSITION_GAIN] * gains,
             velocityGains=[1.0] * gains,
         )
-        self._told = told
+        if before is None:
+            self._forget(index)
+        self._told[joints] = (frozenset(index.tolist()) if before is None else before[0], told)
 
     def drive_velocity(self, index: np.ndarray, velocity: np.ndarray, max_effort: np.ndarray) -> None:
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
-        self._told = None
+        self._forget(index)
         self._drive_otherwise(index)
         velocity = velocity.tolist()
         self._refuse_nan(index, velocity, "velocity")
@@ -236,7 +242,7 @@ class Model(Body):
 
     def step_changed(self) -> None:
         """For World: the length of a tick has changed."""
-        self._told = None  # Bullet turns the greatest effort into an impulse of a tick
+        self._told.clear()  # Bullet turns the greatest effort into an impulse of a tick
         self._damping.step_changed(self._world.time_step_s)
         if self.springs is not None:
             self.springs.step_changed(self._world.time_step_s)
@@ -492,6 +498,12 @@ class Model(Body):
             self._turned_gravity = None if np.allclose(turned, self._world.gravity, atol=1e-9) else turned.tolist()
             self._gravity_key = key
         return self._turned_gravity
+
+    def _forget(self, index: np.ndarray) -> None:
+        """Note that joints ``index`` (k,) are told something else than by the last ``drive_position``."""
+        if self._told:
+            joints = index.tolist()
+            self._told = {key: kept for key, kept in self._told.items() if kept[0].isdisjoint(joints)}
 
     def _drive_otherwise(self, index: np.ndarray) -> None:
         """Note that joints ``index`` (k,) are no longer driven by efforts."""

@@ -448,7 +448,8 @@ class Arms:
         # The joints have not made this tick's step yet.
         lead = points.output - points.output_rate * self._dt - measured.position
         far = np.abs(lead) > self._reach_rad
-        offset = np.clip(lead[far], -self._reach_rad, self._reach_rad) - lead[far]
+        # In some modes at every tick, and a quarter of the time of numpy's clip.
+        offset = np.minimum(np.maximum(lead[far], -self._reach_rad), self._reach_rad) - lead[far]
         points.position[far] += offset
         points.output[far] += offset
         self._smoothing.shift(far, offset)
@@ -457,7 +458,8 @@ class Arms:
         points.output_rate[far] = measured.velocity[far]
         # A braking joint that slips stays where it stops; going back would be a motion without a command.
         slipped = far & points.braking
-        points.target[slipped] = self._resting_point()[slipped]
+        if _any(slipped):
+            points.target[slipped] = self._resting_point()[slipped]
 
     def _resting_point(self) -> np.ndarray:
         """(n,) [rad] where the set-points come to rest if they brake now."""
