@@ -43,8 +43,9 @@ class ActionClient:
         self._client.send_goal(goal)
 
     def is_done(self) -> bool:
-        """Tell whether the last goal has its verdict."""
-        return self._client.get_state() not in (GoalStatus.PENDING, GoalStatus.ACTIVE)
+        """Tell whether the last goal has its verdict and its result."""
+        # The goal's status, a topic of its own, may say that it succeeded before the result is there.
+        return self._client.simple_state == actionlib.SimpleGoalState.DONE
 
     def wait(self, timeout_s: float) -> Any:
         """Wait for the last goal's verdict, `timeout_s` [ROS time] at most, and return its result.
