@@ -43,7 +43,9 @@ class SecondLaunch(unittest.TestCase):
         second = subprocess.run([ROSLAUNCH, LAB, "mark:=second"], env=self.environment, capture_output=True,
                                 text=True, timeout=DEADLINE_S, check=False)
         self.assertEqual(second.returncode, 1, second.stdout)
-        self.assertEqual(len(second.stderr.splitlines()), 3, second.stderr)
+        # Two that start at once may want to make the link to the newest logs at the same time.
+        said = [line for line in second.stderr.splitlines() if "symlink to latest log directory" not in line]
+        self.assertEqual(len(said), 3, second.stderr)
         self.assertIn("/gazebo", second.stderr)
         self.assertIn("To stop it", second.stderr)
         self.assertNotIn("process[", second.stdout)
