@@ -93,6 +93,19 @@ def test_groups_in_a_circle_are_dropped_and_those_that_name_them(robot):
     assert list(srdf.groups) == ["ok"] and len(srdf.warnings) == 3
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_group_with_a_mobile_base_keeps_its_other_joints(robot, order):
+    """As PR2's whole_body: a group of the virtual joint, one of that group, and one of it and an arm."""
+    groups = ['<group name="base"><joint name="v"/></group>', '<group name="drive"><group name="base"/></group>',
+              '<group name="arm"><joint name="a"/></group>',
+              '<group name="body"><group name="drive"/><group name="arm"/><group name="base"/></group>']
+    joint = '<virtual_joint name="v" type="planar" parent_frame="odom" child_link="base"/>'
+    srdf = parse_srdf('<robot name="two">%s%s</robot>' % (joint, "".join(groups[::order])), robot)
+    assert set(srdf.groups) == {"arm", "body"} and srdf.groups["body"].subgroups == ("arm",)
+    for words in ("'v' is a virtual joint", "left out of group 'drive'", "left out of group 'body'"):
+        assert any(words in warning for warning in srdf.warnings)
+
+
 @pytest.mark.parametrize("text", [
     "", "<robot", "<sdf/>", "<!DOCTYPE r [<!ENTITY e 'x'>]><robot name='two'>&e;</robot>"])
 def test_what_is_no_srdf_is_refused(robot, text):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from motion_planning.errors import PlanningError
@@ -53,6 +54,7 @@ class _Reader:
     def __init__(self, root: Element, robot: Robot, source: str) -> None:
         self.root, self.robot, self.source = root, robot, source
         self.srdf = Srdf(root.get("name") or robot.name)
+        self.unplanned: set[str] = set()  # groups of which nothing is planned for
 
     def read(self) -> Srdf:
         if self.srdf.name != self.robot.name:
@@ -112,13 +114,15 @@ class _Reader:
             if item not in found[part.tag]:
                 found[part.tag].append(item)
         if not any(found.values()):
+            if any(part.get("name") in self.virtual_names() for part in element.iterchildren("joint")):
+                self.unplanned.add(name)
             raise _Skip("group '%s' is empty" % name)
         self.srdf.groups[name] = GroupEntry(name, tuple(found["link"]), tuple(found["joint"]), tuple(found["chain"]),
                                             tuple(found["group"]), element.sourceline)
 
     def member_joint(self, element: Element) -> str:
         name = _attribute(element, "name")
-        if name in {joint.name for joint in self.srdf.virtual_joints}:
+        if name in self.virtual_names():
             raise _Skip("'%s' is a virtual joint, which is not planned for" % name)
         return self.joint(element, "name")
 
@@ -132,8 +136,29 @@ class _Reader:
             raise _Skip("the chain from '%s' to itself holds no joint" % base)
         return base, tip
 
+    def virtual_names(self) -> set[str]:
+        return {joint.name for joint in self.srdf.virtual_joints}
+
+    def leave_out_unplanned(self) -> None:
+        """Take groups of virtual joints alone, such as a mobile base, out of those that contain them."""
+        groups = self.srdf.groups
+        while self.unplanned:
+            unplanned = self.unplanned.pop()
+            for name, group in list(groups.items()):
+                if unplanned not in group.subgroups:
+                    continue
+                rest = replace(group, subgroups=tuple(sub for sub in group.subgroups if sub != unplanned))
+                groups[name] = rest
+                self.srdf.warnings.append(
+                    "%s, line %d: nothing in group '%s' is planned for; it is left out of group '%s'"
+                    % (self.source, group.line, unplanned, name))
+                if not (rest.links or rest.joints or rest.chains or rest.subgroups):
+                    del groups[name]
+                    self.unplanned.add(name)
+
     def drop_unresolved_groups(self) -> None:
         """Skip groups with unknown subgroups, and groups that contain themselves."""
+        self.leave_out_unplanned()
         groups, known = self.srdf.groups, set()
         while True:
             new = {name for name, group in groups.items() if name not in known and known.issuperset(group.subgroups)}
