@@ -67,12 +67,13 @@ class Context:
         return self.model.groups[name]
 
     def scene_from(self, state: RobotState, request: str) -> Scene:
-        """Return the scene with the robot in the RobotState of a request, over where it is now.
+        """Return the scene with the robot in the RobotState of a request, over where it is now or a scene message has
+        placed it since its joints moved.
 
         Raises RequestError for one that cannot be understood. A state without joints that is not a diff is taken for
         the current one with a warning: many clients forget the flag.
         """
-        scene, errors = self.monitor.scene(), []
+        scene, errors = self.monitor.scene(as_told=True), []
         empty = not (state.joint_state.name or state.multi_dof_joint_state.joint_names)
         if empty and not state.is_diff and not state.attached_collision_objects:
             rospy.logwarn_throttle(60.0, "%s: the robot state is empty and no diff; taken as the current state"

@@ -61,6 +61,8 @@ class SceneMonitor:
         self._changing, self._lock, self._news = threading.RLock(), threading.RLock(), threading.Condition()
         self._scene, self._octomap = Scene(model), None
         self._values, self._stamps, self._updates = {}, {}, 0
+        # Joints that a scene message has placed since any joint has moved.
+        self._placed: set[str] = set()
         self._base, self._newest_stamp = np.eye(4), rospy.Time()
         self._listeners, self._clear_sensors = [], lambda: None
         self._asking = threading.local()
@@ -91,13 +93,18 @@ class SceneMonitor:
 
     # -- the scene ----------------------------------------------------------------------------------------------
 
-    def scene(self) -> Scene:
-        """The Scene with the robot where it is now, joints without a joint state where the scene had them."""
+    def scene(self, as_told: bool = False) -> Scene:
+        """The Scene with the robot where it is now, joints without a joint state where the scene had them.
+
+        as_told: joints that a scene message has placed stay there until a joint moves, as in MoveIt; for requests that
+        move nothing.
+        """
         with self._lock:
             scene = self._scene
             q = scene.state.q.copy()
             for name, value in self._values.items():
-                q[self.model.index[name]] = value
+                if not (as_told and name in self._placed):
+                    q[self.model.index[name]] = value
             state = scene.state.with_q(self._onto_limits(q))
             return scene.with_state(state.with_base(self._robot_base(state.base)))
 
@@ -109,8 +116,14 @@ class SceneMonitor:
     def apply(self, message: PlanningScene, request: str) -> list[str]:
         """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
         # The poses of attached objects depend on the robot's posture.
-        return self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request,
-                            message.world.octomap)
+        errors = self._change(lambda _: self.reader.with_planning_scene(self.scene(as_told=True), message), request,
+                              message.world.octomap)
+        joints = message.robot_state.joint_state
+        with self._lock:
+            q = self._scene.state.q
+            self._placed |= {name for name, value in zip(joints.name, joints.position, strict=False)
+                             if name in self.model.index and q[self.model.index[name]] == value}
+        return errors
 
     def clear_octomap(self) -> None:
         self._clear_sensors()
@@ -176,7 +189,7 @@ class SceneMonitor:
         self._change(lambda scene: (self.reader.with_collision_object(scene, message), []), "collision_object")
 
     def _on_attached(self, message: AttachedCollisionObject) -> None:
-        self._change(lambda _: (self.reader.with_attached_object(self.scene(), message), []),
+        self._change(lambda _: (self.reader.with_attached_object(self.scene(as_told=True), message), []),
                      "attached_collision_object")
 
     def _on_world(self, message: PlanningSceneWorld) -> None:
@@ -243,6 +256,8 @@ class SceneMonitor:
                 self._stamps.clear()  # time has gone back, as by a reset of the simulation
             for name, value in zip(message.name, message.position, strict=True):
                 if name in self.model.index and math.isfinite(value):
+                    if self._placed and value != self._values.get(name, value):
+                        self._placed.clear()
                     self._values[name], self._stamps[name] = value, stamp
             self._newest_stamp = stamp
             self._updates += 1

@@ -166,3 +166,32 @@ def test_a_frame_with_a_zero_is_refused_at_once_by_name(make, monkeypatch):
     assert monitor.apply(scene(box("crate", "no\0where"), box("tray", "world")), "test") == [
         "ADD of collision object 'crate' refused: 'no\\x00where' is not a frame: it has a zero in it"]
     assert list(monitor.scene().objects) == ["tray"]
+
+
+def test_a_state_that_a_scene_message_tells_stays_until_a_joint_moves(make):
+    """Clients put the robot somewhere by a scene and ask for plans from there; what moves the robot knows better."""
+    monitor = make()
+    turn = monitor.model.index["turn"]
+
+    def told_and_measured():
+        return monitor.scene(as_told=True).state.q[turn], monitor.scene().state.q[turn]
+
+    monitor._on_joint_state(JointState(name=["turn"], position=[0.25]))
+    message = scene(box("crate", "world"))
+    message.robot_state.is_diff = True
+    message.robot_state.joint_state.name, message.robot_state.joint_state.position = ["turn", "nobody"], [1.0, 2.0]
+    assert monitor.apply(message, "test") == [] and told_and_measured() == (1.0, 0.25)
+    monitor._on_joint_state(JointState(name=["turn"], position=[0.25]))
+    assert monitor.apply(scene(box("tray", "world")), "test") == [] and told_and_measured() == (1.0, 0.25)
+    monitor._on_joint_state(JointState(name=["turn"], position=[0.5]))
+    assert told_and_measured() == (0.5, 0.5)
+
+
+def test_a_state_that_is_refused_places_no_joint(make):
+    monitor = make()
+    turn = monitor.model.index["turn"]
+    monitor._on_joint_state(JointState(name=["turn"], position=[0.25]))
+    message = scene()
+    message.robot_state.joint_state.name, message.robot_state.joint_state.position = ["turn"], [float("nan")]
+    assert "not finite" in monitor.apply(message, "test")[0]
+    assert monitor.scene(as_told=True).state.q[turn] == 0.25

@@ -38,7 +38,7 @@ class GetScene:
     @answered("get_planning_scene", GetPlanningSceneResponse)
     def _serve(self, request: GetPlanningSceneRequest, response: GetPlanningSceneResponse) -> None:
         monitor = self.context.monitor
-        response.scene = scene_message(monitor.scene(), request.components.components, monitor.octomap(),
+        response.scene = scene_message(monitor.scene(as_told=True), request.components.components, monitor.octomap(),
                                        monitor.state_stamp())
 
 
