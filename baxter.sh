@@ -183,10 +183,10 @@ asks_only() {
     return 1
 }
 
-# refuse_words MODE WORD…: what the mode's program would refuse after set-up, where a Python is there to read its source.
+# refuse_words MODE WORD…: those that the mode's program would refuse after set-up, where a Python is there to ask it.
 refuse_words() {
     if [[ -x /usr/bin/python3 && $(uname -s) != Darwin ]]; then
-        /usr/bin/python3 -I "$LAB_ROOT/tools/arguments.py" "$LAB_ROOT" "$@" </dev/null
+        /usr/bin/python3 -I -S "$LAB_ROOT/tools/arguments.py" "$LAB_ROOT" "$@" </dev/null
     fi
 }
 

@@ -10,7 +10,7 @@ import urllib.request
 import uuid
 from pathlib import Path
 
-from command_line.options import did_you_mean
+from command_line.options import Parser, did_you_mean
 from lab_tests import processes
 from lab_web import jupyter
 from processes import ports
@@ -98,17 +98,27 @@ def serve(page: str, first_port: int) -> int:
         processes.kill_all(run_id, processes.NOTEBOOK_MARKER)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(prog="./baxter.sh notebook", description=__doc__)
+def parse(argv: list[str]) -> argparse.Namespace:
+    """The options; ``path`` is that of the notebook, None for all."""
+    parser = Parser(prog="./baxter.sh notebook", description=__doc__)
     parser.add_argument("name", nargs="?", help="a part of a notebook's name; without it the list of all")
     parser.add_argument("--port", type=int, default=FIRST_PORT, help="the first port to try (default: %(default)s)")
     parser.add_argument("--list", action="store_true", help="print the notebooks and end")
-    options = parser.parse_args()
+    options = parser.parse_args(argv)
+    try:
+        options.path = find(options.name) if options.name and not options.list else None
+    except NotebookError as error:
+        parser.error(str(error))
+    return options
+
+
+def main() -> int:
+    options = parse(sys.argv[1:])
     try:
         if options.list:
             print("\n".join(f"{path.stem:40} {path.relative_to(ROOT)}" for path in notebooks()))
             return 0
-        page = f"/tree/{find(options.name).relative_to(ROOT)}" if options.name else ""
+        page = f"/tree/{options.path.relative_to(ROOT)}" if options.path else ""
         return serve(page, options.port)
     except NotebookError as error:
         print(f"baxter.sh notebook: {error}", file=sys.stderr)

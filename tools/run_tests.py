@@ -79,6 +79,21 @@ def separate_values(words: list[str]) -> list[str]:
     return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" else word for word in words]
 
 
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; ``rest``: names of tests and options of pytest; ``selection``: those that run, where no commit says
+    it. Paths count from the workspace, which becomes the current folder."""
+    made = parser()
+    options, options.rest = made.parse_known_args(separate_values(arguments))
+    os.chdir(ROOT)
+    if options.busy is not None and not options.rest and options.changed is None:
+        options.rest = list(MAIN_FLOWS)
+    try:
+        options.selection = select(take_inventory(ROOT), options.rest, ROOT) if options.changed is None else None
+    except SelectionError as error:
+        made.exit(2, f"{error}\n")
+    return options
+
+
 def pytest_words(selection: Selection, long: bool, stretch: float, workers: int) -> list[str]:
     words = ["-q", "-p", "lab_tests.plugin", f"--rootdir={ROOT}", f"-c{ROOT / 'pytest.ini'}", "--no-header",
              "--continue-on-collection-errors", f"--stretch={stretch:g}"]
@@ -108,10 +123,8 @@ def run(selection: Selection, options: argparse.Namespace) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    options, rest = parser().parse_known_args(separate_values(arguments))
     # In a script's background job Ctrl-C is ignored, also by every child; but tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    os.chdir(ROOT)
     # Some machines of continuous integration set it. A run starts a thousand Python programs, which would all compile
     # the same modules.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -120,10 +133,10 @@ def main(arguments: list[str]) -> int:
     sys.dont_write_bytecode = False
     # Workers import the plugin, tests import the tools.
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), os.environ.get("PYTHONPATH")]))
+    options = parse(arguments)
     try:
-        changed = None if options.changed is None else changed_files(ROOT, options.changed)
-        names = list(MAIN_FLOWS) if options.busy is not None and not rest and changed is None else []
-        selection = select(take_inventory(ROOT), [*rest, *names], ROOT, changed)
+        selection = options.selection or select(take_inventory(ROOT), options.rest, ROOT,
+                                                changed_files(ROOT, options.changed))
     except SelectionError as error:
         print(error, file=sys.stderr)
         return 2

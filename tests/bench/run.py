@@ -65,7 +65,8 @@ SUITES = {
 LIMIT_S, LIMIT_OF_ALL_S = 1200, 4500
 
 
-def main():
+def parse(argv: list[str]) -> argparse.Namespace:
+    """The options."""
     parser = Parser(prog="./baxter.sh bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="suites to run (default: all)")
     parser.add_argument("--rounds", type=int, default=5, help="number of rounds (default: 5)")
@@ -82,13 +83,22 @@ def main():
                         help="fidelity: fit the actuators' numbers to this arm instead, and test them on the other")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--number", type=int, default=0, help=argparse.SUPPRESS)
-    options = parser.parse_args()
+    options = parser.parse_args(argv)
     unknown = [name for name in options.names if name not in SUITES]
     if unknown:
         parser.error("unknown suite: %s; the suites are %s%s" % (", ".join(unknown), ", ".join(SUITES),
                                                                  did_you_mean(unknown[0], SUITES)))
     if options.rounds < 1:
         parser.error("--rounds must be at least 1, got %d" % options.rounds)
+    if options.recording is not None and not options.recording.is_file():
+        parser.error("--recording: there is no file %s" % options.recording)
+    if options.fit is not None and options.names != ["fidelity"]:
+        parser.error("--fit belongs to fidelity: ./baxter.sh bench fidelity --fit %s" % options.fit)
+    return options
+
+
+def main():
+    options = parse(sys.argv[1:])
     if options.list:
         for name, (_, about) in SUITES.items():
             print("%-10s %s" % (name, about))
@@ -96,16 +106,12 @@ def main():
     if options.child:
         return child(options)
     if options.recording is not None:
-        if not options.recording.is_file():
-            parser.error("--recording: there is no file %s" % options.recording)
         os.environ["BENCH_RECORDING"] = str(options.recording.resolve())
     if options.begin:
         os.environ["BENCH_FROM"] = str(options.begin)
     if options.all:
         os.environ["BENCH_ALL"] = "1"
     if options.fit is not None:
-        if options.names != ["fidelity"]:
-            parser.error("--fit belongs to fidelity: ./baxter.sh bench fidelity --fit %s" % options.fit)
         return fit(options)
     names = options.names or list(SUITES)
     options.out.mkdir(parents=True, exist_ok=True)

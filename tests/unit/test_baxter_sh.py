@@ -400,15 +400,16 @@ def fresh_clone(tmp_path_factory):
 
 
 REFUSED = {
-    "check": "which program", "check lab2": "your Python file", "check lab2 nowhere.py": "nowhere.py is not there",
-    "check lab2 .": "is no file", "check wave.py": "LAB [EXERCISE] PROGRAM", "check lab3 wave.py": "did you mean lab2?",
+    "check": "which program", "check lab2": "LAB [EXERCISE] PROGRAM",
+    "check lab2 nowhere.py": "nowhere.py is not there", "check lab2 .": "is a folder",
+    "check wave.py": "did you mean ./baxter.sh check lab2 wave.py?", "check lab3 wave.py": "did you mean lab2?",
     "check wave wave.py": "an exercise of lab2", "check lab2 wav wave.py": "did you mean wave?",
     "check lab2 wave.py --sed 3": "did you mean --seed?", "check lab2 wave.py --seed x": "a whole number from 0",
     "check --start wav": "did you mean wave?", "check --start": "--start",
-    "check lab2 wave.py --profile real": "robot", "check cwru wave wave.py": "no exercise 'wave'",
-    "grade": "which folder", "grade nowhere": "no folder or archive nowhere", "grade . lab4": "did you mean lab2?",
+    "check lab2 wave.py --profile real": "robot", "check cwru wave wave.py": "not of cwru",
+    "grade": "which folder", "grade nowhere": "neither a folder nor", "grade . lab4": "did you mean lab2?",
     "grade . lab2 wav": "did you mean wave?", "grade . --workers 0": "from 1",
-    "labs": "up, list", "labs downn": "did you mean down?", "labs up nowhere.csv": "nowhere.csv",
+    "labs": "up|list", "labs downn": "did you mean down?", "labs up nowhere.csv": "nowhere.csv",
     "learn": "Reach", "learn Lift": "TwoArmLift", "learn --judge nowhere.npz": "no nowhere.npz",
     "batch": "--list", "batch ik": "--seeds", "batch ikk --seeds 0:3": "did you mean ik?",
     "batch ik --seeds": "--seeds", "batch-node": "--listen", "batch-node --listen 10.0.0.1": "--head",
@@ -456,12 +457,9 @@ def test_what_may_be_right_is_not_refused_before_a_set_up(fresh_clone, words):
 
 def test_the_words_of_every_mode_with_a_program_are_judged():
     """A mode or a source that has moved would otherwise be judged by its program alone, without a word."""
-    script = f"""import sys; sys.argv[1:] = [{str(ROOT)!r}]; sys.path.insert(0, {str(ROOT / "tools")!r})
+    script = f"""import pathlib, sys; sys.path.insert(0, {str(ROOT / "tools")!r})
 import arguments
-print(*arguments.DECLARED)
-for mode in arguments.DECLARED:
-    arguments.parser_of(mode, arguments.source_of(arguments.DECLARED[mode]))
-arguments.exercises(), arguments.tasks(), arguments.named(arguments.source_of(arguments.JOBS), "JOBS")"""
+print(*(mode for mode in arguments.PROGRAMS if arguments.program(pathlib.Path({str(ROOT)!r}), mode).parse))"""
     done = subprocess.run(["/usr/bin/python3", "-I", "-S", "-c", script], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     text = re.search(r"^declare -A PROGRAMS=\($(.*?)^\)$", (ROOT / "baxter.sh").read_text(), re.M | re.S)[1]

@@ -399,7 +399,8 @@ def test_modules_are_compiled_once_for_all_programs_of_a_run(monkeypatch, tmp_pa
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     for name in ("PYTHONDONTWRITEBYTECODE", "PYTHONPATH"):
         monkeypatch.setenv(name, "1")
-    assert run_tests.main(["no_such_package"]) == 2
+    with pytest.raises(SystemExit):
+        run_tests.main(["no_such_package"])
     assert "PYTHONDONTWRITEBYTECODE" not in os.environ and not sys.dont_write_bytecode
 
 

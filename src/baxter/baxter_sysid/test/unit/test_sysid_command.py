@@ -29,8 +29,7 @@ def command():
 
 
 def test_a_recording_that_is_missing_or_is_none(command, tmp_path, capsys):
-    assert command.main([str(tmp_path / "none.csv")]) == 2
-    assert "none.csv cannot be read" in capsys.readouterr().err
+    assert "none.csv cannot be read" in refused(command, capsys, str(tmp_path / "none.csv"))
     empty = tmp_path / "empty.csv"
     empty.write_text("time_s,what\n0,1\n1,2\n")
     assert command.main([str(empty)]) == 2

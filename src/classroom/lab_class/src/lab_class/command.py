@@ -42,7 +42,7 @@ _COLUMNS = "%-20s %-9s %5s %6s %8s %8s %8s  %s"
 
 def main(arguments: list[str] | None = None) -> int:
     """Returns the exit code: 0, 1 for what failed, 2 for wrong words."""
-    options = _parser().parse_args(arguments)
+    options = parse(arguments)
     store = Store(options.folder)
     try:
         return options.run(options, store)
@@ -55,7 +55,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _INTERRUPTED
 
 
-def _parser() -> Parser:
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    """The options; ``run`` is the command's function."""
     defaults = Options()
     parser = Parser(prog="./baxter.sh labs", description="Labs for a class on this machine, each behind walls, with "
                     "one address for each student; docs/class.md.")
@@ -69,8 +70,8 @@ def _parser() -> Parser:
                                      parser_class=functools.partial(  # pyright: ignore[reportArgumentType]
                                          Parser, parents=[folder]))
     up = commands.add_parser("up", help="start a class, and print the addresses")
-    up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
-                    "of last time")
+    up.add_argument("who", type=_number_or_file, nargs="?", help="a number of students, or a CSV file with their "
+                    "names; without it the class of last time")
     up.add_argument("--launch", help="what runs in a lab (default: \"%s\")" % " ".join(defaults.launch))
     up.add_argument("--port", type=int, help="of the front door (default: %d)" % defaults.port)
     up.add_argument("--public", action="store_true", default=None, help="open the front door to other machines")
@@ -110,7 +111,7 @@ def _parser() -> Parser:
     logs = commands.add_parser("logs", help="what a lab has written, or the supervisor")
     logs.add_argument("name", nargs="?")
     logs.set_defaults(run=_logs)
-    return parser
+    return parser.parse_args(arguments)
 
 
 def _number(text: str, words: str, least: float = 0.0):
@@ -150,6 +151,13 @@ def _launch(text: str) -> tuple[str, ...]:
     if words and Path(words[0]).is_file():
         words[0] = str(Path(words[0]).resolve())
     return tuple(words)
+
+
+def _number_or_file(text: str) -> str:
+    """Raises ArgumentTypeError for the name of nothing."""
+    if not text.isdecimal() and not Path(text).exists():
+        raise argparse.ArgumentTypeError("%s is neither a number of students nor a file with their names" % text)
+    return text
 
 
 def _students(who: str) -> list[roster.Student]:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from command_line.options import MAX_SEED, MAX_WORKERS, counted, number, seconds
+from command_line.options import MAX_SEED, MAX_WORKERS, Parser, counted, number, seconds
 from command_line.user_files import read_file
 from disk_cache.files import remove_drafts
 from lab_batch import JobError, Spec
@@ -47,8 +47,9 @@ _TABLES = {"results.json": formats.as_json, "results.csv": formats.as_csv, "resu
 _JOB = "rf_grading.job:Grade"
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parse(argv: list[str] | None) -> argparse.Namespace:
+    """The options; ``chosen``: the exercises to judge."""
+    parser = Parser(
         prog="./baxter.sh grade", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Judge the submissions of a class, several at a time, each in a separate lab and sandbox.\n"
                     "Only new and changed submissions are judged; a grading that was stopped goes on.",
@@ -77,7 +78,18 @@ def _parser() -> argparse.ArgumentParser:
                         help="where this machine allows no sandbox, run all programs without one: never for other "
                              "people's programs")
     parser.add_argument("--version", action="store_true", help="print the version on which verdicts depend, and end")
-    return parser
+    options = parser.parse_args(argv)
+    if options.version:
+        return options
+    if options.folder is None:
+        parser.error("say which folder has the submissions: ./baxter.sh grade FOLDER [LAB [EXERCISE ...]]")
+    if not options.folder.exists():
+        parser.error("%s is neither a folder nor a zip or tar file" % options.folder)
+    try:
+        options.chosen = programs.exercises_of(options.lab, options.exercises)
+    except UnknownExercise as error:
+        parser.error(str(error))
+    return options
 
 
 def _fail(sentence: Any) -> None:
@@ -125,9 +137,9 @@ class _Grading:
         self._failures = {}
 
     def run(self) -> int:
-        """Returns the exit status. Raises BadFolder, UnknownExercise, LedgerError, JobError, OSError."""
+        """Returns the exit status. Raises BadFolder, LedgerError, JobError, OSError."""
         options = self._options
-        exercises = programs.exercises_of(options.lab, options.exercises)
+        exercises = options.chosen
         version = keys.product_version(_workspace())
         conditions = {"seed": options.seed, "profile": options.profile, "serial": options.serial}
         walls = "trusted" if isolation.problem() else "bubblewrap"
@@ -270,13 +282,10 @@ def _stop(*_: object) -> NoReturn:
 
 def main(argv: list[str] | None = None) -> int:
     """Returns the exit status."""
-    parser = _parser()
-    options = parser.parse_args(argv)
+    options = parse(argv)
     if options.version:
         print(keys.product_version(_workspace()))
         return GRADED
-    if options.folder is None:
-        parser.error("say which folder has the submissions: ./baxter.sh grade FOLDER [LAB [EXERCISE ...]]")
     if isolation.problem() and not options.trusted:
         _fail("programs of others are not run without walls around them, and this machine allows none: %s"
               % isolation.problem())
@@ -288,7 +297,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         folder, out = _places(options)
         return _Grading(options, folder, out).run()
-    except (BadFolder, UnknownExercise) as error:
+    except BadFolder as error:
         _fail(error)
         return WRONG_WORDS
     except (LedgerError, JobError, OSError) as error:

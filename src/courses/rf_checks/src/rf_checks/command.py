@@ -117,20 +117,28 @@ def _program_and_exercise(parser: argparse.ArgumentParser, options: argparse.Nam
         parser.error(str(error))
 
 
+def parse(argv: list[str] | None) -> argparse.Namespace:
+    """The options; ``path``, ``exercise`` and ``other`` of a program, see :func:`_program_and_exercise`."""
+    parser = _parser()
+    options = parser.parse_intermixed_args(argv)
+    names = [exercise.name for exercise in EXERCISES]
+    if options.start and options.start not in names:
+        parser.error("there is no exercise '%s'; there are: %s%s" % (
+            options.start, ", ".join(names), did_you_mean(options.start, names)))
+    if not options.list and not options.start:
+        options.path, options.exercise, options.other = _program_and_exercise(parser, options)
+    return options
+
+
 def _link_in(path: Path):
     """The first part of a path, as given, that is a link; or None."""
     return next((part for part in [*reversed(path.parents), path] if part.is_symlink()), None)
 
 
 def start(name: str) -> int:
-    """Copy a skeleton into the current folder; returns the exit status."""
+    """Copy an exercise's skeleton into the current folder; returns the exit status."""
     folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
     source, target = folder / (name + ".py"), Path(name + ".py")
-    if name not in [exercise.name for exercise in EXERCISES]:
-        names = [exercise.name for exercise in EXERCISES]
-        print("there is no exercise '%s'; there are: %s%s" % (name, ", ".join(names), did_you_mean(name, names)),
-              file=sys.stderr)
-        return WRONG_WORDS
     if os.path.lexists(target):
         print("%s is there already; it stays as it is" % target, file=sys.stderr)
         return WRONG_WORDS
@@ -149,14 +157,13 @@ def write_report(path: Path, text: str) -> None:
 
 def main(argv: list[str] | None = None) -> int:
     """Returns the exit status."""
-    parser = _parser()
-    options = parser.parse_intermixed_args(argv)
+    options = parse(argv)
     if options.list:
         print(_listing())
         return PASSED
     if options.start:
         return start(options.start)
-    program, exercise, other = _program_and_exercise(parser, options)
+    program, exercise, other = options.path, options.exercise, options.other
     for one in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(one, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)

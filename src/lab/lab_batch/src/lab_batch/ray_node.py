@@ -15,7 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from command_line.options import MAX_WORKERS, number
+from command_line.options import MAX_WORKERS, Parser, number
 
 from . import ray_engine
 from .job import JobError
@@ -29,8 +29,8 @@ FIXED = {"--node-manager-port": 6380, "--object-manager-port": 6381, "--runtime-
 
 
 def parse(argv: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="./baxter.sh batch-node", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="./baxter.sh batch-node", description=__doc__,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
     role = parser.add_mutually_exclusive_group(required=True)
     role.add_argument("--head", action="store_true", help="the machine that the others and batches connect to")
     role.add_argument("--address", metavar="HOST:PORT", help="of the head")

@@ -100,7 +100,7 @@ class Failure(Exception):
 
 def main() -> int:
     """Returns the exit code."""
-    options = _parser().parse_args(rospy.myargv()[1:])
+    options = parse(rospy.myargv()[1:])
     try:
         _require_lab()
         there = page_files.address(rosgraph.get_master_uri())
@@ -117,7 +117,8 @@ def main() -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+def parse(argv: list[str]) -> argparse.Namespace:
+    """The options."""
     parser = argparse.ArgumentParser(prog="./baxter.sh web", description="The lab's page in a browser, beside a "
                                      "running lab, until Ctrl-C or until the lab ends.")
     parser.add_argument("--port", type=_port_number, help="the port; default: the first free one from %d" % FIRST_PORT)
@@ -134,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
                         help="the topmost folder of the notebooks; the labs' are copied there. Default: the workspace")
     parser.add_argument("--below", type=_below, default="", metavar="PATH",
                         help="the path at which a front door shows this page, such as /anna")
-    return parser
+    return parser.parse_args(argv)
 
 
 def _port_number(text: str) -> int:

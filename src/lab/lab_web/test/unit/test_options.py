@@ -13,7 +13,7 @@ from lab_web import node
     (["--port", "http"], "is no port"), (["--token", ""], "is no token"), (["--view-token", "a\nb"], "is no token")])
 def test_an_impossible_option_is_refused_with_what_is_possible(capsys, words, text):
     with pytest.raises(SystemExit):
-        node._parser().parse_args(words)
+        node.parse(words)
     assert text in capsys.readouterr().err
 
 
@@ -55,4 +55,4 @@ def test_a_taken_port_is_refused_before_the_node_ends_the_page_that_has_it(monke
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(node.Failure, match=str(port)):
-            node.serve(node._parser().parse_args(["--port", str(port)]), None, None)
+            node.serve(node.parse(["--port", str(port)]), None, None)

@@ -81,6 +81,9 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     if options.judge and (options.evaluate or not options.episodes):
         parser.error("--judge needs some episodes, and no --evaluate")
     options.evaluate = options.judge or options.evaluate
+    for path in (options.evaluate, options.data):
+        if path is not None and not path.exists():
+            parser.error("there is no %s" % path)
     if options.evaluate is None and options.task not in EXPERTS:
         parser.error("TASK is one of %s; found %s%s" % (
             ", ".join(EXPERTS), options.task or "none", did_you_mean(options.task or "", EXPERTS)))
