@@ -42,7 +42,8 @@ def test_docstrings_say_what_a_thing_is_or_does():
     assert [one for name, text in texts for one in riddles(name, text)] == []
 
 
-@pytest.mark.parametrize("text", ['"""What it is."""', 'class A:\n    """Who comes."""', 'def a():\n    """What\n    it is."""'])
+@pytest.mark.parametrize("text", [
+    '"""What it is."""', 'class A:\n    """Who comes."""', 'def a():\n    """What\n    it is."""'])
 def test_a_question_is_noticed(text):
     assert len(list(riddles("a.py", text))) == 1
 
