@@ -7,7 +7,6 @@ _NO_WIND = "there is no wind"
 _NO_SOUND = "there is no sound"
 _SOLVER = "the solver is Bullet's, not ODE's"
 _HARD_STOPS = "the stops of joints are hard"
-_ONE_MU = "without fdir1, friction is the same in all directions"
 _NO_FEELING = "such a link passes through others, and its contacts are not told"
 #: An overlap is corrected entirely, and its body rests higher by <min_depth>: no news up to this [m].
 KEPT_DEPTH, WHOLE_DEPTH = "0|<=0.001", "overlaps are corrected entirely"
@@ -51,7 +50,7 @@ HONOURED = {
     "geometry/mesh/submesh": "name center",
     "geometry/heightmap": "uri size pos",
     "surface/bounce": "restitution_coefficient",
-    "surface/friction/ode": "mu fdir1",
+    "surface/friction/ode": "mu mu2 fdir1",
     "surface/contact/ode": "kp kd max_vel",
     "material": "ambient diffuse specular emissive",
     "material/script": "uri name",
@@ -151,7 +150,6 @@ WITHOUT_EFFECT = (
     ("geometry/heightmap", {"texture": None, "blend": None}, "heightmaps have one colour"),
     ("geometry", {"image": None}, "this shape is left out"),
     ("surface/bounce", {"threshold": "100000|1e6|<=0.2"}, "bodies bounce from 0.2 m/s on"),
-    ("surface/friction/ode", {"mu2": "@mu=1|+fdir1|>mu=1"}, _ONE_MU),
     ("surface/friction/ode", {"slip1": "0", "slip2": "0"}, "contacts do not slip"),
     ("surface/friction/torsional", {"coefficient": "1", "use_patch_radius": "1", "patch_radius": "0",
                                     "surface_radius": "0"}, "points of contact resist no turning"),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface, bounds
-from urdf_model.model import ALL_BITS, MAY_BE_INFINITE
+from urdf_model.model import ALL_BITS, MAY_BE_INFINITE, with_both_frictions
 from urdf_model.transforms import pose_matrix
 
 from .document import SdfError
@@ -173,7 +173,7 @@ def _surface(document: Document, collision: etree._Element) -> Surface | None:
     mask = _bitmask(document, element)
     if mask != ALL_BITS:
         found["bitmask"] = mask
-    return Surface(**found) if found else None
+    return with_both_frictions(Surface(**found)) if found else None
 
 
 def _direction(document: Document, collision: etree._Element,

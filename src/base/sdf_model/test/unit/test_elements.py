@@ -66,7 +66,7 @@ LINK = """<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></
 
 
 @pytest.mark.parametrize("inside, named", [
-    ("<friction><ode><mu>1</mu><mu2>0.5</mu2></ode></friction>", "mu2"),
+    ("<friction><ode><mu>1</mu><mu2>0.5</mu2></ode></friction>", ""),
     ("<friction><ode><mu>100</mu><mu2>50</mu2></ode></friction>", ""),
     ("<friction><ode><mu>1</mu><mu2>0.5</mu2><fdir1>0 1 0</fdir1></ode></friction>", ""),
     ("<friction><ode><mu>0.5</mu><mu2>0.5</mu2><fdir1>0 0 0</fdir1><slip1>0.0</slip1></ode></friction>", ""),

@@ -19,9 +19,7 @@ class Row(NamedTuple):
     """An element: ``reason`` says why it has no effect, "" for one that is honoured.
 
     ``harmless``: the texts, with | between them, with which it has none in Gazebo either; None where its presence
-    counts. ``@mu=1`` is the text of the element <mu> beside it, or 1; ``?mu=mu2`` is any text, where the elements <mu>
-    and <mu2> are the same; ``+fdir1`` any, where <fdir1> has a number that is not 0; ``>mu=1``
-    one of 1 or more, where <mu> is so, too; ``<=0.1`` one of at most that.
+    counts. ``<=0.1`` is a number of at most that.
     """
 
     reason: str = ""
@@ -83,8 +81,7 @@ class ElementTable:
                     inside = child.tag
                 if inside in self.parents:
                     yield from self.find(child, inside)
-            elif row.harmless is None or not any(
-                    _is(content(child), text, element) for text in row.harmless.split("|")):
+            elif row.harmless is None or not any(_is(content(child), text) for text in row.harmless.split("|")):
                 yield Idle(child.tag, child.sourceline, row.reason, False)
 
 
@@ -128,25 +125,11 @@ def content(element: Any) -> str:
     return element.get("value", element.text or "").strip()
 
 
-def _content_of(parent, name):
-    child = parent.find(name)
-    return "" if child is None else content(child)
-
-
-def _is(text, harmless, parent):
-    """Whether ``text``, of an element in ``parent``, is the text that ``harmless`` means."""
-    if harmless[:1] not in "@?+><" or not harmless:
-        return _same(text, harmless)
-    name, _, other = harmless[1:].partition("=")
-    if harmless.startswith("<"):
-        return _number(text) <= float(other)
-    if harmless.startswith(">"):
-        return min(_number(text), _number(_content_of(parent, name))) >= float(other)
-    if harmless.startswith("+"):
-        return any(word.strip("-+0.") for word in _content_of(parent, name).split())
-    if harmless.startswith("?"):
-        return _same(_content_of(parent, name) or "1", _content_of(parent, other) or "1")
-    return _same(text, _content_of(parent, name) or other)
+def _is(text, harmless):
+    """Whether ``text`` is the text that ``harmless`` means."""
+    if harmless.startswith("<="):
+        return _number(text) <= float(harmless[2:])
+    return _same(text, harmless)
 
 
 def _number(text):

@@ -15,7 +15,7 @@ from . import bounds
 from .element_table import content
 from .gazebo_names import gazebo_links, in_gazebos_order
 from .materials import GLOWS, MATERIALS
-from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Robot, Surface, is_true
+from .model import ALL_BITS, MAY_BE_INFINITE, Finish, Joint, Link, Robot, Surface, is_true, with_both_frictions
 
 # Element -> field of Surface. Both spellings of the first one are in use.
 _SURFACE = {"mu": "friction", "mu1": "friction", "mu2": "friction_across", "kp": "stiffness", "kd": "damping",
@@ -63,7 +63,7 @@ def _read_link_block(element: Any, link: Link, whole: Link, warn: Callable[[Any,
             warn(part, "<collide_bitmask> of link '%s' is '%s', which is no number, and is left out"
                  % (link.name, part.text))
     if found:
-        link.surface = replace(link.surface or Surface(), **found)
+        link.surface = with_both_frictions(replace(link.surface or Surface(), **found))
     for part in element.iterchildren("dampingFactor"):
         value = _number(part, "link '%s'" % link.name, False, warn)
         if value is not None:

@@ -176,9 +176,12 @@ def _turned(surface, offset):
 
 def _alike(one, other):
     """Whether two Surfaces are the same, with what Gazebo has where nothing is said."""
-    one, other = (replace(surface, friction=1.0 if surface.friction is None else surface.friction)
-                  for surface in (one, other))
-    return one == other
+    def filled(surface):
+        mu = 1.0 if surface.friction is None else surface.friction
+        return replace(surface, friction=mu,
+                       friction_across=mu if surface.friction_across is None else surface.friction_across)
+
+    return filled(one) == filled(other)
 
 
 def combine(parts: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Inertial:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -119,9 +119,17 @@ class Surface:
     damping: float | None = None  # N s/m
     restitution: float | None = None  # 0 to 1
     leaving_speed: float | None = None  # with which an overlap is corrected at most [m/s]
-    friction_across: float | None = None  # mu across `direction`, 1 if not given
-    direction: tuple[float, float, float] | None = None  # unit, in the link's frame; None: mu is the same in all
+    friction_across: float | None = None  # mu across `direction`; None: it is `friction`, in all directions
+    direction: tuple[float, float, float] | None = None  # unit, in the link's frame; None: ODE's, in the world's axes
     bitmask: int | None = None  # two links collide where they have a bit in common; None: ALL_BITS
+
+
+def with_both_frictions(surface: Surface) -> Surface:
+    """A Surface as Gazebo has it: where a file gives one of mu and mu2, the other is 1."""
+    if surface.friction is None and surface.friction_across is None:
+        return surface
+    return replace(surface, friction=1.0 if surface.friction is None else surface.friction,
+                   friction_across=1.0 if surface.friction_across is None else surface.friction_across)
 
 
 @dataclass

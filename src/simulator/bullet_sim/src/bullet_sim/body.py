@@ -75,8 +75,8 @@ class Body:
         #: {body's name: parts of its speed and turn rate that each step takes}
         self.decaying = {link.name: link.decay for link in merged.links.values()
                          if any(link.decay) and not (self.static and link.name == merged.root)}
-        #: The bodies whose friction depends on the direction.
-        self.directed = directed_bodies(merged)
+        #: The bodies whose friction depends on the direction, and those of them whose directions turn with them.
+        self.directed, self.own_directions = directed_bodies(merged), directed_bodies(merged, own=True)
         self._weightless = {}  # body's name -> (mass, its centre (3,) in the body; None: of the whole body)
         for link in merged.links.values():
             if not link.gravity:

@@ -265,12 +265,14 @@ def most_friction(joint: Joint | None) -> float:
     return _WHEEL_FRICTION if joint is not None and is_wheel(joint) else 1.0
 
 
-def directed_bodies(merged: MergedRobot) -> frozenset[str]:
-    """The bodies of a urdf_model.MergedRobot whose friction depends on the direction."""
+def directed_bodies(merged: MergedRobot, own: bool = False) -> frozenset[str]:
+    """The bodies of a urdf_model.MergedRobot whose friction depends on the direction; ``own``: on one of theirs."""
     by_child = {joint.child: joint for joint in merged.joints.values()}
-    return frozenset(link.name for link in merged.links.values()
-                     if any(directed(surface, most_friction(by_child.get(link.name))) is not None
-                            for surface in (link.surface, *(patch.surface for patch in link.patches))))
+    ways = {link.name: [directed(surface, most_friction(by_child.get(link.name)))
+                        for surface in (link.surface, *(patch.surface for patch in link.patches))]
+            for link in merged.links.values()}
+    return frozenset(name for name, found in ways.items()
+                     if any(way is not None and not (own and way.direction is None) for way in found))
 
 
 def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str, Any]:
@@ -283,6 +285,12 @@ def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str
     arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, most)}
     if ways is not None:
         arguments["lateralFriction"], arguments["anisotropicFriction"] = scales(ways, axes)
+    return {**arguments, **_pressing(surface)}
+
+
+def _pressing(surface: Surface) -> dict[str, float]:
+    """Return changeDynamics' arguments for a urdf_model.Surface but for its friction."""
+    arguments = {}
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
     stiffness, damping = surface.stiffness, _DEFAULT_DAMPING if surface.damping is None else surface.damping
@@ -333,10 +341,9 @@ def join_patches(merged: MergedRobot) -> list[str]:
 def _as_built(surface: Surface | None, most: float) -> tuple:
     """All that Bullet is told of a surface; ``most``: as for :func:`_contact`."""
     surface = surface or Surface()
-    arguments = {"restitution": 0.0, **_contact(replace(surface, direction=None), most, np.eye(3))}
-    ways = directed(surface, most)
-    if ways is not None:
-        del arguments["lateralFriction"]
+    arguments, ways = {"restitution": 0.0, **_pressing(surface)}, directed(surface, most)
+    if ways is None:
+        arguments["lateralFriction"] = _contact(surface, most, np.eye(3))["lateralFriction"]
     return tuple(sorted(arguments.items())), ways, ALL_BITS if surface.bitmask is None else surface.bitmask
 
 
@@ -368,7 +375,8 @@ def _inertial(link: MergedLink, warn: Callable[[str], None]) -> tuple[float, np.
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     given = link.inertial.mass
     mass, moments, axes = moving_inertial(link.inertial)
-    if directed(link.surface, _WHEEL_FRICTION) is not None:
+    ways = directed(link.surface, _WHEEL_FRICTION)
+    if ways is not None and ways.direction is not None:
         moments, axes, off = turned(moments, axes, link.surface.direction)
         if is_off(off):
             warn("the friction of link '%s' has the directions of its principal axes of inertia, %.0f degrees from its "

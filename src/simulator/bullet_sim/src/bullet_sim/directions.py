@@ -22,18 +22,20 @@ _SAME, _CLOSE = 1e-3, 1e-2
 
 
 class Directed(NamedTuple):
-    """Coefficients of friction along the direction and across it, and the direction (3,), in the body's frame."""
+    """Coefficients of friction along the direction and across it, and the direction (3,), in the body's frame; None for
+    those of the world (:mod:`.world_directions`)."""
 
     along: float
     across: float
-    direction: tuple
+    direction: tuple | None
 
 
 def directed(surface: Surface | None, most: float) -> Directed | None:
     """Return the Directed of a surface with coefficients up to ``most``; None where all directions are the same."""
-    if surface is None or surface.direction is None:
+    if surface is None:
         return None
-    along, across = (min(1.0 if mu is None else mu, most) for mu in (surface.friction, surface.friction_across))
+    mu = 1.0 if surface.friction is None else surface.friction
+    along, across = min(mu, most), min(mu if surface.friction_across is None else surface.friction_across, most)
     return None if along == across else Directed(along, across, surface.direction)
 
 
@@ -59,8 +61,11 @@ def turned(moments: np.ndarray, axes: np.ndarray, direction: Sequence[float]) ->
 
 
 def scales(found: Directed, axes: np.ndarray) -> tuple[float, list[float]]:
-    """Return (coefficient, scales of it along the three ``axes`` (3, 3)) for changeDynamics, of a Directed."""
+    """Return (coefficient, scales of it along the three ``axes`` (3, 3)) for changeDynamics, of a Directed; those
+    of one with the world's directions are all the same."""
     most = max(found.along, found.across)
+    if found.direction is None:
+        return most, [1.0] * 3
     factors = [found.across / most] * 3
     factors[int(np.abs(axes.T @ found.direction).argmax())] = found.along / most
     return most, factors

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .builder import most_friction
+from .directions import directed
 from .quiet_pybullet import pybullet
 
 if TYPE_CHECKING:
@@ -30,6 +32,8 @@ _STICKS, _STEEPNESS = 0.6, 8
 _REACH_M = 1.0
 # Wheels whose places on the vehicle differ by less are on the same axle [m], and directions of axles [1].
 _SAME = 1e-3
+# The smallest part of the larger coefficient that the other one has [1].
+_LEAST = 1e-3
 
 
 def fixed_wheels(joints: Iterable[Joint]) -> list[int]:
@@ -56,10 +60,19 @@ def sliding_wheels(client: int, model: Model) -> list[SlidingWheels]:
     trees = {}
     joints = list(model.merged.joints.values())
     for index in fixed_wheels(joints):
-        if joints[index].child in model.directed:
+        if joints[index].child in model.own_directions:
             continue
         trees.setdefault(model.parts.root_of(index), []).append(model.parts.places[index].index)
     return [SlidingWheels(client, model, root, wheels) for root, wheels in trees.items()]
+
+
+def _parts(joint: Joint, model: Model) -> tuple[float, float, float]:
+    """For ``SlidingWheels._parts_of``, of the wheel behind a joint."""
+    found = directed(model.merged.links[joint.child].surface, most_friction(joint))
+    if found is None or found.direction is not None:
+        return (1.0, 1.0, 1.0)
+    most = max(found.along, found.across)
+    return (max(found.across / most, _LEAST), max(found.along / most, _LEAST), 1.0)
 
 
 class SlidingWheels:
@@ -69,6 +82,9 @@ class SlidingWheels:
         """``client``: PyBullet's; ``model``: a Model, ``root``: index of its root; ``wheels``: PyBullet's numbers of
         their joints."""
         self._client, self._model, self._root, self._wheels = client, model, root, frozenset(wheels)
+        #: {wheel: the parts (3,) of its larger coefficient that its friction has along the world's axes}
+        self._parts_of = {model.parts.places[index].index: _parts(joint, model)
+                          for index, joint in enumerate(model.merged.joints.values())}
         self._surfaces = {}  # (body, link) -> (friction, does it stand still)
 
     def models_changed(self) -> None:
@@ -84,16 +100,17 @@ class SlidingWheels:
         states = pybullet.getLinkStates(body, links, computeLinkVelocity=1, physicsClientId=self._client)
         moving = {link: (state[0], state[6], state[7]) for link, state in zip(links, states, strict=True)}
         place, normal, friction = (np.array([row[k] for row in rows]) for k in (1, 2, 3))
-        most = np.array([row[4] for row in rows])
+        most, parts = np.array([row[4] for row in rows]), np.array([self._parts_of[row[0]] for row in rows])
         centre, linear, angular = (np.array([moving[row[0]][k] for row in rows]) for k in range(3))
         arm = place - centre
         slip = linear + np.cross(angular, arm)
         slip -= normal * np.sum(slip * normal, axis=1)[:, None]
         speed = np.linalg.norm(slip, axis=1)
-        share = np.minimum(1.0, np.linalg.norm(friction, axis=1) / most) ** _STEEPNESS
+        share = np.minimum(1.0, np.linalg.norm(friction / parts, axis=1) / most) ** _STEEPNESS
         share *= np.minimum(1.0, speed / _CREEP_M_PER_S)
         share *= np.linalg.norm(arm, axis=1) < _REACH_M
-        coulomb = -slip * (most / np.maximum(speed, 1e-9))[:, None]
+        # Of the forces in the ellipse, the one that takes most power from the slip.
+        coulomb = -slip * parts ** 2 * (most / np.maximum(np.linalg.norm(slip * parts, axis=1), 1e-9))[:, None]
         forces = (coulomb - friction) * share[:, None]
         for row, force in zip(rows, forces.tolist(), strict=True):
             pybullet.applyExternalForce(body, row[0], force, row[1], pybullet.WORLD_FRAME,
@@ -116,8 +133,11 @@ class SlidingWheels:
                 continue
             friction, stands = self._surface(other)
             most = point[9] * friction * self._surface((body, link))[0]
-            if stands and math.hypot(point[10], point[12]) > _STICKS * most > 0.0:
-                push = [sign * (point[10] * u + point[12] * v) for u, v in zip(point[11], point[13], strict=True)]
+            if not (stands and most > 0.0):
+                continue
+            push = [sign * (point[10] * u + point[12] * v) for u, v in zip(point[11], point[13], strict=True)]
+            in_parts = (force / part for force, part in zip(push, self._parts_of[link], strict=True))
+            if math.hypot(*in_parts) > _STICKS * most:
                 found.append((link, point[5] if sign > 0.0 else point[6], [sign * n for n in point[7]], push, most))
         return found
 

@@ -104,8 +104,8 @@ class SlippingWheels:
         surface, most = self._model.merged.links[body].surface, most_friction(self._joints[body])
         along = 1.0 if surface is None or surface.friction is None else surface.friction
         across = along
-        if surface is not None and surface.direction is not None:
-            across = 1.0 if surface.friction_across is None else surface.friction_across
+        if surface is not None and surface.direction is not None and surface.friction_across is not None:
+            across = surface.friction_across
         return min(along, most), min(across, most)
 
     def push(self) -> None:

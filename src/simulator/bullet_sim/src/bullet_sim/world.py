@@ -24,6 +24,7 @@ from .sliding_wheels import sliding_wheels
 from .slipping_wheels import SlippingWheels
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
+from .world_directions import WorldDirections
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -108,6 +109,7 @@ class World:
         self._weightless = []  # models of which some link has no weight
         self._sliding = {}  # model -> its SlidingWheels
         self._slipping = {}  # model -> its SlippingWheels
+        self._directions = {}  # model -> its WorldDirections
         self._acting = {}  # model -> functions that act on it before each step
         self._watch = StateWatch(self, error)
         self._touched = []  # models that were touched since the last step, perhaps asleep
@@ -223,6 +225,9 @@ class World:
         wheels = [] if static else sliding_wheels(self._client, model)
         if wheels:
             self._sliding[model] = wheels
+        directions = WorldDirections(self._client, model)
+        if directions:
+            self._directions[model] = directions
         if model.decaying:
             self._acting[model] = [model.slow_down]
         if model.springs is not None:
@@ -268,7 +273,11 @@ class World:
             self._warn("model '%s': wheels %s slip along both axes or not at all, since their axles are no axes of "
                        "their inertia" % (model.name, ", ".join(slipping.crooked)))
         self._slipping.setdefault(model, []).append(slipping)
-        model.directed |= {wheel.body for wheel in wheels}
+        bodies = {wheel.body for wheel in wheels}
+        model.directed |= bodies
+        model.own_directions |= bodies
+        if model in self._directions:
+            self._directions[model].leave(bodies)
         if model in self._sliding:
             self._sliding[model] = sliding_wheels(self._client, model)
         self._models_changed()
@@ -293,6 +302,7 @@ class World:
         del self.models[name]
         self._sliding.pop(model, None)
         self._slipping.pop(model, None)
+        self._directions.pop(model, None)
         self._acting.pop(model, None)
         self._models_changed()
         self.note_weightless(model, False)
@@ -352,6 +362,8 @@ class World:
         for found in self._slipping.values():
             for slipping in found:
                 slipping.push()
+        for directions in self._directions.values():
+            directions.follow()
         for functions in self._acting.values():
             for act in functions:
                 act()

@@ -120,7 +120,7 @@ def test_friction_holds_a_box_up_to_its_coefficient(world, friction, slides):
 
 def test_friction_stands_in_the_gazebo_element_of_a_urdf(world):
     xml = BOX % '<gazebo reference="box"><mu1>0.2</mu1><kp>1e5</kp><kd>1</kd><material>Gazebo/Red</material></gazebo>'
-    assert parse_urdf(xml).links["box"].surface == Surface(0.2, 1e5, 1.0)
+    assert parse_urdf(xml).links["box"].surface == Surface(0.2, 1e5, 1.0, friction_across=1.0)
 
 
 def test_a_soft_contact_gives_way(world):
@@ -360,7 +360,8 @@ def test_links_that_are_fixed_to_each_other_keep_their_surfaces(world, first, se
 
 @pytest.mark.parametrize("first, second, patches", [
     ("<mu1>1</mu1>", "<mu1>100</mu1>", 0), ("", "<mu1>1</mu1><mu2>3</mu2><kp>1e9</kp><kd>5</kd>", 0),
-    ("<mu1>0.5</mu1><mu2>0.2</mu2>", "<mu1>0.5</mu1>", 0), ("<maxVel>1</maxVel>", "<kp>1e12</kp>", 0),
+    ("<mu1>0.5</mu1><mu2>0.2</mu2>", "<mu1>0.5</mu1>", 1),
+    ("<mu1>0.5</mu1>", "<mu1>0.5</mu1><mu2>1</mu2>", 0), ("<maxVel>1</maxVel>", "<kp>1e12</kp>", 0),
     ("<mu1>0.5</mu1>", "<mu1>0.4</mu1>", 1), ("<kp>1e6</kp>", "", 1), ("", "<maxVel>0.1</maxVel>", 1),
     ("", "<mu1>0.5</mu1><fdir1>0 1 0</fdir1>", 1), ("<mu1>2</mu1><mu2>4</mu2><fdir1>0 1 0</fdir1>", "", 0)])
 def test_surfaces_that_act_alike_are_no_further_link(world, first, second, patches):

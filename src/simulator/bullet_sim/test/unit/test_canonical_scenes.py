@@ -356,8 +356,8 @@ def test_only_wheels_have_a_friction_above_one(world, kind, holds):
     text = CART.replace('type="continuous"', 'type="%s"' % kind).replace(
         "</joint>", '<limit lower="-9" upper="9" effort="99" velocity="9"/></joint>')
     wheels = [end + side for end in ("front", "rear") for side in ("left", "right")]
-    text = text.replace("</robot>", "".join('<gazebo reference="%s"><mu1>200</mu1></gazebo>' % name for name in wheels)
-                        + "</robot>")
+    rough = '<gazebo reference="%s"><mu1>200</mu1><mu2>200</mu2></gazebo>'
+    text = text.replace("</robot>", "".join(rough % name for name in wheels) + "</robot>")
     world.add_ground_plane()
     cart = world.spawn(parse_urdf(text), "cart", Pose((0.0, 0.0, 0.1)))
     index = cart.index(wheels)
@@ -366,12 +366,13 @@ def test_only_wheels_have_a_friction_above_one(world, kind, holds):
     assert (abs(cart.base_pose().position[0]) < 0.02) is holds
 
 
-@pytest.mark.parametrize("mu", [0.5, 1.0])
-def test_a_vehicle_with_fixed_wheels_turns_against_coulombs_friction(world, mu):
+@pytest.mark.parametrize("mu, mu2", [(0.5, 0.5), (1.0, 1.0), (0.5, 0.501)])  # the last has the world's directions
+def test_a_vehicle_with_fixed_wheels_turns_against_coulombs_friction(world, mu, mu2):
     # Base 0.4 m, track 0.3 m: it turns as if its track were 1 + (base / track)^2 times as large, by friction of the
     # same size in all directions.
     wheels = [end + side for end in ("front", "rear") for side in ("left", "right")]
-    surfaces = "".join('<gazebo reference="%s"><mu1>%g</mu1></gazebo>' % (name, mu) for name in wheels)
+    surfaces = "".join('<gazebo reference="%s"><mu1>%g</mu1><mu2>%g</mu2></gazebo>' % (name, mu, mu2)
+                       for name in wheels)
     world.add_ground_plane()
     cart = world.spawn(parse_urdf(CART.replace("</robot>", surfaces + "</robot>")), "cart", Pose((0.0, 0.0, 0.1)))
     speeds, efforts = np.array([-1.0, 1.0, -1.0, 1.0]) * 0.3 / 0.1, np.full(4, 20.0)
@@ -386,8 +387,8 @@ def test_a_vehicle_with_fixed_wheels_turns_against_coulombs_friction(world, mu):
     run(world, 2.0, drive)
     way = np.unwrap(angles)
     rate = (way[-1] - way[len(way) // 2]) / 1.0
-    assert 2.0 * 0.3 / rate == pytest.approx(0.3 * (1.0 + (0.4 / 0.3) ** 2), rel=0.01)
-    assert math.hypot(*cart.base_pose().position[:2]) < 0.005, "it turns on the spot"
+    assert 2.0 * 0.3 / rate == pytest.approx(0.3 * (1.0 + (0.4 / 0.3) ** 2), rel=0.01 if mu == mu2 else 0.03)
+    assert math.hypot(*cart.base_pose().position[:2]) < (0.005 if mu == mu2 else 0.01), "it turns on the spot"
 
 
 def test_fixed_wheels_are_those_of_several_axles():

@@ -16,17 +16,16 @@ if TYPE_CHECKING:
 
 _STOPS = "the stops of joints are hard"
 _NOT_IN_A_URDF = "this element of SDF is not read in a URDF"
-_ONE_MU = "without fdir1, friction is the same in all directions"
 
 #: The elements of <gazebo> blocks as sdformat's reader of URDF has them: of the whole model, of a link, of a joint.
 KNOWN = {
     "model": "static self_collide joint plugin start_configuration",
-    "link": "mu mu1 fdir1 kp kd maxVel selfCollide self_collide dampingFactor "
+    "link": "mu mu1 mu2 fdir1 kp kd maxVel selfCollide self_collide dampingFactor "
             "turnGravityOff gravity material sensor light plugin canonicalBody "
             "maxContacts",
     "link/visual": "plugin",
     "link/collision": "max_contacts",
-    "link/collision/surface/friction/ode": "mu fdir1",
+    "link/collision/surface/friction/ode": "mu mu2 fdir1",
     "link/collision/surface/contact": "collide_bitmask",
     "link/collision/surface/contact/ode": "kp kd max_vel",
     **{"link/collision/" + path: names for path, names in sdf.HARMLESS.items() if path.startswith("surface")},
@@ -34,7 +33,6 @@ KNOWN = {
              "preserveFixedJoint disableFixedJointLumping",
 }
 WITHOUT_EFFECT = (
-    ("link", {"mu2": "@mu1=1|+fdir1|>mu1=1"}, _ONE_MU),
     ("link", {"minDepth": sdf.KEPT_DEPTH}, sdf.WHOLE_DEPTH),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),

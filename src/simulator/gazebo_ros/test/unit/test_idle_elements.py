@@ -73,6 +73,8 @@ def said(block):
 @pytest.mark.parametrize("block", [
     '<gazebo reference="a"><mu1>0.5</mu1><mu2>0.5</mu2><kp>1</kp><selfCollide>false</selfCollide><maxVel>0.01</maxVel>'
     "<fdir1>0 0 1</fdir1><minDepth>0.001</minDepth><laserRetro>0</laserRetro><material>Gazebo/Red</material></gazebo>",
+    '<gazebo reference="a"><mu1 value="0.5"/><mu2 value="0.1"/><collision><surface><friction><ode><mu2>2</mu2></ode>'
+    "</friction></surface></collision></gazebo>",
     '<gazebo reference="j"><provideFeedback>true</provideFeedback><springStiffness>1</springStiffness></gazebo>',
     '<gazebo><static>true</static><plugin filename="libother.so"><any>1</any></plugin></gazebo>',
     '<gazebo reference="a"><sensor type="camera" name="s"><camera><image><width>9</width></image></camera><plugin '
@@ -89,12 +91,9 @@ def test_what_has_its_effect_or_none_in_gazebo_is_no_news(block):
     ('<gazebo reference="j"><stopCfm>0.1</stopCfm><fudgeFactor>1</fudgeFactor></gazebo>',
      ["stopCfm", "fudgeFactor"]),
     ('<gazebo reference="j"><stopCfm value="0.1"/><stopErp value="0.2"/></gazebo>', ["stopCfm"]),
-    ('<gazebo reference="a"><mu1 value="0.5"/><mu2 value="0.1"/></gazebo>', ["mu2"]),
     ('<gazebo reference="a"><minDepth>deep</minDepth><maxContacts>ten</maxContacts></gazebo>',
      ["minDepth", "maxContacts"]),
     ('<gazebo reference="a"><visual><material/></visual></gazebo>', ["material"]),
-    ('<gazebo reference="a"><collision><surface><friction><ode><mu>0.1</mu><mu2>2</mu2></ode></friction></surface>'
-     "</collision></gazebo>", ["mu2"]),
     ('<gazebo><joint name="k" type="revolute"/><bar/></gazebo>', ["bar"]),
     ('<gazebo reference="nose"><mu1>1</mu1></gazebo>', ["nose"]),
     ('<gazebo reference="a"><sensor type="imu" name="s"><imu><noise/></imu><plugin '
