@@ -10,6 +10,7 @@ from lerobot.robots import Robot, RobotConfig
 
 from . import wire
 from .cameras import Stream
+from .over_rosbridge import OverRosbridge
 from .rosbridge import Bridge
 
 #: {camera: topic of its images}
@@ -48,7 +49,7 @@ class BaxterConfig(RobotConfig):
                 raise ValueError("robot.%s is %r; it must be above 0" % (name, getattr(self, name)))
 
 
-class Baxter(Robot):
+class Baxter(OverRosbridge, Robot):
     """A robot of LeRobot with 16 numbers, `wire.NUMBERS`, and pictures. Raises ConnectionError where the robot is not
     there, not enabled, or silent."""
 
@@ -59,7 +60,6 @@ class Baxter(Robot):
         super().__init__(config)
         self.config = config
         self.cameras: dict[str, Stream | None] = dict.fromkeys(config.camera_names)
-        self._bridge: Bridge | None = None
         self._set_points: dict[str, float] = {}
         self._sent_at = 0.0
         self._openings: dict[str, float | None] = {}
@@ -70,27 +70,6 @@ class Baxter(Robot):
         """{number: float, camera: (height, width, 3)}."""
         shape = (self.config.camera_height, self.config.camera_width, 3)
         return {**dict.fromkeys(wire.NUMBERS, float), **dict.fromkeys(self.cameras, shape)}
-
-    @property
-    def action_features(self) -> dict[str, Any]:
-        """{number: float}."""
-        return dict.fromkeys(wire.NUMBERS, float)
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether rosbridge is."""
-        return self._bridge is not None and self._bridge.is_open
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: joints have absolute angles."""
-        return True
-
-    def calibrate(self) -> None:
-        """Nothing."""
-
-    def configure(self) -> None:
-        """Nothing."""
 
     def connect(self, calibrate: bool = True) -> None:
         """Find the robot. Raises ConnectionError."""

@@ -8,6 +8,7 @@ from typing import Any
 from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 from lerobot.teleoperators.utils import TeleopEvents
 from lerobot_robot_baxter import wire
+from lerobot_robot_baxter.over_rosbridge import OverRosbridge
 from lerobot_robot_baxter.rosbridge import Bridge
 
 _FOUND_WITHIN_S = 5.0
@@ -33,7 +34,7 @@ class BaxterTeleopConfig(TeleoperatorConfig):
             raise ValueError("teleop.seen_s is %r; it must be above 0" % self.seen_s)
 
 
-class BaxterTeleop(Teleoperator):
+class BaxterTeleop(OverRosbridge, Teleoperator):
     """A device of LeRobot with the numbers of `wire.NUMBERS`. Raises ConnectionError where it is silent."""
 
     config_class = BaxterTeleopConfig
@@ -42,34 +43,12 @@ class BaxterTeleop(Teleoperator):
     def __init__(self, config: BaxterTeleopConfig):
         super().__init__(config)
         self.config = config
-        self._bridge: Bridge | None = None
         self._openings: dict[str, float] = {}
-
-    @property
-    def action_features(self) -> dict[str, Any]:
-        """{number: float}."""
-        return dict.fromkeys(wire.NUMBERS, float)
 
     @property
     def feedback_features(self) -> dict[str, Any]:
         """None."""
         return {}
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether rosbridge is."""
-        return self._bridge is not None and self._bridge.is_open
-
-    @property
-    def is_calibrated(self) -> bool:
-        """Always: joints have absolute angles."""
-        return True
-
-    def calibrate(self) -> None:
-        """Nothing."""
-
-    def configure(self) -> None:
-        """Nothing."""
 
     def connect(self, calibrate: bool = True) -> None:
         """Find the robot. Raises ConnectionError."""
