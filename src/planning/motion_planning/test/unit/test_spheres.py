@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Spheres contain what they stand for, and the compiled checker says what exact geometry says, on the safe side."""
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from urdf_model.transforms import pose_matrix as pose
 pytestmark = pytest.mark.tree
 
 TOLERANCE = 0.01
+# CPU time of 300 balls of 100 spheres, as a robot's tables have [s]; a loop in Python takes 0.05 or more.
+MAX_BALLS_S = 0.02
 SOLIDS = [Box((0.3, 0.02, 0.1)), Box((0.01, 0.0135, 0.1127)), Cylinder(0.06, 0.27), Cylinder(0.04, 0.02), Sphere(0.1)]
 
 
@@ -377,3 +380,13 @@ def test_spheres_contain_a_link_that_is_padded_or_scaled(link, padding, scale):
     states = np.random.default_rng(1).uniform(-0.3, 0.3, (400, 3))
     free = states[checker.valid(states)]
     assert len(free) and exact.first_blocked(scene, free, "g") is None
+
+
+def test_balls_of_a_robots_tables_cost_little():
+    """They are made again when another joint has moved, also between an obstacle's message and the way around it."""
+    spheres = np.column_stack([np.random.default_rng(5).normal(size=(100, 3)), np.full(100, 0.1)])
+    ball(spheres, steps=12)  # compiles
+    begin = time.thread_time()
+    for _ in range(300):
+        ball(spheres, steps=12)
+    assert time.thread_time() - begin < MAX_BALLS_S

@@ -104,15 +104,7 @@ def _cover(parts: Sequence[Placed], tolerance: float, bound: Bound) -> tuple[np.
 
 def ball(spheres: np.ndarray, steps: int = 100) -> np.ndarray:
     """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards the farthest sphere."""
-    centre = 0.5 * ((spheres[:, :3] - spheres[:, 3:]).min(0) + (spheres[:, :3] + spheres[:, 3:]).max(0))
-    best = np.append(centre, np.inf)
-    for turn in range(steps):
-        reach = np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]
-        far = reach.argmax()
-        if reach[far] < best[3]:
-            best = np.append(centre, reach[far])
-        centre = centre + (spheres[far, :3] - centre) / (turn + 2.0)
-    return best + [0.0, 0.0, 0.0, ROUNDING]
+    return covering.ball(np.ascontiguousarray(spheres, dtype=float), steps) + [0.0, 0.0, 0.0, ROUNDING]
 
 
 def _greedy(wanted: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> np.ndarray:

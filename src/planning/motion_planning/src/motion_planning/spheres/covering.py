@@ -5,6 +5,7 @@ Points (3 * room,) float32 are stored axis by axis; room is a multiple of 16, an
 """
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -142,3 +143,27 @@ def nearest(points: np.ndarray, count: int, places: np.ndarray, found: np.ndarra
             best = least(best, _squares(points, begin, places[m, 0], places[m, 1], places[m, 2]))
         store(lane, 0, best)
         found[m] = np.sqrt(lane.min())
+
+
+@compiled
+def ball(spheres: np.ndarray, steps: int) -> np.ndarray:
+    """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards the farthest sphere."""
+    centre, best = np.empty(3), np.empty(4)
+    for axis in range(3):
+        low, high = math.inf, -math.inf
+        for row in spheres:
+            low, high = min(low, row[axis] - row[3]), max(high, row[axis] + row[3])
+        centre[axis] = 0.5 * (low + high)
+    best[:3], best[3] = centre, math.inf
+    for turn in range(steps):
+        far, reach = 0, -1.0
+        for number in range(len(spheres)):
+            x, y, z, radius = spheres[number]
+            here = math.sqrt((x - centre[0])**2 + (y - centre[1])**2 + (z - centre[2])**2) + radius
+            if here > reach:
+                far, reach = number, here
+        if reach < best[3]:
+            best[:3], best[3] = centre, reach
+        for axis in range(3):
+            centre[axis] += (spheres[far, axis] - centre[axis]) / (turn + 2.0)
+    return best
