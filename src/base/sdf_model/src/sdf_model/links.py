@@ -164,6 +164,9 @@ def _surface(document: Document, collision: etree._Element) -> Surface | None:
             if used != value:
                 document.mend(part, "<%s> of %g, for which %g is used" % (tag, value, used))
             found[name] = used
+    contact = element.find("contact")
+    if contact is not None and document.number(contact, "elastic_modulus", 0.0) > 0.0:
+        found.pop("stiffness", None)  # kp says nothing then
     bounce = element.find("bounce")
     if bounce is not None and document.number(bounce, "threshold", _NO_BOUNCE_M_PER_S) >= _NEVER_M_PER_S:
         found.pop("restitution", None)

@@ -71,6 +71,16 @@ def test_a_link_has_its_shapes_inertia_surface_and_colours():
     assert [shape.colour for shape in link.visuals] == [(0.9, 0.1, 0.1, 1.0), (0, 1, 0, 0.75), None]
 
 
+@pytest.mark.parametrize("modulus, stiffness", [(5e5, None), (-1.0, 1.0), (0.0, 1.0)])
+def test_kp_says_nothing_of_a_body_with_an_elastic_modulus(modulus, stiffness):
+    """As of Gazebo's elastic_modulus_contact_test.world."""
+    content = """<link name="l"><collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry><surface>
+        <contact><elastic_modulus>%g</elastic_modulus><ode><kp>1</kp><kd>2</kd></ode></contact></surface></collision></link>"""
+    model = parse_sdf_model(sdf(content % modulus), "m.sdf")
+    assert model.robot.links["l"].surface.stiffness == stiffness
+    assert ("elastic_modulus (m.sdf line 4)" in model.warning) is (stiffness is None)
+
+
 @pytest.mark.parametrize(("threshold", "restitution"), [
     ("", None), ("<threshold>1e+06</threshold>", None), ("<threshold>0.1</threshold>", 0.9)])
 def test_a_body_bounces_where_its_threshold_lets_it(threshold, restitution):
