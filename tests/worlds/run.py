@@ -71,7 +71,8 @@ def bring_up(path, model_folders, seconds):
 def summary(said):
     """The names in the simulator's warnings: elements and plugins without an effect, the number of missing meshes."""
     said = re.sub(r"known plugins: .*?(?=; model|$)", "", said)
-    said = re.sub(r"not as SDF has it, but read: .*?(?=; without an effect here|; model|$)", "", said)
+    said = re.sub(r"not as SDF has it, but read: .*?(?=; (?:without an effect here|not known and left out|model)|$)",
+                  "", said)
     elements = dict.fromkeys(re.findall(r"([A-Za-z_@]\w*) \([^()]*?line [^()]*\)", said))
     plugins = dict.fromkeys(re.findall(r"'(lib[\w.]+)'", said))
     meshes = set(re.findall(r"mesh (\S+) cannot be found", said))
