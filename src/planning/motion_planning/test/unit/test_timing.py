@@ -194,3 +194,13 @@ def test_times_that_are_spaced_leave_no_gap_and_no_point_out(name):
     times = timed.spaced(0.01)
     assert np.isin(timed.times, times).all() and (np.diff(times) > 0.0).all()
     assert np.abs(np.diff(timed.sampled(times)[0], axis=0)).max(initial=0.0) <= 0.01 + 1e-9
+
+
+@pytest.mark.parametrize("algorithm", THROUGH)
+def test_dense_points_of_a_smooth_path_are_passed_as_fast_as_a_few(algorithm):
+    """Cartesian paths have a point per centimetre."""
+    along = np.linspace(0.0, 1.0, 80)
+    path = np.column_stack([np.sin(1.5 * along), 2.0 * along - along**2, -0.7 * along**3])
+    limits = np.full(3, 3.0), np.full(3, 1.0)
+    best = time_path(path, *limits).duration
+    assert time_path(path, *limits, algorithm).duration < 1.3 * best

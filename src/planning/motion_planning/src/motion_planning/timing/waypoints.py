@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from motion_planning.timing.kernels import peaks_of_cubics, second_derivatives
+from motion_planning.timing.kernels import greatest_speeds, peaks_of_cubics, second_derivatives
 from motion_planning.timing.timed import Timed
 
 _ROUNDS = 60
@@ -23,7 +23,14 @@ def through_points(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndar
     """
     if rest_acceleration:
         path = _with_end_points(path)
-    durations = _first_guess(path, velocity, acceleration)
+    guesses = [_first_guess(path, velocity, acceleration), _guess_by_curve(path, velocity, acceleration)]
+    found = [_stretched(path, durations, velocity, acceleration, rest_acceleration) for durations in guesses]
+    return min(found, key=lambda one: one[0])[1]
+
+
+def _stretched(path: np.ndarray, durations: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray,
+               rest_acceleration: bool) -> tuple[float, Timed]:
+    """(its duration within the limits [s], the best Timed of the rounds that begin with ``durations``)"""
     found = []
     for _ in range(_ROUNDS):
         timed = _spline(durations, path, rest_acceleration)
@@ -34,7 +41,21 @@ def through_points(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndar
         if worst <= 1.0:
             break
         durations = durations * np.where(excess > 1.0, _PUSH * np.minimum(excess, 2.0), 1.0)
-    return min(found, key=lambda one: one[0])[1]
+    return min(found, key=lambda one: one[0])
+
+
+def _guess_by_curve(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Durations (m - 1,) [s] of the time-optimal motion along a curve through the points, as dense ones tell it."""
+    widths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(widths)])
+    slopes = np.gradient(path, along, axis=0)
+    bends = np.gradient(slopes, along, axis=0)
+    stop = np.zeros(len(path), dtype=bool)
+    stop[[0, -1]] = True
+    squared, _ = greatest_speeds(widths, np.stack([slopes[:-1], bends[:-1], slopes[1:], bends[1:]]), velocity,
+                                 acceleration, stop)
+    speeds = np.sqrt(squared)
+    return np.maximum(2.0 * widths / np.maximum(speeds[:-1] + speeds[1:], 1e-9), 1e-4)
 
 
 def _first_guess(path: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
