@@ -51,5 +51,5 @@ def _add_entry(matrix: AllowedCollisionMatrix, name: str) -> None:
 
 def add_methods() -> None:
     """Give the message type these methods, as programs written for MoveIt expect."""
-    AllowedCollisionMatrix.set_default = set_default
-    AllowedCollisionMatrix.set_allowed = set_allowed
+    AllowedCollisionMatrix.set_default = set_default  # pyright: ignore[reportAttributeAccessIssue]  (new ones)
+    AllowedCollisionMatrix.set_allowed = set_allowed  # pyright: ignore[reportAttributeAccessIssue]

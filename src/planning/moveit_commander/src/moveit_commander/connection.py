@@ -91,7 +91,7 @@ class Connection:
         """Whether move_group's node is there, served or not."""
         master = master_calls.master(rospy.get_name(), rosgraph.get_master_uri(), _ANSWER_S)
         try:
-            uri = urllib.parse.urlsplit(master.lookupNode(self.name("move_group")))
+            uri = urllib.parse.urlsplit(str(master.lookupNode(self.name("move_group"))))
             socket.create_connection((uri.hostname or "", uri.port or 0), timeout=_ANSWER_S).close()
         # The master does not answer, or knows no such node, or one that has ended.
         except (rosgraph.MasterException, *master_calls.NO_ANSWER):

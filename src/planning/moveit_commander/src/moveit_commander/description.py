@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import rospy
 import yaml
@@ -29,7 +29,7 @@ class Description:
 @lru_cache(maxsize=8)
 def _model(urdf: str, srdf: str, limits: str) -> PlanningModel:
     """Programs make several commanders of one robot; building its model takes longer than all the rest."""
-    return PlanningModel.from_xml(urdf, srdf, yaml.safe_load(limits))
+    return PlanningModel.from_xml(urdf, srdf, cast("dict[str, Any]", yaml.safe_load(limits)))
 
 
 def _parameter_name(name: str, namespace: str) -> str:

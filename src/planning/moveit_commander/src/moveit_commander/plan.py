@@ -2,7 +2,7 @@
 """The result of plan(): noetic's tuple, which melodic's programs can use as the trajectory that they expect."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from moveit_msgs.msg import RobotTrajectory
 
@@ -33,7 +33,7 @@ class Plan(tuple):
         setattr(self[1], name, value)
 
 
-def trajectory_of(plan: Motion) -> RobotTrajectory:
+def trajectory_of(plan: Motion | None) -> RobotTrajectory:
     """Return the RobotTrajectory in a Plan, a tuple like it, a RobotTrajectory or a JointTrajectory.
 
     Raises TypeError for anything else.
@@ -41,8 +41,8 @@ def trajectory_of(plan: Motion) -> RobotTrajectory:
     if isinstance(plan, tuple):
         found = [part for part in plan if isinstance(part, RobotTrajectory)]
         plan = found[0] if found else plan
-    if getattr(plan, "_type", "") == "trajectory_msgs/JointTrajectory":
-        return RobotTrajectory(joint_trajectory=plan)
+    if getattr(plan, "_type", "") == "trajectory_msgs/JointTrajectory":  # also of a bag, which has another class
+        return RobotTrajectory(joint_trajectory=cast("JointTrajectory", plan))
     if not isinstance(plan, RobotTrajectory):
         raise TypeError("expected a RobotTrajectory, a JointTrajectory or what plan() returns, got %s"
                         % type(plan).__name__)

@@ -172,8 +172,9 @@ def place_goal(group: Group, target: str, locations: Sequence[PlaceLocation], se
 
 def grasps_of(grasp: Grasp | str | Iterable[Grasp | str]) -> list[Grasp]:
     """Return a list of Grasps from one, or from a list of them."""
-    grasps = list(grasp) if isinstance(grasp, list | tuple) else [grasp]
-    if not all(isinstance(one, Grasp) for one in grasps):
+    given = list(grasp) if isinstance(grasp, list | tuple) else [grasp]
+    grasps = [one for one in given if isinstance(one, Grasp)]
+    if len(grasps) != len(given):
         raise MoveItCommanderException("expected a Grasp or a list of them, got %r" % (grasp,))
     return grasps
 

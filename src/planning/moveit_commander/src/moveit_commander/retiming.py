@@ -47,6 +47,6 @@ def retimed(model: PlanningModel, trajectory: RobotTrajectory, scaling: tuple[fl
     rows = zip(timed.times, timed.positions, timed.velocities, timed.accelerations, strict=True)
     result.joint_trajectory.points = [
         JointTrajectoryPoint(positions=positions.tolist(), velocities=velocities.tolist(),
-                             accelerations=accelerations.tolist(), time_from_start=rospy.Duration(float(time)))
+                             accelerations=accelerations.tolist(), time_from_start=rospy.Duration.from_sec(time))
         for time, positions, velocities, accelerations in rows]
     return result

@@ -124,7 +124,8 @@ class RobotCommander:
         if group is not None:
             return list(self._group(group).all_joints)
         floating = self._model.virtual_joint
-        joints = [joint.name for joint in map(self._model.robot.parent_joint, self._model.links[1:])]
+        joints = [joint.name for link in self._model.links[1:]
+                  if (joint := self._model.robot.parent_joint(link)) is not None]
         return [floating.name, *joints] if floating is not None else joints
 
     def get_active_joint_names(self, group: str | None = None) -> list[str]:

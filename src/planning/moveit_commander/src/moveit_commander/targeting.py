@@ -2,6 +2,7 @@
 """Targets of a group of joints: joint values, poses, names."""
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,36 +21,34 @@ from urdf_model.transforms import rpy_from_matrix, rpy_matrix
 from . import states
 from .conversions import list_to_pose, matrix_of, pose_of, pose_to_list
 from .exception import MoveItCommanderException
+from .group_state import GroupState
 from .requests import JOINTS, ORIENTATION, POSE, POSITION, code_name
-from .targets import with_followers
-from .tuning import Tunable
+from .targets import JointTarget, with_followers
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from geometry_msgs.msg import Point, Quaternion
 
     from motion_planning.model import Group, PlanningModel
 
     from .connection import Connection
-    from .targets import JointTarget
+    from .requests import RequestSettings
 
     PoseLike = Pose | PoseStamped | Sequence[float]
-    JointsLike = str | Mapping[str, float] | JointState | RobotState | Sequence[float] | np.ndarray
+    ManyJointsLike = Mapping[str, float] | JointState | RobotState | Sequence[float] | np.ndarray
+    JointsLike = str | ManyJointsLike
 
 
-class Targeting(Tunable):
-    """The methods of MoveGroupCommander that set targets. It has the group, the model and the connection."""
+class Targeting(GroupState):
+    """The methods of MoveGroupCommander that set targets."""
 
-    _connection: Connection
-    _model: PlanningModel
-    _group: Group
-    _joint_target: JointTarget
-    _pose_targets: dict[str, list[PoseStamped]]
-    _remembered: dict[str, list[float]]
-    _kind: str
-    _random: np.random.Generator
-    _reference_frame: str
+    def __init__(self, connection: Connection, model: PlanningModel, group: Group, settings: RequestSettings) -> None:
+        super().__init__(connection, model, group, settings)
+        self._joint_target = JointTarget(model, group)
+        self._pose_targets: dict[str, list[PoseStamped]] = {}
+        self._kind = JOINTS
+        self._remembered: dict[str, list[float]] = {}
 
     # -- targets: joints --------------------------------------------------------------------------------------------
 
@@ -83,12 +82,12 @@ class Targeting(Tunable):
             self._set_joints(arg1)
         self._kind = JOINTS
 
-    def _set_joints(self, values: JointsLike) -> None:
+    def _set_joints(self, values: ManyJointsLike) -> None:
         tolerance = self._settings.joint_tolerance
         if isinstance(values, RobotState | JointState):
             joints = values.joint_state if isinstance(values, RobotState) else values
             self._joint_target.set_robot(states.named_positions(joints), tolerance)
-        elif isinstance(values, dict):
+        elif isinstance(values, Mapping):
             self._joint_target.set_by_name(values, tolerance)
         else:
             self._joint_target.set_values(values, tolerance)
@@ -134,6 +133,10 @@ class Targeting(Tunable):
     def set_named_target(self, name: str) -> None:
         """Set a remembered or a named state as the target. Raises MoveItCommanderException for an unknown name."""
         self.set_joint_value_target(self.get_named_target_values(name))
+
+    def get_named_targets(self) -> list[str]:
+        """Return the names of the SRDF's states of this group, and of remembered joint values."""
+        return [*self._group.states, *(name for name in self._remembered if name not in self._group.states)]
 
     def get_named_target_values(self, target: str) -> dict[str, float]:
         """Return {joint: value} of a remembered or named state. Raises MoveItCommanderException for an unknown name."""
