@@ -47,16 +47,21 @@ class Drawn(NamedTuple):
     colour: Colour
 
 
+def _three(values: Iterable[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
+
+
 def solid_of(geometry: object, pose: np.ndarray) -> Solid | None:
     """Return the Solid of a shape of urdf_model or motion_planning.shapes; None for what cannot be drawn."""
     if isinstance(geometry, Box):
-        return Solid("box", pose, tuple(geometry.size))
+        return Solid("box", pose, _three(geometry.size))
     if isinstance(geometry, Sphere):
-        return Solid("sphere", pose, (2.0 * geometry.radius,) * 3)
+        return Solid("sphere", pose, _three([2.0 * geometry.radius] * 3))
     if isinstance(geometry, Cylinder):
         return Solid("cylinder", pose, (2.0 * geometry.radius, 2.0 * geometry.radius, geometry.length))
     if isinstance(geometry, Mesh):
-        return Solid("mesh", pose, tuple(geometry.scale), geometry.filename)
+        return Solid("mesh", pose, _three(geometry.scale), geometry.filename)
     if isinstance(geometry, Plane):
         return Solid("box", pose, (_PLANE_M, _PLANE_M, _THIN_M))
     if isinstance(geometry, Cone):

@@ -85,16 +85,16 @@ class Film:
     def _run(self) -> None:
         while not rospy.is_shutdown():
             with self._lock:
-                playing = self._enabled and self._playback is not None
-                markers = self._markers() if playing and self._picture.is_looked_at() else []
-                if markers or not playing:
+                playing = self._playback if self._enabled else None
+                markers = self._markers(playing) if playing is not None and self._picture.is_looked_at() else []
+                if markers or playing is None:
                     self._picture.show(markers)
             # Real time: a film continues while simulation time is paused.
-            self._wake.wait(1.0 / FILM_HZ if playing else None)
+            self._wake.wait(1.0 / FILM_HZ if playing is not None else None)
             self._wake.clear()
 
-    def _markers(self) -> list[Marker]:
-        frames = self._model.frames(self._playback.at(time.monotonic() - self._begin))
+    def _markers(self, playback: Playback) -> list[Marker]:
+        frames = self._model.frames(playback.at(time.monotonic() - self._begin))
         poses = {link: frames[self._model.link_index[link]] for link in self._solids}
         return self._lines + [marker_of(one, self._model.root)
                               for one in drawing.drawn(self._solids, poses, drawing.PATH)]

@@ -79,7 +79,7 @@ class Handles:
                 else:
                     message = marker_message(which, link, pose, self._frame, self._scale)
                     message.menu_entries = self._menu
-                    self._server.insert(message, self._on_feedback)
+                    self._insert(message)
                     self._names.add(name)
             self._server.applyChanges()
 
@@ -98,6 +98,11 @@ class Handles:
             self._menu = menu_entries(entries)
             for name in self._names:
                 message = self._server.get(name)
+                assert message is not None  # all of these names are on the server
                 message.menu_entries = self._menu
-                self._server.insert(message, self._on_feedback)
+                self._insert(message)
             self._server.applyChanges()
+
+    def _insert(self, message: InteractiveMarker) -> None:
+        self._server.insert(message)
+        self._server.setCallback(message.name, self._on_feedback)

@@ -130,7 +130,7 @@ def object_solids(message: CollisionObject) -> list[Solid]:
 def _primitive(message: SolidPrimitive) -> Box | Sphere | Cylinder | Cone | None:
     sizes = list(message.dimensions)
     if message.type == SolidPrimitive.BOX and len(sizes) >= 3:
-        return Box(tuple(sizes[:3]))
+        return Box((sizes[0], sizes[1], sizes[2]))
     if message.type == SolidPrimitive.SPHERE and sizes:
         return Sphere(sizes[0])
     if message.type in (SolidPrimitive.CYLINDER, SolidPrimitive.CONE) and len(sizes) >= 2:

@@ -159,13 +159,13 @@ class PanelNode:
 
         self._put(choose)
 
-    def _handle(self, link: str) -> Handle | None:
+    def _handle(self, link: str) -> Handle:
         for handle in self._panel.handles:
             if handle.link == link:
                 return handle
         raise InteractionError("link '%s' is not an end of group '%s'" % (link, self._panel.query.group))
 
-    def _in_root(self, frame: str) -> np.ndarray | None:
+    def _in_root(self, frame: str) -> np.ndarray:
         """The pose (4, 4) of a frame in the root link, by tf where it is another."""
         frame = frame.lstrip("/")
         if frame in ("", self._model.root):

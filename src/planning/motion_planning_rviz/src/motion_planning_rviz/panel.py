@@ -12,7 +12,7 @@ import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning_rviz import interaction, menu
-from motion_planning_rviz.client import NoPosture
+from motion_planning_rviz.client import NoPosture, Snapshot
 from motion_planning_rviz.interaction import WHICH, InteractionError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Panel:
         self.query = interaction.Query(self.groups[0], model.default_state())
         self.handles = ()
         self.trajectory = None
-        self._snapshot = None
+        self._snapshot = Snapshot({}, [], [], {})
         self._planners = {}
         self._path_shown = True
         self._lines = {"goal": "", "start": "", "motion": ""}
@@ -59,12 +59,12 @@ class Panel:
     def begin(self, group: str, speed: float, measured: bool = False) -> None:
         """Set the goal to the robot's present state. Raises PlanningError if move_group does not answer, and with
         ``measured`` if it has not heard where the joints are."""
-        self._look()
-        if measured and not self._snapshot.is_measured:
+        snapshot = self._look()
+        if measured and not snapshot.is_measured:
             raise PlanningError("it has not heard where the joints are")
-        goal = interaction.with_known(self.query.goal, self._snapshot.values)
+        goal = interaction.with_known(self.query.goal, snapshot.values)
         self.query = replace(self.query, goal=goal, speed=speed)
-        self.view.scene(self._snapshot)
+        self.view.scene(snapshot)
         self.select_group(group or self.query.group)
 
     def select_group(self, name: str) -> None:
@@ -82,14 +82,14 @@ class Panel:
 
     def refresh(self) -> None:
         """Read the scene again, and check whether the goal is in collision now."""
-        self._look()
-        self.view.scene(self._snapshot)
+        self.view.scene(self._look())
         for which in WHICH:
             self._show(which, moved=False)
         self._show_menu()
 
-    def _look(self) -> None:
+    def _look(self) -> Snapshot:
         self._snapshot = self.client.snapshot()
+        return self._snapshot
 
     def _show(self, which: str, moved: bool = True, unreached: tuple[Handle, np.ndarray] | None = None,
               reason: str = "") -> None:
@@ -109,7 +109,7 @@ class Panel:
             text = str(error)
         name = "" if which == "goal" else "start: "
         self._lines[which] = name + "; ".join(filter(None, [reason, text])) if reason or text else ""
-        self.view.ghost(which, state, touches, self._snapshot.attached if self._snapshot else (), unreached)
+        self.view.ghost(which, state, touches, self._snapshot.attached, unreached)
         if moved:
             self.view.place(which, {handle: interaction.pose_of(self.model, state, handle.link)
                                     for handle in self.handles})
@@ -188,8 +188,7 @@ class Panel:
             self._show_menu()
 
     def _robot(self) -> State:
-        self._look()
-        return interaction.with_known(self.query.goal, self._snapshot.values)
+        return interaction.with_known(self.query.goal, self._look().values)
 
     def current(self, which: str) -> None:
         """Set the goal to the robot's present state; from now on the start follows the robot."""
@@ -302,10 +301,10 @@ class Panel:
 
     def _planned(self, outcome: Outcome) -> None:
         self.trajectory = outcome.trajectory if outcome.success else None
-        if not outcome.success:
+        if self.trajectory is None:
             self._say(motion="no plan: " + outcome.text)
             return
-        points = outcome.trajectory.joint_trajectory.points
+        points = self.trajectory.joint_trajectory.points
         seconds = points[-1].time_from_start.to_sec() if points else 0.0
         self._say(motion="planned: %.2f s long, found in %.3f s" % (seconds, outcome.seconds))
 
