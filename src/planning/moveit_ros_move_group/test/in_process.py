@@ -73,8 +73,7 @@ class Node:
         for level in ("logdebug", "loginfo", "logwarn", "logerr", "logfatal"):
             monkeypatch.setattr(rospy, level, lambda text, *values, **_: self.logged.append(text % values))
         monkeypatch.setattr(rospy, "logwarn_throttle", lambda _, text, *values: self.logged.append(text % values))
-        self.kept = node.build()
-        self.context = self.kept[0]
+        self.context, self.kept = node.build()
 
     def ask(self, endpoint, message):
         """Return the answer of a service, (status, result, text) of an action, None of a topic."""

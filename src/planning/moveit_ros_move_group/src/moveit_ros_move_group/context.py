@@ -121,8 +121,9 @@ def answered(name: str,
             except Exception as error:  # the node must survive any error of a request
                 code = tell(self.context, name, RequestError(MoveItErrorCodes.FAILURE, "%s: %s" % (
                     type(error).__name__, error)), _group_of(request))
-            if hasattr(response, "error_code"):
-                response.error_code.val = response.error_code.val or code
+            answer = getattr(response, "error_code", None)
+            if answer is not None:
+                answer.val = answer.val or code
             return response
         return serve
     return decorate

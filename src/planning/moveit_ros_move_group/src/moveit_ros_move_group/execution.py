@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,17 @@ _AWAY_S = 5.0
 _INVALIDATED = MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
 
 
+class StartTolerances(dict[str, float]):
+    """Tolerances of some joints, and one for all others."""
+
+    def __init__(self, usual: float, by_joint: Mapping[str, float]) -> None:
+        super().__init__(by_joint)
+        self._usual = usual
+
+    def get(self, name: str, default: float | None = None) -> float:
+        return super().get(name, self._usual)
+
+
 @dataclass
 class ExecutionSettings:
     """``~trajectory_execution``: monitored: a limit on time is kept; scaling and margin [s] make it. start_tolerance:
@@ -58,7 +69,7 @@ class ExecutionSettings:
     def allow_at_start(self, tolerance: float) -> None:
         """Put ``tolerance`` [rad or m] in the place of that of joints without one of their own."""
         own = self.start_tolerance
-        self.start_tolerance = type(own)(tolerance, own) if isinstance(own, dict) else tolerance
+        self.start_tolerance = StartTolerances(tolerance, own) if isinstance(own, dict) else tolerance
 
 
 @dataclass

@@ -60,11 +60,14 @@ def _hand(job: _Job, candidate: Candidate, colour: tuple[float, float, float, fl
 def _shape(geometry: object) -> tuple[int, tuple[float, float, float]] | None:
     """(type of a Marker, its scale); None for what no marker shows."""
     if isinstance(geometry, Mesh):
-        return Marker.MESH_RESOURCE, tuple(geometry.scale)
+        size = geometry.scale
+        return Marker.MESH_RESOURCE, (size[0], size[1], size[2])
     if isinstance(geometry, Box):
-        return Marker.CUBE, tuple(geometry.size)
+        size = geometry.size
+        return Marker.CUBE, (size[0], size[1], size[2])
     if isinstance(geometry, Sphere):
-        return Marker.SPHERE, (2.0 * geometry.radius,) * 3
+        diameter = 2.0 * geometry.radius
+        return Marker.SPHERE, (diameter, diameter, diameter)
     if isinstance(geometry, Cylinder):
         return Marker.CYLINDER, (2.0 * geometry.radius, 2.0 * geometry.radius, geometry.length)
     return None

@@ -13,6 +13,7 @@ import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
     GripperCommandAction,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from actionlib import ClientGoalHandle
+    from control_msgs.msg import GripperCommandFeedback
     from trajectory_msgs.msg import JointTrajectory
 
     from moveit_ros_move_group.controllers import Controller
@@ -53,12 +55,10 @@ class Handles:
         """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin. limits:
         {joint: (lowest, highest)}, for grippers that are commanded in percent."""
         self._limits = limits or {}
-        self._made, self._fake_states = {}, None
-        if any(controller.kind == FAKE for controller in controllers):
-            # Latched: a subscriber may connect later than the joints are published.
-            self._fake_states = rospy.Publisher("~fake_controller_joint_states", JointState, queue_size=100, latch=True)
-            if initial:
-                self._fake_states.publish(_joint_state(initial.keys(), initial.values()))
+        self._made: dict[str, Handle] = {}
+        self._fake_states: rospy.Publisher | None = None
+        if initial and any(controller.kind == FAKE for controller in controllers):
+            self._fake_publisher().publish(_joint_state(initial.keys(), initial.values()))
         for controller in controllers:
             self.of(controller)
 
@@ -66,11 +66,17 @@ class Handles:
         key = controller.action or controller.name
         if key not in self._made:
             if controller.kind == FAKE:
-                self._made[key] = FakeHandle(controller, self._fake_states)
+                self._made[key] = FakeHandle(controller, self._fake_publisher())
             else:
                 self._made[key] = (FollowHandle(controller) if controller.kind == FOLLOW
                                    else GripperHandle(controller, self._limits))
         return self._made[key]
+
+    def _fake_publisher(self) -> rospy.Publisher:
+        if self._fake_states is None:
+            # Latched: a subscriber may connect later than the joints are published.
+            self._fake_states = rospy.Publisher("~fake_controller_joint_states", JointState, queue_size=100, latch=True)
+        return self._fake_states
 
 
 _goals = itertools.count(1)
@@ -94,9 +100,12 @@ class _Goal:
             self.handle = handle
             self.over.set()
 
-    def told(self, handle: ClientGoalHandle, feedback: rospy.Message) -> None:
+    def told(self, handle: ClientGoalHandle,
+             feedback: FollowJointTrajectoryFeedback | GripperCommandFeedback) -> None:
         """The goal's feedback has come."""
-        since = feedback.desired.time_from_start.to_sec() if hasattr(feedback, "desired") else 0.0
+        if not isinstance(feedback, FollowJointTrajectoryFeedback):
+            return
+        since = feedback.desired.time_from_start.to_sec()
         if since > _SINCE_S:
             self.began = feedback.header.stamp.to_sec() - since
 
@@ -148,10 +157,11 @@ class _ActionHandle:
 
     def error(self) -> str:
         """The sentence what went wrong, empty where nothing has."""
-        status = self._status()
-        if status in (None, GoalStatus.SUCCEEDED):
+        handle, status = self._goal.handle, self._status()
+        if handle is None or status in (None, GoalStatus.SUCCEEDED):
             return ""
-        return "controller %s ended with %s%s" % (self.controller, _STATUS_NAMES.get(status, status), self._detail())
+        return "controller %s ended with %s%s" % (self.controller, _STATUS_NAMES.get(status, status),
+                                                  self._detail(handle))
 
     def _status(self) -> int | None:
         return self._goal.handle.get_terminal_state() if self._goal.handle is not None else None
@@ -159,8 +169,8 @@ class _ActionHandle:
     def _goal_of(self, trajectory: JointTrajectory) -> rospy.Message:
         raise NotImplementedError
 
-    def _detail(self) -> str:
-        text = self._goal.handle.get_goal_status_text()
+    def _detail(self, handle: ClientGoalHandle) -> str:
+        text = handle.get_goal_status_text()
         return ": %s" % text if text else ""
 
 
@@ -178,12 +188,12 @@ class FollowHandle(_ActionHandle):
             goal.goal_time_tolerance = rospy.Duration(options["goal_time_tolerance"])
         return goal
 
-    def _detail(self) -> str:
-        result = self._goal.handle.get_result()
+    def _detail(self, handle: ClientGoalHandle) -> str:
+        result = handle.get_result()
         if result is None:
-            return super()._detail()
+            return super()._detail(handle)
         name = _FOLLOW_ERRORS.get(result.error_code, str(result.error_code))
-        text = result.error_string or self._goal.handle.get_goal_status_text()
+        text = result.error_string or handle.get_goal_status_text()
         return ", %s%s" % (name, ": %s" % text if text else "")
 
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import genpy
 import numpy as np
 import rospy
 import tf2_ros
@@ -152,7 +153,7 @@ class SceneMonitor:
         self._listeners.append(listener)
 
     def _change(self, function: Callable[[Scene], tuple[Scene, list[str]]], request: str,
-                octomap: OctomapWithPose | None = None) -> list[str]:
+                octomap: OctomapWithPose | Callable[[], OctomapWithPose] | None = None) -> list[str]:
         """Put the scene of ``function(scene)`` = (scene, errors) in the scene's place; return the errors.
 
         octomap: the OctomapWithPose that a new octomap comes from.
@@ -172,7 +173,8 @@ class SceneMonitor:
         self._tell()
         return errors
 
-    def _replace(self, scene: Scene, octomap: OctomapWithPose | None = None) -> None:
+    def _replace(self, scene: Scene,
+                 octomap: OctomapWithPose | Callable[[], OctomapWithPose] | None = None) -> None:
         with self._lock:
             if scene.octomap is not self._scene.octomap:
                 self._octomap = None if scene.octomap is None else octomap
@@ -213,11 +215,11 @@ class SceneMonitor:
             return [name for name in self.model.variables
                     if name not in self._values and name not in self.model.passive]
 
-    def state_stamp(self) -> rospy.Time:
+    def state_stamp(self) -> genpy.Time:
         """The stamp of the newest joint state."""
         return self._newest_stamp
 
-    def wait_for_state(self, after: rospy.Time, timeout_s: float, joints: Sequence[str] | None = (),
+    def wait_for_state(self, after: rospy.Time, timeout_s: float, joints: Sequence[str] = (),
                        given_up: Callable[[], bool] = lambda: False) -> str | None:
         """Wait in wall time until each of ``joints`` has a value no older than ``after`` (rospy.Time).
 
@@ -252,7 +254,7 @@ class SceneMonitor:
             return
         stamp = message.header.stamp
         with self._lock:
-            if stamp + rospy.Duration(1.0) < self._newest_stamp:
+            if stamp + rospy.Duration(1) < self._newest_stamp:
                 self._stamps.clear()  # time has gone back, as by a reset of the simulation
             for name, value in zip(message.name, message.position, strict=True):
                 if name in self.model.index and math.isfinite(value):
@@ -274,6 +276,7 @@ class SceneMonitor:
         if joint is None or joint.type == "fixed":
             return before
         try:
+            assert self._buffer is not None  # such a robot's monitor listens from the start
             found = self._buffer.lookup_transform_core(joint.parent_frame, joint.child_link, rospy.Time())
             return matrix_of(found.transform)
         except (tf2_ros.TransformException, MessageError) as error:
@@ -292,17 +295,17 @@ class SceneMonitor:
         finally:
             self._asking.given_up = None
 
-    def tf_frame(self, name: str, stamp: rospy.Time = _NEWEST) -> np.ndarray:
+    def tf_frame(self, name: str, stamp: genpy.Time = _NEWEST) -> np.ndarray:
         """Return the pose (4, 4) of a tf frame in the planning frame at ``stamp``. Raises PlanningError."""
         if "\0" in name:  # where tf2's library raises ValueError
             raise MessageError("%r is not a frame: it has a zero in it" % name)
-        self._listen_to_tf()
+        buffer = self._listen_to_tf()
         given_up = getattr(self._asking, "given_up", None)
         deadline = time.monotonic() + _FRAME_TIMEOUT_S
         while True:
             for known in (self.model.frame, self.model.root):
                 try:
-                    found = matrix_of(self._buffer.lookup_transform_core(known, name, stamp).transform)
+                    found = matrix_of(buffer.lookup_transform_core(known, name, stamp).transform)
                     return found if known == self.model.frame else self.scene().frame(known) @ found
                 except tf2_ros.TransformException as error:
                     reason = str(error)
@@ -316,11 +319,12 @@ class SceneMonitor:
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)
 
-    def _listen_to_tf(self) -> None:
+    def _listen_to_tf(self) -> tf2_ros.Buffer:
         with self._lock:
             if self._buffer is None:
                 self._buffer = tf2_ros.Buffer(debug=False)
                 self._listener = tf2_ros.TransformListener(self._buffer)
+            return self._buffer
 
     # -- what is published ---------------------------------------------------------------------------------------
 

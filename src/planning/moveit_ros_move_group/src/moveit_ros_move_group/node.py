@@ -61,8 +61,8 @@ Parameters: ~robot_description (the name of the URDF's), ~controller_list, ~move
 """
 
 
-def build() -> list[object]:
-    """Return what has to be kept alive. Raises PlanningError, MissingParameter."""
+def build() -> tuple[Context, list[object]]:
+    """Return the Context, and what has to be kept alive. Raises PlanningError, MissingParameter."""
     name = rospy.get_param("~robot_description", rospy.get_param("~planning_scene_monitor_options/robot_description",
                                                                   "robot_description"))
     urdf = wait_for_param(name, _DESCRIPTION_TIMEOUT_S)
@@ -81,11 +81,11 @@ def build() -> list[object]:
         rospy.logwarn("%s", text)
     may_execute = rospy.get_param("~allow_trajectory_execution", True)
     context = Context(model, monitor, exact, failures, pipes, usual, _executor(monitor) if may_execute else None)
-    kept = [context, *_capabilities(context, wanted, name, may_execute)]
+    kept = _capabilities(context, wanted, name, may_execute)
     kept.append(Sensors(monitor, sphere_model_of(exact)))
     if context.executor is not None:
         kept.append(motion.StopEvent(context.executor))
-    return kept
+    return context, kept
 
 
 def _executor(monitor: SceneMonitor) -> Executor:
@@ -158,12 +158,13 @@ def main() -> None:
         limit_ports()
         rospy.init_node("move_group", disable_signals=True, log_level=rospy.DEBUG if options.debug else rospy.INFO)
         logging.getLogger("actionlib").setLevel(logging.WARNING)
-        kept = build()
+        context, kept = build()
     except (PlanningError, MissingParameter, rospy.ROSInitException) as error:
         if not rospy.is_shutdown():
             sys.exit("move_group: %s" % error)
         return
     # Scripts wait for this line.
     print("\nYou can start planning now!\n", flush=True)
-    tell_of_silent_controllers(kept[0].executor)
+    tell_of_silent_controllers(context.executor)
     rospy.spin()
+    del kept

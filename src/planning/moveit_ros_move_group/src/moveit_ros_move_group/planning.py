@@ -86,11 +86,12 @@ class Planner:
         """(pipeline.PlanQuery, remarks) of a MotionPlanRequest. Raises RequestError."""
         remarks, reader = [], self._context.monitor.reader
         try:
-            goals = [constraint_set_of(goal, scene, reader, remarks) for goal in request.goal_constraints]
+            found = [constraint_set_of(goal, scene, reader, remarks) for goal in request.goal_constraints]
             path_constraints = constraint_set_of(request.path_constraints, scene, reader, remarks)
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
-        if any(goal is None for goal in goals):
+        goals = [goal for goal in found if goal is not None]
+        if len(goals) < len(found):
             raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "; ".join(
                 ["a goal without any constraint says nothing", *remarks]))
         query = pipeline.PlanQuery(

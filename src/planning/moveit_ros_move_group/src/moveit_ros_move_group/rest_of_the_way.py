@@ -60,13 +60,13 @@ class RestOfTheWay:
         the trajectory begins."""
         now = rospy.get_time()
         # Time may have been set back, as by a reset of the simulation.
-        self._begin = now if self._begin is None else min(self._begin, now + LATER_S)
+        begin = self._begin = now if self._begin is None else min(self._begin, now + LATER_S)
         scene = self._changed_scene()
         if scene is None:
             return None
-        self._begin = self._began() or self._begin
+        begin = self._begin = self._began() or begin
         times = self._timed.spaced(_APART)
-        times = times[times >= min(now - self._begin - _BEHIND_S, self._timed.duration)]
+        times = times[times >= min(now - begin - _BEHIND_S, self._timed.duration)]
         states = self._timed.sampled(times)[0]
         first = first_touching(self._exact, scene, self._group, states)
         if first is None:
@@ -76,24 +76,25 @@ class RestOfTheWay:
         reason = "in the way of what is left: %s" % self.contacts[0] if self.contacts else "something is in the way"
         blocked_from = float(times[first])
         if self._onward is not None:
-            found = self._around(scene, blocked_from)
+            found = self._around(self._onward, scene, begin, blocked_from)
             if isinstance(found, NewWay):
                 return found
             reason = "%s; %s" % (reason, found)
             self._onward = None  # joints that stop go nowhere else
-        stop = stopped(self._exact, scene, self._group, self._running(blocked_from))
-        return reason if stop is None else self._new_way(scene, stop.timed, self._begin + stop.begin, reason)
+        stop = stopped(self._exact, scene, self._group, self._running(begin, blocked_from))
+        return reason if stop is None else self._new_way(scene, stop.timed, begin + stop.begin, reason)
 
-    def _running(self, blocked_from: float) -> Running:
-        return Running(self._timed, rospy.get_time() - self._begin, blocked_from)
+    def _running(self, begin: float, blocked_from: float) -> Running:
+        return Running(self._timed, rospy.get_time() - begin, blocked_from)
 
-    def _around(self, scene: Scene, blocked_from: float) -> str | NewWay:
+    def _around(self, onward: Callable[[Scene, Running], Redirection], scene: Scene, begin: float,
+                blocked_from: float) -> str | NewWay:
         """A NewWay to the goal, or the sentence why there is none."""
         try:
-            found = self._onward(scene, self._running(blocked_from))
+            found = onward(scene, self._running(begin, blocked_from))
         except PlanningError as error:
             return "no other way while the joints move: %s" % error
-        begins = self._begin + found.begin
+        begins = begin + found.begin
         late = rospy.get_time() - begins
         if late > 0.0:
             return "another way was found %.3f s too late" % late

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import rosgraph
 import rospy
@@ -49,7 +49,7 @@ class RosControl:
     def __init__(self, namespace: str | None, listed: Iterable[Controller] = (),
                  list_controllers: Callable[[str], Sequence[ControllerState]] | None = None,
                  service_names: Callable[[], Sequence[str]] | None = None,
-                 warn: Callable[[str], object] = rospy.logwarn, answer_s: float = ANSWER_S) -> None:
+                 warn: Callable[..., object] = rospy.logwarn, answer_s: float = ANSWER_S) -> None:
         """namespace: of one controller manager, or None for all; listed: Controllers of the controller_list, taken
         where no manager has one of that action. list_controllers(service): states; service_names(): those of
         the master; warn(format, *values): for managers that do not answer beside others that do."""
@@ -108,4 +108,6 @@ def _list_controllers(service: str) -> Sequence[ControllerState]:
 
 
 def _service_names() -> list[str]:
-    return [name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]]
+    state = rosgraph.Master(rospy.get_name()).getSystemState()
+    # rosgraph has no types.
+    return [name for name, _ in cast("tuple[object, object, list[tuple[str, list[str]]]]", state)[2]]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import genpy
 import numpy as np
 import rospy
 from moveit_msgs.srv import LoadMap, LoadMapResponse, SaveMap, SaveMapResponse
@@ -19,6 +20,7 @@ from std_msgs.msg import Header
 
 from motion_planning.errors import PlanningError
 from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
+from motion_planning.scene import Octree
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
 from urdf_model import read_file
@@ -26,7 +28,7 @@ from urdf_model import read_file
 if TYPE_CHECKING:
     from moveit_msgs.srv import LoadMapRequest, SaveMapRequest
 
-    from motion_planning.scene import Octree, Scene, WorldObject
+    from motion_planning.scene import Scene, WorldObject
     from motion_planning.spheres import SphereModel
     from moveit_ros_move_group.monitor import SceneMonitor
 
@@ -100,8 +102,8 @@ class _Past:
         self._monitor, self._states = monitor, collections.deque(maxlen=_STATES)
         self._subscriber = rospy.Subscriber(monitor.joint_state_topic, JointState, self._states.append, queue_size=25)
 
-    def scene(self, stamp: rospy.Time) -> Scene:
-        """The monitor's Scene with each joint where it was next to ``stamp`` (rospy.Time)."""
+    def scene(self, stamp: genpy.Time) -> Scene:
+        """The monitor's Scene with each joint where it was next to ``stamp``."""
         scene = self._monitor.scene()
         model, time_s = scene.model, stamp.to_sec()
         q, gaps = scene.state.q.copy(), {}
@@ -171,7 +173,7 @@ class Sensors:
             return OccupancyMap
         return CloudMap if alone else OccupancyMap
 
-    def _pose(self, name: str, scene: Scene, stamp: rospy.Time) -> np.ndarray:
+    def _pose(self, name: str, scene: Scene, stamp: genpy.Time) -> np.ndarray:
         """The pose (4, 4) of a frame in the planning frame. Raises PlanningError."""
         return scene.frame(name) if scene.has_frame(name) else self._monitor.tf_frame(name, stamp)
 
@@ -206,13 +208,14 @@ class Sensors:
             self._octree = None
             self._show(rospy.Time.now())
 
-    def _show(self, stamp: rospy.Time) -> None:
+    def _show(self, stamp: genpy.Time) -> None:
         centres = np.empty((0, 3)) if self._octree is None else self._octree.boxes[:, :3]
         self._display.publish(cloud_of(centres, Header(stamp=stamp, frame_id=self._frame)))
 
 
 def _shape_of(octomap: WorldObject | None) -> Octree | None:
-    return None if octomap is None else octomap.shapes[0][0]
+    shape = None if octomap is None else octomap.shapes[0][0]
+    return shape if isinstance(shape, Octree) else None
 
 
 class _Source:
@@ -265,7 +268,7 @@ class _Source:
 
     def _enter(self, message: PointCloud2 | Image) -> None:
         settings = self._settings
-        if settings.kind == "DepthImageOctomapUpdater":
+        if isinstance(message, Image):
             if self._info is None:
                 rospy.logwarn_throttle(10.0, "%s: no camera_info has come beside it" % settings.topic)
                 return

@@ -13,7 +13,7 @@ import rospy
 from motion_planning.errors import PlanningError
 from motion_planning.industrial import PLANNERS as INDUSTRIAL_PLANNERS
 from moveit_ros_move_group.controllers import read_list
-from moveit_ros_move_group.execution import ExecutionSettings
+from moveit_ros_move_group.execution import ExecutionSettings, StartTolerances
 from moveit_ros_move_group.ros_control import PLUGINS, RosControl
 
 if TYPE_CHECKING:
@@ -154,27 +154,16 @@ def execution_settings() -> ExecutionSettings:
     """Return the ExecutionSettings of ``~trajectory_execution``."""
     tree = rospy.get_param("~trajectory_execution", {})
     usual = ExecutionSettings()
-    tolerance = _number(tree.get("allowed_start_tolerance"), usual.start_tolerance)
+    tolerance = _number(tree.get("allowed_start_tolerance"), usual.usual_start_tolerance)
     by_joint = tree.get("joints_allowed_start_tolerance")
     if isinstance(by_joint, dict):
-        tolerance = _Tolerances(tolerance, by_joint)
+        tolerance = StartTolerances(tolerance, by_joint)
     return ExecutionSettings(
         bool(tree.get("execution_duration_monitoring", usual.monitored)),
         _number(tree.get("allowed_execution_duration_scaling"), usual.scaling),
         _number(tree.get("allowed_goal_duration_margin"), usual.margin), tolerance,
         bool(tree.get("wait_for_trajectory_completion", usual.wait_for_rest)),
         _number(tree.get("controller_connection_timeout"), usual.connection_timeout))
-
-
-class _Tolerances(dict):
-    """Tolerances of some joints, and one for all others."""
-
-    def __init__(self, usual: float, by_joint: Mapping[str, float]) -> None:
-        super().__init__(by_joint)
-        self._usual = usual
-
-    def get(self, name: str, default: float | None = None) -> float:
-        return super().get(name, self._usual)
 
 
 def controllers() -> tuple[list[Controller], list[str]]:
@@ -198,9 +187,9 @@ def initial_positions(model: PlanningModel) -> dict[str, float]:
     found = {}
     entries = rospy.get_param("~initial", [])
     for entry in entries if isinstance(entries, list) else ():
-        group = model.groups.get(entry.get("group")) if isinstance(entry, dict) else None
+        group = model.groups.get(entry.get("group", "")) if isinstance(entry, dict) else None
         if group is not None:
-            found.update(group.states.get(entry.get("pose"), {}))
+            found.update(group.states.get(entry.get("pose", ""), {}))
     return found
 
 

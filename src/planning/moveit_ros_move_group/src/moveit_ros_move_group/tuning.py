@@ -21,8 +21,8 @@ class _RosTopics:
     def publisher(self, topic: str, msg_class: type[rospy.Message], latch: bool = False) -> rospy.Publisher:
         return rospy.Publisher(topic, msg_class, latch=latch, queue_size=10)
 
-    def service(self, name: str, service_class: type, handler: Callable[[Any], Any]) -> rospy.Service:
-        return rospy.Service(name, service_class, handler)
+    def service(self, name: str, srv_class: type, handler: Callable[[Any], Any]) -> rospy.Service:
+        return rospy.Service(name, srv_class, handler)
 
 
 def servers(executor: Executor | None, monitor: SceneMonitor, move_action: MoveAction | None) -> list[SettingsServer]:

@@ -44,19 +44,19 @@ class Kinematics:
 
     @answered("compute_ik", GetPositionIKResponse)
     def _ik(self, request: GetPositionIKRequest, response: GetPositionIKResponse) -> None:
-        request, context = request.ik_request, self.context
-        group = context.group(request.group_name)
-        scene = context.scene_from(request.robot_state, "compute_ik")
-        poses = self._poses(request, group, scene)
-        timeout = request.timeout.to_sec() or self._timeouts.get(group.name, _TIMEOUT_S)
+        wanted, context = request.ik_request, self.context
+        group = context.group(wanted.group_name)
+        scene = context.scene_from(wanted.robot_state, "compute_ik")
+        poses = self._poses(wanted, group, scene)
+        timeout = wanted.timeout.to_sec() or self._timeouts.get(group.name, _TIMEOUT_S)
         timeout = min(timeout, _LONGEST_S)
         remarks, touching = [], []
-        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader, remarks)
+        constraints = constraint_set_of(wanted.constraints, scene, context.monitor.reader, remarks)
         context.remark("compute_ik", remarks, group.name)
 
         def accept(q: np.ndarray) -> str | None:
             state = scene.state.with_q(q)
-            if request.avoid_collisions and not context.exact.free(scene, state, group.name):
+            if wanted.avoid_collisions and not context.exact.free(scene, state, group.name):
                 touching[:] = context.exact.contacts(scene, state, group.name)
                 return "; ".join(map(str, touching[:3]))
             return constraints.broken(context.model, state, scene, context.exact) if constraints is not None else None
@@ -75,10 +75,11 @@ class Kinematics:
                 raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "%s but %s; name a link for "
                                    "each" % (counted(len(poses), "pose"), counted(len(links), "ik_link_name")))
         else:
-            links, poses = [request.ik_link_name or group.tip], [request.pose_stamped]
-            if links == [None]:
+            link = request.ik_link_name or group.tip
+            if link is None:
                 raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is not a chain; name a link for the "
                                    "pose" % group.name)
+            links, poses = [link], [request.pose_stamped]
         found = {}
         for name, pose in zip(links, poses, strict=True):
             try:

@@ -64,18 +64,18 @@ class PlanService:
 
     def _serve(self, request: GetMotionPlanRequest) -> GetMotionPlanResponse:
         response = MotionPlanResponse()
-        request = request.motion_plan_request
-        response.group_name = request.group_name
+        wanted = request.motion_plan_request
+        response.group_name = wanted.group_name
         begin = time.monotonic()
         try:
-            scene = self.context.scene_from(request.start_state, "plan_kinematic_path")
+            scene = self.context.scene_from(wanted.start_state, "plan_kinematic_path")
             response.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())
-            plan = self._planner.plan(request, scene)
-            response.trajectory = show(self.context, request.group_name, plan)
+            plan = self._planner.plan(wanted, scene)
+            response.trajectory = show(self.context, wanted.group_name, plan)
             response.planning_time = plan.planning_time
             response.error_code.val = MoveItErrorCodes.SUCCESS
         except Exception as error:  # the node must survive any error of a request
-            response.error_code.val = failed(self.context, "plan_kinematic_path", error, request.group_name)[0]
+            response.error_code.val = failed(self.context, "plan_kinematic_path", error, wanted.group_name)[0]
             response.planning_time = time.monotonic() - begin
         return GetMotionPlanResponse(response)
 

@@ -234,7 +234,7 @@ class _Job:
     name: str
     one: str
     action: type[rospy.Message]
-    result: type[rospy.Message]
+    result: type[PickupResult] | type[PlaceResult]
     feedback: type[rospy.Message]
 
     def __init__(self, context: Context, goal: Any) -> None:
@@ -327,7 +327,8 @@ class _Pick(_Job):
         found = grasp_candidate(one, name, scene, self.context.monitor.reader, self.link)
         return _touching(found, self.goal.allowed_touch_objects)
 
-    def choose(self, result: PickupResult, candidate: Candidate) -> None:
+    def choose(self, result: PickupResult | PlaceResult, candidate: Candidate) -> None:
+        assert isinstance(result, PickupResult)
         result.grasp = self.chosen(candidate)
 
     def posture(self, candidate: Candidate, stage: str) -> tuple[JointTrajectory, float]:
@@ -390,7 +391,8 @@ class _Place(_Job):
         found = place_candidate(one, name, self.context.monitor.reader, self.task, self.goal.place_eef)
         return _touching(found, self.goal.allowed_touch_objects)
 
-    def choose(self, result: PlaceResult, candidate: Candidate) -> None:
+    def choose(self, result: PickupResult | PlaceResult, candidate: Candidate) -> None:
+        assert isinstance(result, PlaceResult)
         result.place_location = self.chosen(candidate)
 
     def posture(self, candidate: Candidate, stage: str) -> tuple[JointTrajectory, float]:

@@ -49,7 +49,8 @@ class SequenceService:
         response, begin = MotionSequenceResponse(), time.monotonic()
         try:
             items = request.request.items
-            scene = self.context.scene_from(items[0].req.start_state, "plan_sequence_path") if items else None
+            scene = self.context.scene_from(items[0].req.start_state, "plan_sequence_path") if items else (
+                self.context.monitor.scene())
             _planned(self.context, self._planner, items, scene, response)
             response.error_code.val = MoveItErrorCodes.SUCCESS
         except Exception as error:  # the node must survive any error of a request
@@ -134,7 +135,7 @@ class SequenceAction:
                                "sequence_move_group", keep_robot=True)
 
 
-def _planned(context: Context, planner: Planner, items: Sequence[MotionSequenceItem], scene: Scene | None,
+def _planned(context: Context, planner: Planner, items: Sequence[MotionSequenceItem], scene: Scene,
              response: MotionSequenceResponse, stop: Callable[[], bool] = lambda: False) -> list[tuple[str, Plan]]:
     """Return [(group name, Plan), ...] of MotionSequenceItems from the state of ``scene``; fill the response."""
     if not items:

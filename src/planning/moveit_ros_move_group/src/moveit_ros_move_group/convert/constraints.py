@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
 from geometry_msgs.msg import Pose, Quaternion
 from moveit_msgs.msg import OrientationConstraint
 
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
     from motion_planning.scene import Scene
     from moveit_ros_move_group.convert.scene_in import SceneReader
 
+M = TypeVar("M")
+T = TypeVar("T")
 # Least and greatest number of corners of a cone of sight; least radius of a target [m].
 _MIN_SIDES, _MAX_SIDES, _NO_RADIUS = 3, 100, 1e-12
 # The quaternion of an orientation may be off by this much, as in MoveIt.
@@ -39,17 +44,18 @@ def constraint_set_of(message: Constraints, scene: Scene, reader: SceneReader,
     looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError for unknown frames, and for
     numbers that are not finite.
     """
-    kinds = ((message.joint_constraints, _joint), (message.position_constraints, _position),
-             (message.orientation_constraints, _orientation), (message.visibility_constraints, _visibility))
-    targets = []
-    for constraints, convert in kinds:
-        targets.append([])
+    def targets(constraints: Iterable[M], convert: Callable[[M, Scene, SceneReader, list[str]], T]) -> tuple[T, ...]:
+        found = []
         for one in constraints:
             try:
-                targets[-1].append(convert(one, scene, reader, remarks))
+                found.append(convert(one, scene, reader, remarks))
             except _LeftOut as reason:
                 remarks.append("%s; the constraint is left out" % reason)
-    found = ConstraintSet(message.name, *targets)
+        return tuple(found)
+
+    found = ConstraintSet(
+        message.name, targets(message.joint_constraints, _joint), targets(message.position_constraints, _position),
+        targets(message.orientation_constraints, _orientation), targets(message.visibility_constraints, _visibility))
     return found if len(found) else None
 
 
@@ -101,21 +107,22 @@ def _position(message: PositionConstraint, scene: Scene, reader: SceneReader, re
     region, offset = message.constraint_region, message.target_point_offset
     what = "the region of link '%s'" % link
     shapes = []
-    for kind, items, poses, convert in (("shape", region.primitives, region.primitive_poses, shape_of),
-                                        ("mesh", region.meshes, region.mesh_poses, mesh_shape_of)):
-        for number, item in enumerate(items):
+    primitives = [partial(shape_of, one) for one in region.primitives]
+    meshes = [partial(mesh_shape_of, one) for one in region.meshes]
+    for kind, made, poses in (("shape", primitives, region.primitive_poses), ("mesh", meshes, region.mesh_poses)):
+        for number, make in enumerate(made):
             if number >= len(poses):
                 remarks.append("%s %d of %s has no pose and is left out" % (kind, number + 1, what))
                 continue
             try:
-                shape = convert(item)
+                shape = make()
             except MessageError as error:
                 remarks.append("%s %d of %s is left out: %s" % (kind, number + 1, what, error))
                 continue
             shapes.append((shape, frame @ matrix_of(poses[number], what)))
     if not shapes:
         raise _LeftOut("the position of link '%s' has no region: give it a shape and a pose" % link)
-    return PositionTarget(link, shapes, (offset.x, offset.y, offset.z), weight=_weight(message))
+    return PositionTarget(link, tuple(shapes), np.array((offset.x, offset.y, offset.z)), weight=_weight(message))
 
 
 def _orientation(message: OrientationConstraint, scene: Scene, reader: SceneReader,
@@ -128,8 +135,8 @@ def _orientation(message: OrientationConstraint, scene: Scene, reader: SceneRead
                        "1; no turn is taken instead" % (link, turn.x, turn.y, turn.z, turn.w, length))
         turn = Quaternion(0.0, 0.0, 0.0, 1.0)
     rotation = matrix_of(Pose(orientation=turn), "the orientation of link '%s'" % link)
-    tolerances = [message.absolute_x_axis_tolerance, message.absolute_y_axis_tolerance,
-                  message.absolute_z_axis_tolerance]
+    x, y, z = tolerances = [message.absolute_x_axis_tolerance, message.absolute_y_axis_tolerance,
+                            message.absolute_z_axis_tolerance]
     if min(tolerances) < 0.0:
         remarks.append("tolerances of the orientation of link '%s' are %s; they are taken without their sign"
                        % (link, tolerances))
@@ -137,7 +144,7 @@ def _orientation(message: OrientationConstraint, scene: Scene, reader: SceneRead
     if message.parameterization not in kinds:
         remarks.append("the parameterization %d of the orientation of link '%s' is unknown; angles about x, y and z "
                        "are taken" % (message.parameterization, link))
-    return OrientationTarget(link, (frame @ rotation)[:3, :3], tuple(map(abs, tolerances)),
+    return OrientationTarget(link, (frame @ rotation)[:3, :3], (abs(x), abs(y), abs(z)),
                              rotation_vector=message.parameterization == OrientationConstraint.ROTATION_VECTOR,
                              weight=_weight(message))
 

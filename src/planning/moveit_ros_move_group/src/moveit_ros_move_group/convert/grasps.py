@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import rospy
@@ -51,7 +51,8 @@ def place_candidate(place: PlaceLocation, name: str, reader: SceneReader, task: 
     pose = reader.frame(scene, place.place_pose.header.frame_id) @ matrix_of(place.place_pose.pose, what)
     opened = place.post_place_posture
     if not opened.points:
-        opened = scene.state.attached[task.target].detach_posture or opened
+        # The core keeps what it was given.
+        opened = cast("JointTrajectory | None", scene.state.attached[task.target].detach_posture) or opened
     pose = pose if of_hand else task.hand_pose(pose)
     return Candidate(
         name, pose, _way(place.pre_place_approach, what + ", approach", scene, reader, task.link),
@@ -116,7 +117,7 @@ def hand_trajectory(posture: JointTrajectory, values: Mapping[str, float], model
     if len(points) == 1 and points[0].time_from_start <= rospy.Duration():
         speeds = np.array([model.velocity[model.index[name]] if name in model.index else math.inf for name in names])
         longest = float((2.0 * np.abs(np.subtract(points[0].positions, begin)) / speeds).max())
-        points[0].time_from_start = rospy.Duration(max(_POSTURE_S, longest))
+        points[0].time_from_start = rospy.Duration.from_sec(max(_POSTURE_S, longest))
     if points[0].time_from_start > rospy.Duration():
         rest = [0.0] * len(names) if points[0].velocities else []
         points.insert(0, JointTrajectoryPoint(

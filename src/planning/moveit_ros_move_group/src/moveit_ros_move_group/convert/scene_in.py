@@ -289,14 +289,16 @@ def _object_of(message: CollisionObject, frame: np.ndarray) -> WorldObject:
     """The WorldObject of a CollisionObject's shapes; ``frame`` (4, 4): its header's, in which the poses are
     returned."""
     shapes = []
-    for kind, items, poses, convert in (("primitives", message.primitives, message.primitive_poses, shape_of),
-                                        ("meshes", message.meshes, message.mesh_poses, mesh_shape_of),
-                                        ("planes", message.planes, message.plane_poses, plane_shape_of)):
-        if len(poses) > len(items):
-            raise MessageError("%d %s but %s" % (len(items), kind, counted(len(poses), "pose")))
-        for i, item in enumerate(items):
+    primitives = [partial(shape_of, one) for one in message.primitives]
+    meshes = [partial(mesh_shape_of, one) for one in message.meshes]
+    planes = [partial(plane_shape_of, one) for one in message.planes]
+    for kind, made, poses in (("primitives", primitives, message.primitive_poses),
+                              ("meshes", meshes, message.mesh_poses), ("planes", planes, message.plane_poses)):
+        if len(poses) > len(made):
+            raise MessageError("%d %s but %s" % (len(made), kind, counted(len(poses), "pose")))
+        for i, make in enumerate(made):
             pose = matrix_of(poses[i], "the pose of a shape") if i < len(poses) else np.eye(4)
-            shape = convert(item)
+            shape = make()
             if isinstance(shape, tuple):
                 shape, inner = shape
                 pose = pose @ inner

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+import genpy
 import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -28,6 +29,7 @@ from moveit_ros_move_group.convert.geometry import add_shapes, pose_of, transfor
 
 if TYPE_CHECKING:
     from octomap_msgs.msg import OctomapWithPose
+    from trajectory_msgs.msg import JointTrajectory
 
     from motion_planning.model import PlanningModel, State
     from motion_planning.scene import AllowedCollisions, AttachedBody, Scene, WorldObject
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 EVERYTHING = 1023
 
 
-def object_message(thing: WorldObject, frame: str, stamp: rospy.Time | None = None,
+def object_message(thing: WorldObject, frame: str, stamp: genpy.Time | None = None,
                    geometry: bool = True) -> CollisionObject:
     """Return the CollisionObject of a WorldObject whose pose is given in ``frame``."""
     message = CollisionObject(id=thing.id, operation=CollisionObject.ADD)
@@ -56,11 +58,11 @@ def attached_message(body: AttachedBody) -> AttachedCollisionObject:
     message = AttachedCollisionObject(link_name=body.link, object=object_message(body.object, body.link),
                                       touch_links=sorted(body.touch_links))
     if body.detach_posture is not None:
-        message.detach_posture = body.detach_posture
+        message.detach_posture = cast("JointTrajectory", body.detach_posture)  # the core keeps what it was given
     return message
 
 
-def state_message(model: PlanningModel, state: State, stamp: rospy.Time | None = None, attached: bool = True,
+def state_message(model: PlanningModel, state: State, stamp: genpy.Time | None = None, attached: bool = True,
                   is_diff: bool = False) -> RobotState:
     """Return the RobotState of a State: all joints, mimic ones too, and the base where a virtual joint moves it."""
     message = RobotState(is_diff=is_diff)
@@ -80,7 +82,7 @@ def state_message(model: PlanningModel, state: State, stamp: rospy.Time | None =
 
 
 def scene_message(scene: Scene, components: int = EVERYTHING, octomap: OctomapWithPose | None = None,
-                  stamp: rospy.Time | None = None) -> PlanningScene:
+                  stamp: genpy.Time | None = None) -> PlanningScene:
     """Return the parts of a scene that ``components`` (bits of PlanningSceneComponents; 0 for all) asks for.
 
     octomap: the OctomapWithPose that the scene's octomap came with, or None.
@@ -115,7 +117,7 @@ def scene_message(scene: Scene, components: int = EVERYTHING, octomap: OctomapWi
     return message
 
 
-def scene_diff(before: Scene, after: Scene, stamp: rospy.Time | None = None,
+def scene_diff(before: Scene, after: Scene, stamp: genpy.Time | None = None,
                octomap: OctomapWithPose | None = None) -> PlanningScene:
     """Return the PlanningScene diff that leads from one scene to another."""
     model = after.model
@@ -157,7 +159,7 @@ def matrix_message(allowed: AllowedCollisions) -> AllowedCollisionMatrix:
 
 
 def trajectory_message(names: Sequence[str], timed: Timed, frame: str,
-                       stamp: rospy.Time | None = None) -> RobotTrajectory:
+                       stamp: genpy.Time | None = None) -> RobotTrajectory:
     """Return the RobotTrajectory of a timing.Timed for joints ``names``."""
     message = RobotTrajectory()
     message.joint_trajectory.header.frame_id = frame
