@@ -41,4 +41,5 @@ def test_pyright():
         if done.returncode:
             shutil.rmtree(folder, ignore_errors=True)
             pytest.skip("pyright could not be fetched: " + done.stderr.strip().splitlines()[-1])
+    lint(sys.executable, ROOT / "tools/message_stubs.py", ROOT / ".baxter/typings")
     lint("node", folder / "pyright/dist/index.js", "--project", ROOT / "pyrightconfig.json")

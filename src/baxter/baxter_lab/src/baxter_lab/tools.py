@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
+from lxml import etree
 
 from baxter_model import SIDES
 from urdf_model import parse_xml

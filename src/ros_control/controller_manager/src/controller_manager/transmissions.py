@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
+from lxml import etree
 
 from command_line.options import counted
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
+from lxml import etree
 
 from sensor_renderer.errors import SensorError
 from sensor_renderer.lens import Distortion, Lens

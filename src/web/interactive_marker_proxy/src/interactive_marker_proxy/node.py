@@ -52,7 +52,7 @@ class Proxy:
         try:
             found = self._buffer.lookup_transform(self._frame, one.header.frame_id.lstrip("/"), rospy.Time(0)).transform
         # ValueError: a name with a zero in it.
-        except (tf2_ros.TransformException, ValueError) as error:  # pyright: ignore[reportAttributeAccessIssue]
+        except (tf2_ros.TransformException, ValueError) as error:
             rospy.logwarn_throttle(10.0, "marker %s stays in frame %r: %s", one.name, one.header.frame_id, error)
             return
         move, turn, place, orientation = found.translation, found.rotation, one.pose.position, one.pose.orientation

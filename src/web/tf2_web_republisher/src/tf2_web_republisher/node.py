@@ -40,7 +40,7 @@ class Republisher:
         try:
             found = self._buffer.lookup_transform(target, source, rospy.Time(0))
         # Frames that are not there yet, or not connected, or no names.
-        except (tf2_ros.TransformException, TypeError, ValueError):  # pyright: ignore[reportAttributeAccessIssue]
+        except (tf2_ros.TransformException, TypeError, ValueError):
             return None
         move, turn = found.transform.translation, found.transform.rotation
         return (move.x, move.y, move.z), (turn.x, turn.y, turn.z, turn.w), found

@@ -38,7 +38,8 @@ def pose_matrix(pose: Pose) -> np.ndarray:
 
 def transform_matrix(transform: Transform) -> np.ndarray:
     """Return the (4, 4) matrix of a geometry_msgs/Transform. Raises InvalidTarget when it is not a transform."""
-    return pose_matrix(Pose(position=transform.translation, orientation=transform.rotation))
+    shift = transform.translation
+    return pose_matrix(Pose(Point(shift.x, shift.y, shift.z), transform.rotation))
 
 
 def posture(chain: Chain, joint_state: JointState) -> np.ndarray:
