@@ -16,6 +16,7 @@ from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
 from gazebo_ros.urdf_extras import plugins
 from gazebo_ros.urdf_extras import sensor_plugins as found_in
+from lab_testing.closing import factory
 from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
@@ -64,15 +65,8 @@ class Lab:
 
 @pytest.fixture
 def lab():
-    made = []
-
-    def make(*arguments, **options):
-        made.append(Lab(*arguments, **options))
-        return made[-1]
-
-    yield make
-    for each in made:
-        each.world.close()
+    with factory(Lab, "world") as made:
+        yield made
 
 
 def wall(world, x):

@@ -12,6 +12,7 @@ from controller_manager.testing import fake_context
 from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros_control.plugin import GazeboRosControl, _flat
+from lab_testing.closing import factory
 from loop_ros.faults import Faults
 from loop_ros.request_queue import RequestQueue
 from loop_ros.testing import FakeLog, FakeRos
@@ -88,16 +89,8 @@ class Simulator:
 
 @pytest.fixture
 def simulate():
-    simulators = []
-
-    def make(*arguments, **options):
-        simulators.append(Simulator(*arguments, **options))
-        return simulators[-1]
-
-    yield make
-    for simulator in simulators:
-        simulator.plugin.close()
-        simulator.world.close()
+    with factory(Simulator, "plugin", "world") as made:
+        yield made
 
 
 def test_controllers_run_at_every_step(simulate):

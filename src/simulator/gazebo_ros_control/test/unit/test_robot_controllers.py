@@ -25,6 +25,7 @@ from bullet_sim import Pose, World
 from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros_control.cascade import GRAVITY_M_S2, CarriedChain
 from gazebo_ros_control.robot_controllers import RobotControllers
+from lab_testing.closing import factory
 from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
@@ -128,16 +129,8 @@ class Robot:
 
 @pytest.fixture
 def make_robot():
-    robots = []
-
-    def make(*arguments, **options):
-        robots.append(Robot(*arguments, **options))
-        return robots[-1]
-
-    yield make
-    for robot in robots:
-        robot.plugin.close()
-        robot.world.close()
+    with factory(Robot, "plugin", "world") as made:
+        yield made
 
 
 @pytest.fixture

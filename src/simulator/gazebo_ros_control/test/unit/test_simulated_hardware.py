@@ -8,6 +8,7 @@ import pytest
 from bullet_sim import Pose, World
 from controller_manager import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY, HardwareError
 from gazebo_ros_control.hardware import SimulatedHardware
+from lab_testing.closing import factory
 from loop_ros.testing import FakeLog
 from urdf_model import parse_urdf
 
@@ -74,15 +75,8 @@ class Arm:
 
 @pytest.fixture
 def make():
-    arms = []
-
-    def make_arm(*arguments, **options):
-        arms.append(Arm(*arguments, **options))
-        return arms[-1]
-
-    yield make_arm
-    for arm in arms:
-        arm.world.close()
+    with factory(Arm, "world") as made:
+        yield made
 
 
 MASSES = [(1e-5, 10.0), (1e-5, 1e-7), (1.0, 0.02), (30.0, 1.0)]
