@@ -282,7 +282,8 @@ def _contact(surface: Surface | None, most: float, axes: np.ndarray) -> dict[str
     # Bullet multiplies the two friction coefficients of a contact; Gazebo (ODE) takes the smaller one, and 1 by
     # default. With coefficients clamped to 1, the product equals the smaller one whenever one of them is 1. Wheels may
     # have more, as they need it on Gazebo's floors of 100.
-    arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, most)}
+    mu = _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, most)
+    arguments: dict[str, Any] = {"lateralFriction": mu}
     if ways is not None:
         arguments["lateralFriction"], arguments["anisotropicFriction"] = scales(ways, axes)
     return {**arguments, **_pressing(surface)}
@@ -377,7 +378,7 @@ def _inertial(link: MergedLink, warn: Callable[[str], None]) -> tuple[float, np.
     mass, moments, axes = moving_inertial(link.inertial)
     ways = directed(link.surface, _WHEEL_FRICTION)
     if ways is not None and ways.direction is not None:
-        moments, axes, off = turned(moments, axes, link.surface.direction)
+        moments, axes, off = turned(moments, axes, ways.direction)
         if is_off(off):
             warn("the friction of link '%s' has the directions of its principal axes of inertia, %.0f degrees from its "
                  "fdir1" % (link.name, np.degrees(off)))
