@@ -10,11 +10,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import genpy
 import numpy as np
 import rospy
 import tf2_ros
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneWorld
+from rospy.rostime import genpy  # of the stamps in messages
 from sensor_msgs.msg import JointState
 
 from command_line.options import counted

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import genpy
 import numpy as np
 import rospy
 from moveit_msgs.srv import LoadMap, LoadMapResponse, SaveMap, SaveMapResponse
+from rospy.rostime import genpy  # of the stamps in messages
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
-import genpy
 import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -22,6 +21,7 @@ from moveit_msgs.msg import (
     RobotState,
     RobotTrajectory,
 )
+from rospy.rostime import genpy  # of the stamps in messages
 from std_msgs.msg import ColorRGBA
 from trajectory_msgs.msg import JointTrajectoryPoint
 
