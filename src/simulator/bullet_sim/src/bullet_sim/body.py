@@ -14,7 +14,7 @@ from urdf_model.transforms import inverse
 
 from .builder import directed_bodies, inertial_frame, set_collision_filter
 from .errors import BulletSimError, within
-from .parts import link_indices
+from .multibodies import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from urdf_model import MergedFrame, MergedLink
 
     from .builder import Blueprint
-    from .parts import Motion, Parts
+    from .multibodies import Motion, Parts
     from .world import World
 
 BASE = -1  # PyBullet's index of the root link

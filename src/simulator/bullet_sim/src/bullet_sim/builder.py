@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turn a merged robot into PyBullet multibodies, mostly one (:mod:`bullet_sim.parts`).
+"""Turn a merged robot into PyBullet multibodies, mostly one (:mod:`bullet_sim.multibodies`).
 
 A body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary file, collision shapes shared between
 copies, the inertia exactly as merged, and 10 ms where loading the same robot from a file takes 60.
@@ -18,7 +18,7 @@ from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .directions import directed, is_off, scales, turned
 from .mass_matrix import moving_inertial
-from .parts import Parts, Place, limbs, patches
+from .multibodies import Parts, Place, limbs, patches
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from urdf_model import Joint, MergedLink, Shape
 
-    from .parts import Limb
+    from .multibodies import Limb
     from .shapes import ShapeStore
 
 _JOINT_TYPES = {

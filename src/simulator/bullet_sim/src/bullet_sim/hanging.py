@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from urdf_model.transforms import inverse
 
-from .parts import link_indices
+from .multibodies import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from urdf_model.transforms import inverse, quaternion_from_matrix
 
-from .parts import link_indices
+from .multibodies import link_indices
 from .pose import Pose
 from .quiet_pybullet import pybullet
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from urdf_model import MergedRobot
 
-    from .parts import Parts, Place
+    from .multibodies import Parts, Place
 
 # A hinge is two points on its axis, so far from the joint [m].
 _HALF_HINGE_M = 0.05

@@ -16,7 +16,7 @@ from .body import Body
 from .damping import JointDamping
 from .errors import BulletSimError, within
 from .loops import close_loops
-from .parts import Motion
+from .multibodies import Motion
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .springs import JointSprings
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from urdf_model import Joint
 
     from .builder import Blueprint
-    from .parts import Parts
+    from .multibodies import Parts
     from .world import World
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of

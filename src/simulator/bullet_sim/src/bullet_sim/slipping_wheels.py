@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .model import Model
-    from .parts import Place
+    from .multibodies import Place
 
 # A force of the slip takes over from a compliance on that is stable, and lets go below this part of it.
 _LETS_GO = 0.8

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from urdf_model import MergedRobot
 
-    from .parts import Motion
+    from .multibodies import Motion
     from .slipping_wheels import Slip
 
 # Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.

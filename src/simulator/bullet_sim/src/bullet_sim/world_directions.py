@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from .builder import most_friction
 from .directions import directed
-from .parts import link_indices
+from .multibodies import link_indices
 from .quiet_pybullet import pybullet
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from .model import Model
-    from .parts import Place
+    from .multibodies import Place
 
 # Scales that differ by less are the same, as are axes whose slopes do [1].
 _SAME, _LEVEL = 1e-3, 0.01

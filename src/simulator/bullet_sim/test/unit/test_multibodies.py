@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bullet_sim import Pose, World, parts
+from bullet_sim import Pose, World, multibodies
 from bullet_sim.quiet_pybullet import pybullet
 from urdf_model import merge_fixed, parse_urdf
 
@@ -34,7 +34,7 @@ BY_TURNS = tuple(element for pair in zip(limb("left", 0.3), limb("right", -0.3),
 
 
 def numbers(limbs, separate=True):
-    return [limb.joints for limb in parts.limbs(merge_fixed(parse_urdf(description(*limbs))), separate)]
+    return [limb.joints for limb in multibodies.limbs(merge_fixed(parse_urdf(description(*limbs))), separate)]
 
 
 def test_large_limbs_of_a_fixed_root_are_multibodies_and_the_smallest_takes_the_small_ones():
@@ -53,7 +53,7 @@ def both(request, monkeypatch):
 
     def each(**options):
         for least, count in ((4, 2), (100, 1)):
-            monkeypatch.setattr(parts, "_MIN_JOINTS", least)
+            monkeypatch.setattr(multibodies, "_MIN_JOINTS", least)
             world = World()
             model = world.spawn(parse_urdf(description(*request.param)), "two", Pose((0.0, 0.0, 1.0)), static=True,
                                 **options)
