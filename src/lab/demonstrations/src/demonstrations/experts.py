@@ -35,6 +35,8 @@ _NEAR_M, _NEAR_RAD, _STILL_NEAR, _BEGUN = 0.008, 0.06, 2.5, 90.0
 _ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 2.0
 #: A thing is carried the more freely the higher it is, from the first to the second height over its place [m].
 _FREE_M = (0.01, 0.06)
+#: Direction from the meeting of two hands to the robot.
+_AWAY = np.array((-1.0, 0.0, 0.0))
 
 
 class Hand(NamedTuple):
@@ -81,13 +83,23 @@ def _funnel(beside):
 
 def _risen(height):
     """How freely a thing is carried at a height [m], 0 to 1."""
-    low, high = _FREE_M
-    return min(max((height - low) / (high - low), 0.0), 1.0)
+    return _share(height, *_FREE_M)
 
 
 def _eased(way):
     """Most of one action [m] of a hand that is `way` [m] from where it began."""
     return min(_MIN_M + (_SPEED_M - _MIN_M) * max(way, 0.0) / _EASY_M, _SPEED_M)
+
+
+def _share(value: float, low: float, high: float) -> float:
+    """How far a value is from the first to the second of two others, 0 to 1; they may fall."""
+    return min(max((value - low) / (high - low), 0.0), 1.0)
+
+
+def _between(one: np.ndarray, other: np.ndarray, share: float) -> np.ndarray:
+    """(3,) a direction between two others, which are not opposite."""
+    found = one + share * (other - one)
+    return found / np.linalg.norm(found)
 
 
 def _nearest(yaw, to, period):
@@ -214,48 +226,79 @@ class TwoArmLiftExpert(Expert):
 
 
 class TwoArmHandoverExpert(Expert):
-    """The right hand brings the hammer in front of the robot, the left one takes it there."""
+    """The right hand brings the hammer in front of the robot, and the left one, which goes where its end will be, takes
+    it there.
+
+    All that is wanted follows from what policies see. A gripper says that it holds something a while after its fingers
+    have stopped, and that is not observed; so a hand has the handle when its fingers are as far apart as the handle is
+    thick.
+    """
 
     TASK = "TwoArmHandover"
     #: Along the hammer: where the right hand takes it, and the left one [m].
     _RIGHT_M, _LEFT_M = 0.05, -0.07
     #: Where the right hand holds it for the left one, and how far hands lean outwards then.
     _MEETING, _TILT_RAD = np.array((0.62, -0.02, 0.10)), math.radians(45.0)
-    _WAITING_M, _BEGUN_M = 0.12, 0.04
+    #: The left hand waits so far from where it will take the hammer, and goes there as the right one arrives: from the
+    #: first to the second distance from the meeting [m].
+    _WAITING_M, _ARRIVING_M = 0.17, (0.10, 0.025)
+    #: Fingers on the handle are less open than this [%], and the hand is so near its place on the handle [m].
+    _ON_HANDLE, _ON_HANDLE_M = {"left": 53.0, "right": 74.0}, {"left": 0.015, "right": 0.03}
+    _BACK_M = 0.05  # a hand that lets go withdraws by this at a time, as far as its fingers are open
 
     def hands(self):
         """Both hands."""
         hammer = self.task.hammer.pose
-        holding = {side: self.arms[side].gripper.holds for side in SIDES}
-        # The hammer's axis, or its reverse, as the hands' first axis: they have it towards the robot.
-        axis = hammer[:3, 0] if hammer[0, 0] < 0.0 else -hammer[:3, 0]
+        # The hammer's axis, or its reverse, as the hands' first axis: the one that is nearer.
+        sense = 1.0 if self.arms["right"].pose[:3, 0] @ hammer[:3, 0] > 0.0 else -1.0
+        axis = sense * hammer[:3, 0]
         grasp = {side: hammer[:3, 3] + along * hammer[:3, 0]
                  for side, along in zip(SIDES, (self._LEFT_M, self._RIGHT_M), strict=True)}
-        waiting = self._MEETING + (0.0, self._WAITING_M, self._WAITING_M)
-        found = {"left": Hand(waiting, self._leaning("left", np.array((-1.0, 0.0, 0.0))), OPEN)}
-        if holding["left"]:
-            return {"left": Hand(self.arms["left"].pose[:3, 3], self.arms["left"].pose[:3, :3], CLOSED),
-                    "right": Hand(self.arms["right"].pose[:3, 3], self.arms["right"].pose[:3, :3], OPEN)}
-        if not holding["right"]:
-            yaw = math.atan2(axis[1], axis[0])
-            return {**found, "right": self._approach("right", grasp["right"], down(yaw))}
-        hand = self.arms["right"].pose[:3, 3]
-        rotation = self._leaning("right", np.array((-1.0, 0.0, 0.0)))
-        if not self.task._lifted() and hand[1] < self._MEETING[1] - 0.1:
-            speed = _eased(float(hammer[2, 3]) - TABLE_TOP_M - 0.5 * self.task.HEAD_M[2]) / _SPEED_M
-            return {**found, "right": Hand(hand + (0.0, 0.0, 0.1), down(math.atan2(axis[1], axis[0])), CLOSED, speed)}
-        found["right"] = Hand(self._MEETING, rotation, CLOSED)
-        begun = float(np.linalg.norm(self.arms["left"].pose[:3, 3] - waiting))
-        # The left hand goes to the hammer, wherever it is: once it is on its way, the other need not keep still.
-        if self._is_at("right", self._MEETING, rotation, 2.0 if begun < self._BEGUN_M else 5.0):
-            found["left"] = self._approach("left", grasp["left"], self._leaning("left", axis))._replace(
-                speed=_eased(begun) / _SPEED_M)
+        height = float(hammer[2, 3]) - TABLE_TOP_M - 0.5 * self.task.HEAD_M[2]
+        if self._has("left", grasp["left"], height):
+            return {"left": self._stays("left", CLOSED), "right": self._withdraws("right")}
+        if not self._has("right", grasp["right"], height):
+            return {"left": self._waits(self._MEETING, _AWAY),
+                    "right": self._approach("right", grasp["right"], down(math.atan2(axis[1], axis[0])))}
+        right, risen = self.arms["right"].pose, _share(height, 0.02, self.task.LIFTED_M)
+        rotation = self._leaning("right", _between(axis, _AWAY, risen), risen)
+        to = right[:3, 3] + risen * (self._MEETING - right[:3, 3]) + (1.0 - risen) * np.array((0.0, 0.0, 0.1))
+        found = {"right": Hand(to, rotation, CLOSED, _eased(height) / _SPEED_M)}
+        # Where the left hand will take it, and, as the right one arrives, where that is now.
+        off = float(np.linalg.norm(self._MEETING - right[:3, 3])) + 0.1 * float(np.linalg.norm(
+            rotation_vector(self._leaning("right", _AWAY) @ right[:3, :3].T)))
+        arrived = _share(off, *self._ARRIVING_M)
+        ready = self._waits(self._MEETING + sense * (self._LEFT_M - self._RIGHT_M) * _AWAY, _AWAY)
+        takes = self._approach("left", grasp["left"], self._leaning("left", axis))
+        found["left"] = takes._replace(place=ready.place + arrived * (takes.place - ready.place),
+                                       rotation=self._leaning("left", _between(_AWAY, axis, arrived)))
         return found
 
-    def _leaning(self, side, axis):
-        """(3, 3) of a hand with its first axis along `axis` (3,), which points to the other side and down."""
-        sign = 1.0 if side == "right" else -1.0
-        pointing = np.array((0.0, sign * math.sin(self._TILT_RAD), -math.cos(self._TILT_RAD)))
+    def _has(self, side: str, place: np.ndarray, height: float) -> bool:
+        """Whether a hand has the handle between its fingers; place (3,) [m]: where it takes it; height [m]: of the
+        hammer. In the air, fingers that are askew count as well."""
+        arm = self.arms[side]
+        most = _BEGUN if side == "right" and height > _FREE_M[0] else self._ON_HANDLE[side]
+        return bool(arm.gripper.position < most
+                    and np.linalg.norm(place - arm.pose[:3, 3]) < self._ON_HANDLE_M[side])
+
+    def _stays(self, side: str, grip: float) -> Hand:
+        return Hand(self.arms[side].pose[:3, 3], self.arms[side].pose[:3, :3], grip)
+
+    def _withdraws(self, side: str) -> Hand:
+        pose, opened = self.arms[side].pose, _share(self.arms[side].gripper.position, self._ON_HANDLE[side], 100.0)
+        return Hand(pose[:3, 3] - opened * self._BACK_M * pose[:3, 2], pose[:3, :3], OPEN)
+
+    def _waits(self, place: np.ndarray, axis: np.ndarray) -> Hand:
+        """The left hand before a place (3,) [m]."""
+        rotation = self._leaning("left", axis)
+        return Hand(place - self._WAITING_M * rotation[:, 2], rotation, OPEN)
+
+    def _leaning(self, side: str, axis: np.ndarray, share: float = 1.0) -> np.ndarray:
+        """(3, 3) of a hand with its first axis along `axis` (3,), which points down and, by `share` of the whole tilt,
+        to the other side."""
+        tilt = share * self._TILT_RAD
+        pointing = np.array((0.0, (1.0 if side == "right" else -1.0) * math.sin(tilt), -math.cos(tilt)))
         pointing -= axis * (axis @ pointing)
         pointing /= np.linalg.norm(pointing)
         return np.column_stack([axis, np.cross(pointing, axis), pointing])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from baxter_lab import Options
+from baxter_lab.robot import Gripper
 from demonstrations.collecting import collect, film
 from demonstrations.environment import core_of, expert_of, record, replay, schema_of
 from demonstrations.experts import EXPERTS, down, rotation_vector
@@ -37,6 +38,36 @@ def test_hands_close_on_a_pot_together(seed):
     left, right = episode.columns[EXPERT_ACTION][:, [6, 13]].T
     assert episode.success and left.max() > 0.0
     np.testing.assert_array_equal(left, right)
+    core.close()
+
+
+def test_a_handover_follows_from_what_policies_see(monkeypatch):
+    """A gripper says that it holds something a while after its fingers have stopped, and policies do not see it: those
+    that learned from an expert that waited for it held on to the hammer."""
+    core = core_of("TwoArmHandover")
+    expert, done, closed = expert_of(core), False, []
+    core.reset(np.random.default_rng(3))
+    expert.begin()
+    while not done and len(closed) < 150:
+        wanted = expert.act()
+        for says in (False, True):
+            with monkeypatch.context() as patch:
+                patch.setattr(Gripper, "holds", property(lambda gripper, says=says: says))
+                np.testing.assert_array_equal(expert.act(), wanted)
+        closed.append((core.lab.robot.left.gripper.position, wanted[[6, 13]] > 0.0))
+        done = core.step(wanted).succeeded
+    assert done
+    on_handle = [both for position, both in closed if position < closed[-1][0] + 2.0]
+    assert len(on_handle) >= 3  # so often is it shown
+    np.testing.assert_array_equal(on_handle, [(True, False)] * len(on_handle))
+    core.close()
+
+
+@pytest.mark.parametrize("seed", [100013, 100020])
+def test_a_disturbed_handover_succeeds(seed):
+    """The right gripper lost its grip for a moment, opened, and the hammer fell: these seeds failed."""
+    core = core_of("TwoArmHandover")
+    assert record(core, expert_of(core), seed, noise=1.0).success
     core.close()
 
 
