@@ -378,6 +378,28 @@ def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):
     assert sorted(order("--shuffle=1")) == order()
 
 
+EXAMPLES = """import time
+from hypothesis import given, settings, strategies
+@strategies.composite
+def slow(draw):
+    time.sleep(0.3)
+    return draw(strategies.integers())
+@given(strategies.integers())
+def test_quick(number): print("one of quick")
+@settings(max_examples=5)
+@given(slow())
+def test_on_a_busy_machine(number): pass
+"""
+
+
+@pytest.mark.parametrize(("words", "examples"), [([], 50), (["--long"], 500), (["-n1"], 50)])
+def test_examples_are_few_unless_long_tests_run_and_their_time_is_no_failure(tmp_path, words, examples):
+    (tmp_path / "test_one.py").write_text(EXAMPLES)
+    done = run_pytest(tmp_path, "-rP", *words)
+    assert done.stdout.splitlines()[-1].startswith("2 passed, 0 failed"), done.stdout
+    assert done.stdout.splitlines().count("one of quick") == examples
+
+
 COLLECTED = """import os
 with open(os.environ["PYTEST_XDIST_WORKER"] + ".txt", "a") as stream:
     stream.write(__name__ + "\\n")

@@ -40,6 +40,8 @@ DURATIONS, FIRST_DURATIONS = "durations.json", Path(__file__).with_name("duratio
 MIN_DURATION_S = 2.0
 # Temporary files that are named.
 MAX_NAMED = 20
+# Examples of a test by Hypothesis that names no number: everywhere, and with --long.
+QUICK_EXAMPLES, DEEP_EXAMPLES = 50, 500
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -64,6 +66,19 @@ def pytest_configure(config: pytest.Config) -> None:
     # A few files run in this process itself.
     if is_worker or not config.option.numprocesses:
         config.pluginmanager.register(Worker(config), "lab worker")
+        load_hypothesis_profile(config)
+
+
+def load_hypothesis_profile(config: pytest.Config) -> None:
+    """Few examples, or many with --long; unless --hypothesis-profile names another profile."""
+    import hypothesis  # here, since the controller of a whole run needs none of it
+
+    for name, examples in (("quick", QUICK_EXAMPLES), ("deep", DEEP_EXAMPLES)):
+        # How long an example takes is the machine's doing, not the code's.
+        hypothesis.settings.register_profile(name, max_examples=examples, deadline=None,
+                                             suppress_health_check=[hypothesis.HealthCheck.too_slow])
+    if not config.getoption("hypothesis_profile", None):
+        hypothesis.settings.load_profile("deep" if config.option.long else "quick")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> RostestFile | None:
