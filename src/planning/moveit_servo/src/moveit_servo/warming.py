@@ -7,6 +7,7 @@ from motion_planning.scene import Scene, WorldObject
 from motion_planning.spheres import SphereModel
 from moveit_servo.servo import Command, Servo
 from moveit_servo.settings import ServoSettings
+from moveit_servo.straight import StraightWay
 from moveit_servo.surroundings import Surroundings
 from urdf_model import Box
 
@@ -23,5 +24,10 @@ def warm_up() -> None:
     servo = Servo(model, ServoSettings(move_group_name="arm", command_out_topic="command"))
     scene = Scene(model).with_object(WorldObject("box", np.eye(4), ((Box((0.1, 0.9, 0.1)), np.eye(4)),)))
     servo.surroundings = Surroundings(SphereModel.of(model, None), servo.group, scene)
-    for command in (Command(joints=np.array([0.5])), Command(twist=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5]))):
+    turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
+    for command in (Command(joints=np.array([0.5])), Command(twist=turn), Command(pose=np.eye(4))):
         servo.step(np.zeros(1), np.zeros(1), command, 0.01)
+    # A servo calls it for a hand that has come up to the speed of its twist and that nothing holds back.
+    way = StraightWay()
+    for _ in range(2):
+        way.correction(servo.pose(np.zeros(1)), turn, 1.0)
