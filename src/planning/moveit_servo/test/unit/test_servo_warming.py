@@ -17,7 +17,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from steered_arms import Driven, planar_model  # noqa: E402
 
 
-
 def at(x, y):
     place = np.eye(4)
     place[:2, 3] = x, y
