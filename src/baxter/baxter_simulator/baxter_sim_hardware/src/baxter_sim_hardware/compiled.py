@@ -50,8 +50,9 @@ def load() -> None:
 def load_of_effects(numbers: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
     """Those of a robot with every effect of the physical one; numbers: what ``effects.read`` returns."""
     here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
-    sensors = JointSensors(numbers["noise"], ["left_s0"], 0, 0)
-    sensors.reached(sensors.felt(here), np.arange(1))
+    # Two joints: numbers of some of them are in another order in memory than those of all, or of one.
+    sensors = JointSensors(numbers["noise"], ["left_s0", "left_s1"], 0, 0)
+    sensors.reached(sensors.felt(np.zeros(2)), np.arange(2))
     actuators = Actuators(numbers["lag"], ["left_s0"])
     actuators.torques(Wanted(bound > 0.0, here, at_rest, bound > 0.0, here, bound), np.ones((3, 1)), 1.0)
     rotations, origins, rates = _arm()

@@ -10,23 +10,25 @@ from baxter_core_msgs.msg import JointCommand
 from numba.core.dispatcher import Dispatcher
 
 from baxter_model import joint_names
-from baxter_sim_hardware import compiled
+from baxter_sim_hardware import compiled, effects
 from baxter_sim_hardware.arms.joint_command import Mode
 
 HEARD = ("*",)
 LOADED = """
 import json, sys
 from numba.core.dispatcher import Dispatcher
-from baxter_sim_hardware import compiled
+from baxter_sim_hardware import compiled, effects
 compiled.load()
+if "robot" in sys.argv:
+    compiled.load_of_effects(effects.read(effects.physical_robot()))
 print(json.dumps({found.py_func.__qualname__: list(map(str, found.signatures))
     for name, module in list(sys.modules.items()) if name.startswith("baxter_sim_hardware")
     for found in vars(module).values() if isinstance(found, Dispatcher)}))
 """
 
 
-def printed_by(program):
-    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300,
+def printed_by(program, *words):
+    return subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, timeout=300,
                           check=True).stdout
 
 
@@ -36,8 +38,12 @@ def test_cameras_and_spawning_load_no_compiled_code(module):
                       "if name in sys.modules])" % module) == "[]\n"
 
 
-def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
-    compiled.load()  # they call each other, and none can be compiled while it is replaced
+@pytest.mark.parametrize(("profile", "chosen"), [("sim", {}), ("robot", {}), ("robot", {"effects": "noise"})],
+                         ids=["sim", "robot", "noise"])
+def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch, profile, chosen):
+    # They call each other, and none can be compiled while it is replaced.
+    compiled.load()
+    compiled.load_of_effects(effects.read(effects.physical_robot()))
     called = {}
 
     def recorded(function):
@@ -51,13 +57,13 @@ def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
         for name, found in list(vars(module).items()):
             if isinstance(found, Dispatcher):
                 monkeypatch.setattr(module, name, recorded(found))
-    lab = make_lab()
+    lab = make_lab(parameters={"profile": profile, **chosen})
     lab.enable()
     lab.run(0.1)
     for mode in Mode:
         names = list(joint_names("left"))
         lab.send("limb/left/joint_command", JointCommand(mode, [0.1] * len(names), names))
         lab.run(0.1)
-    loaded = json.loads(printed_by(LOADED))
+    loaded = json.loads(printed_by(LOADED, profile))
     assert {"follow", "approach", "any_beyond", "_clamp", "shares_in_step", "cruising_speeds"} <= called.keys()
     assert {name: types - set(loaded[name]) for name, types in called.items()} == dict.fromkeys(called, set())
