@@ -25,12 +25,14 @@ CONTRACT, OBSERVATION, ACTIONS = "contract", "observation", "actions"
 _IR_VERSION, _OPERATORS = 8, 13
 _FLOAT, _INT64 = 1, 7
 _INT_ATTRIBUTE = 2
-#: Of a quaternion x y z w: which products of two of its numbers there are, and the first two axes of its rotation as
-#: sums of them, as `inputs` has them.
+#: Of a quaternion x y z w: which products of two of its numbers there are, and the axes of its rotation as sums of
+#: them, as `inputs` has them.
 _PRODUCTS = list(combinations_with_replacement(range(4), 2))
 _AXES = ({(1, 1): -2, (2, 2): -2}, {(0, 1): 2, (2, 3): 2}, {(0, 2): 2, (1, 3): -2},
-         {(0, 1): 2, (2, 3): -2}, {(0, 0): -2, (2, 2): -2}, {(1, 2): 2, (0, 3): 2})
-_ONES = (1, 0, 0, 0, 1, 0)
+         {(0, 1): 2, (2, 3): -2}, {(0, 0): -2, (2, 2): -2}, {(1, 2): 2, (0, 3): 2},
+         {(0, 2): 2, (1, 3): 2}, {(1, 2): 2, (0, 3): -2}, {(0, 0): -2, (1, 1): -2})
+_ONES = (1, 0, 0, 0, 1, 0, 0, 0, 1)
+_TWO, _THREE = 6, 9
 
 
 @dataclass
@@ -61,13 +63,17 @@ def graph_of(policy: Policy) -> Graph:
         return graph.add("Gather", OBSERVATION, np.array(index, np.int64), axis=1)
 
     parts = [columns(group) for group in taken.places]
-    parts += [_two_axes(graph, columns(group)) for group in taken.turns]
+    parts += [_axes(graph, columns(group), _TWO) for group in taken.turns]
     if taken.others:
         parts.append(columns(taken.others))
     apart = [graph.add("Sub", columns(taken.places[second]), columns(taken.places[first]))
              for first, second in taken.pairs]
     parts += apart
-    parts += [graph.add("Tanh", graph.add("Mul", one, np.array([1.0 / FINE_M]))) for one in apart]
+    parts += [_fine(graph, one) for one in apart]
+    for sight in taken.sights:
+        hand, turn = _axes(graph, columns(sight.hand_turn), _THREE), _axes(graph, columns(sight.turn), _TWO)
+        away = _seen(graph, hand, graph.add("Sub", columns(sight.place), columns(sight.hand_place)), range(3))
+        parts += [_seen(graph, hand, turn, range(3)), _seen(graph, hand, turn, range(3, 6)), away, _fine(graph, away)]
     seen = graph.add("Concat", *parts, axis=1)
     seen = graph.add("Div", graph.add("Sub", seen, policy.input_mean), policy.input_scale)
     value = graph.add("Clip", seen, np.array(-MOST), np.array(MOST))
@@ -81,11 +87,21 @@ def graph_of(policy: Policy) -> Graph:
     return graph
 
 
-def _two_axes(graph, quaternion):
+def _axes(graph, quaternion, count):
     first, second = (graph.add("Gather", quaternion, np.array(index, np.int64), axis=1)
                      for index in zip(*_PRODUCTS, strict=True))
-    sums = np.array([[axis.get(pair, 0) for axis in _AXES] for pair in _PRODUCTS], float)
-    return graph.add("Gemm", graph.add("Mul", first, second), sums, np.array(_ONES, float))
+    sums = np.array([[axis.get(pair, 0) for axis in _AXES[:count]] for pair in _PRODUCTS], float)
+    return graph.add("Gemm", graph.add("Mul", first, second), sums, np.array(_ONES[:count], float))
+
+
+def _seen(graph, axes, vectors, columns):
+    """Three columns of vectors, along the axes of a frame."""
+    thrice = graph.add("Gather", vectors, np.array([*columns] * 3, np.int64), axis=1)
+    return graph.add("Gemm", graph.add("Mul", axes, thrice), np.repeat(np.eye(3), 3, axis=0), np.zeros(3))
+
+
+def _fine(graph, difference):
+    return graph.add("Tanh", graph.add("Mul", difference, np.array([1.0 / FINE_M])))
 
 
 # -- messages: fields of a number, bytes, a text, or a message

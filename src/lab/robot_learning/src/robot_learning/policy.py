@@ -112,10 +112,10 @@ class Policy:
 
     def __post_init__(self) -> None:
         contract = self.contract
-        if contract.inputs != inputs.KIND:
-            raise PolicyError("the policy's inputs are of kind %r; this version has %r"
-                              % (contract.inputs, inputs.KIND))
-        self.inputs = Inputs(contract.observation, contract.control != "osc_pose")
+        if contract.inputs not in inputs.KINDS:
+            raise PolicyError("the policy's inputs are of kind %r; this version has %s"
+                              % (contract.inputs, ", ".join(map(repr, inputs.KINDS))))
+        self.inputs = Inputs(contract.observation, contract.control != "osc_pose", contract.inputs)
         self._require_numbers()
         expected = (len(self.inputs), contract.chunk * len(contract.action))
         found = (self.network.layers[0][0].shape[0], self.network.layers[-1][0].shape[1])

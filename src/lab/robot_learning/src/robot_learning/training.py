@@ -100,7 +100,7 @@ def train(data: DataSet, settings: TrainingSettings = TrainingSettings(), made: 
     contract = contract_of(data, settings.chunk, made)
     examples = Examples.of(data, numbers[judged:], settings.chunk)
     judge = Examples.of(data, numbers[:judged], settings.chunk) if judged else examples
-    taken = Inputs(contract.observation, contract.control != "osc_pose")
+    taken = Inputs(contract.observation, contract.control != "osc_pose", contract.inputs)
     seen = taken.of(examples.observations)
     mean, scale = seen.mean(axis=0), np.maximum(seen.std(axis=0), _MIN_INPUT_SCALE)
     actions = examples.chunks[:, 0]

@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from demonstrations.frames import ACTION, ENVIRONMENT, STATE, DemonstrationError, Episode, Schema, numbers
 from demonstrations.reading import DataSet
 from demonstrations.writing import SetWriter
 from robot_learning import command
 from robot_learning.evaluation import Score, wilson
-from robot_learning.inputs import Inputs
+from robot_learning.inputs import KIND, KINDS, Inputs
 from robot_learning.network import Network
 from robot_learning.pictures import choose, draw_curve
 from robot_learning.policy import Contract, PolicyError, Runner, load
@@ -200,6 +201,22 @@ def test_a_quaternion_and_its_negative_are_the_same_input():
     np.testing.assert_array_equal(one, other)
     assert one.shape == (1, len(inputs)) == (1, 9)
     np.testing.assert_allclose(one[0, 3:6], (1.0 - 2.0 * 0.36, 2.0 * 0.48, 0.0), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hand_sees_things_the_same_wherever_it_is_and_turns(kind):
+    """Inputs of the newest kind, not of the one before, which files of earlier versions name."""
+    names = ["%s.%s" % (thing, part) for thing in ("left_hand", "block")
+             for part in ("x", "y", "z", "qx", "qy", "qz", "qw")]
+    block, turn, moved = (0.1, -0.02, 0.3), Rotation.from_euler("xyz", (0.2, -0.4, 1.0)), np.array((0.5, 0.1, 0.2))
+    inputs, rows = Inputs(names, False, kind), []
+    for hand in (Rotation.identity(), Rotation.from_euler("xyz", (2.0, 0.3, -0.7))):
+        rows.append([*moved, *hand.as_quat(), *(moved + hand.apply(block)), *(hand * turn).as_quat()])
+    one, other = inputs.of(np.array(rows))
+    assert len(one) == len(inputs) == (36 if kind == KIND else 24)
+    if kind == KIND:
+        np.testing.assert_allclose(one[-12:], other[-12:], atol=1e-6)
+        np.testing.assert_allclose(one[-12:-3], [*turn.as_matrix()[:, 0], *turn.as_matrix()[:, 1], *block], atol=1e-6)
 
 
 def test_speeds_are_no_inputs_and_angles_only_of_joint_policies():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robot_learning import onnx_writing
-from robot_learning.inputs import Inputs
+from robot_learning.inputs import KINDS, Inputs
 from robot_learning.network import Network
 from robot_learning.policy import Contract, Policy, PolicyError, load
 
@@ -23,11 +23,12 @@ OPERATORS = {
     "Reshape": lambda value, shape: value.reshape(shape)}
 
 
-@pytest.fixture(scope="module")
-def policy():
+@pytest.fixture(scope="module", params=KINDS)
+def policy(request):
     random = np.random.default_rng(3)
-    contract = Contract("PickPlace", "osc_pose", 20, NAMES, ("",) * len(NAMES), ("a", "b", "c"), 4)
-    width = len(Inputs(NAMES, False))
+    contract = Contract("PickPlace", "osc_pose", 20, NAMES, ("",) * len(NAMES), ("a", "b", "c"), 4,
+                        inputs=request.param)
+    width = len(Inputs(NAMES, False, request.param))
     mean, scale = random.normal(size=width), random.uniform(0.2, 1.0, width)
     return Policy(contract, Network.random((width, 16, 12), random), mean, scale, random.normal(0.0, 0.2, 3),
                   random.uniform(0.5, 2.0, 3))
