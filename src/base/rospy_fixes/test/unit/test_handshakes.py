@@ -155,7 +155,8 @@ def test_a_client_that_goes_in_its_handshake_costs_no_line_and_no_descriptor(sce
         scene.connect(framed(b"half")[:5]).close()
         scene.server.turn(0.0)
     scene.turn_until(lambda: scene.server.pending == 0, "all to be gone")
-    assert len(os.listdir("/proc/self/fd")) == before
+    # What earlier tests have left to the garbage collector may go meanwhile, or a thread of theirs open something.
+    wait_until(lambda: len(os.listdir("/proc/self/fd")) <= before, "no more descriptors than before")
     assert scene.lines == []
 
 
