@@ -364,7 +364,8 @@ def test_a_temporary_file_that_a_test_leaves_is_named_and_removed(tmp_path, word
                                           "    os.system('mktemp -t XXXXXXleft')")
     before = set(Path(tempfile.gettempdir()).iterdir())
     done = run_pytest(tmp_path, *words)
-    assert "left 2 temporary files" in done.stdout and done.stdout.splitlines()[-1].startswith("1 passed, 0 failed")
+    assert "left 2 temporary files" in done.stdout, done.stdout
+    assert done.stdout.splitlines()[-1].startswith("1 passed, 0 failed"), done.stdout
     assert not {path.name for path in set(Path(tempfile.gettempdir()).iterdir()) - before if "left" in path.name}
 
 

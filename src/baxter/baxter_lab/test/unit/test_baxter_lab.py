@@ -18,6 +18,7 @@ def lab():
 
 def test_a_disabled_robot_refuses_and_an_enabled_one_moves(lab):
     arm = lab.robot.left
+    lab.robot.disable()  # another test may have enabled it
     with pytest.raises(CommandRefused):
         arm.move(arm.angles)
     lab.robot.enable()
