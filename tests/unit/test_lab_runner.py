@@ -8,13 +8,15 @@ import subprocess
 import sys
 import tempfile
 import uuid
+from collections import OrderedDict
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import run_tests
 from lab_testing.waiting import wait_until
-from lab_tests import comma_locale, processes, rostests
+from lab_tests import comma_locale, plugin, processes, rostests
 from lab_tests.discovery import SelectionError, changed_files, is_long, mostly_waits, select, take_inventory
 from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 
@@ -411,6 +413,25 @@ def test_each_worker_begins_its_collection_with_other_files(tmp_path):
     assert done.stdout.splitlines()[-1].startswith("6 passed, 0 failed")
     firsts = [(tmp_path / f"gw{number}.txt").read_text().split()[0] for number in range(3)]
     assert firsts == ["test_a", "test_c", "test_e"]
+
+
+class WorkerNode:
+    def __init__(self, name, ended):
+        self.gateway, self.shutdown = SimpleNamespace(id=name), lambda: ended.append(name)
+
+
+@pytest.mark.parametrize(("left", "runs"), [(["gw2"], "gw2"), (["gw0", "gw2"], None)])
+def test_a_worker_beside_the_cores_runs_what_nobody_else_is_there_for(monkeypatch, tmp_path, left, runs):
+    """xdist ends the last of more workers than files, in the order in which they began."""
+    taken, ended = [], []
+    monkeypatch.setattr(plugin.LoadScopeScheduling, "_assign_work_unit", lambda _, node: taken.append(node.gateway.id))
+    nodes = [WorkerNode(name, ended) for name in left]
+    made = object.__new__(plugin.FileScheduling)
+    made.config, made.numnodes = SimpleNamespace(rootpath=tmp_path), 3
+    made.workqueue = OrderedDict({"test_one.py": {"test_one.py::test_one": False}})
+    made.assigned_work = {node: {} for node in nodes}
+    made._assign_work_unit(next(node for node in made.assigned_work if node.gateway.id == "gw2"))
+    assert (taken, ended) == (([runs], []) if runs else ([], ["gw2"]))
 
 
 def test_modules_are_compiled_once_for_all_programs_of_a_run(monkeypatch, tmp_path):

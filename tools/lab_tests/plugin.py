@@ -341,7 +341,9 @@ class FileScheduling(LoadScopeScheduling):
         waiting = {unit: mostly_waits(self.config.rootpath / file_of(next(iter(tests))))
                    for unit, tests in self.workqueue.items()}
         wanted = next((unit for unit, waits in waiting.items() if waits == self._is_extra(node)), None)
-        if wanted is None and self._is_extra(node):
+        # xdist has ended the last of more workers than files; which ones these are depends on how fast they began.
+        others = any(not self._is_extra(other) for other in self.assigned_work)
+        if wanted is None and self._is_extra(node) and others:
             node.shutdown()
             return
         self.workqueue.move_to_end(wanted or next(iter(self.workqueue)), last=False)
