@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .model import Robot
 
 
-Numbers = TypeVar("Numbers", float, Sequence[float], np.ndarray)
+Numbers = TypeVar("Numbers", bound=float | Sequence[float] | np.ndarray)
 
 
 class OutOfBounds(ValueError):
@@ -39,7 +39,7 @@ class Bound:
 
         ``what`` names them in the text of OutOfBounds.
         """
-        numbers = values if np.ndim(values) else (values,)
+        numbers = (values,) if isinstance(values, (int, float, np.number)) else values
         for number in numbers:
             # Also true for NaN, because it compares as false.
             if not self.low <= number <= self.high:

@@ -100,8 +100,9 @@ class IdleElements:
     def text(self) -> str:
         """The line, "" where nothing was added."""
         reasons = "; ".join("%s: %s" % (reason, placed(tags)) for reason, tags in self._reasons.items())
+        unknown = placed(self._unknown)
         return "; ".join(filter(None, (reasons and "without an effect here: " + reasons,
-                                       self._unknown and "not known and left out: " + placed(self._unknown))))
+                                       unknown and "not known and left out: " + unknown)))
 
 
 def add_place(table: dict[str, dict[str, list[Any]]], what: str, source: str, line: Any) -> None:

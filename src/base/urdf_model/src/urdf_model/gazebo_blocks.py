@@ -67,7 +67,8 @@ def _read_link_block(element: Any, link: Link, whole: Link, warn: Callable[[Any,
     for part in element.iterchildren("dampingFactor"):
         value = _number(part, "link '%s'" % link.name, False, warn)
         if value is not None:
-            whole.decay = (_within(part, "link '%s'" % link.name, value, 1.0, warn),) * 2
+            share = _within(part, "link '%s'" % link.name, value, 1.0, warn)
+            whole.decay = (share, share)
     for part in element.iterchildren("selfCollide", "self_collide"):
         whole.self_collide = is_true(content(part))
     for part in element.iterchildren("turnGravityOff", "gravity"):

@@ -127,11 +127,11 @@ def merge_fixed(robot: Robot, held: bool = False) -> MergedRobot:
 
 
 def _merge_group(robot, body, members, frames, wholes):
-    merged = MergedLink(body, None, members=list(members))
+    visuals, collisions = [], []
     parts = {}  # member -> (mass, centre, inertia)
     for name in members:
         link, offset = robot.links[name], frames[name].offset
-        for source, target in ((link.visuals, merged.visuals), (link.collisions, merged.collisions)):
+        for source, target in ((link.visuals, visuals), (link.collisions, collisions)):
             target.extend(
                 replace(shape, origin=offset @ shape.origin, link=name) for shape in source
             )
@@ -139,7 +139,7 @@ def _merge_group(robot, body, members, frames, wholes):
             rotation = offset[:3, :3]
             centre = rotation @ link.inertial.centre + offset[:3, 3]
             parts[name] = link.inertial.mass, centre, rotation @ link.inertial.inertia @ rotation.T
-    merged.inertial = combine([*parts.values()])
+    merged = MergedLink(body, combine([*parts.values()]), visuals, collisions, list(members))
     said = [name for name in members if robot.links[name].surface is not None]
     said.sort(key=lambda name: not robot.links[name].collisions)  # the first with shapes, if one has any
     if said:
@@ -193,7 +193,7 @@ def combine(parts: Sequence[tuple[float, np.ndarray, np.ndarray]]) -> Inertial:
     if mass <= 0.0:
         inertia = sum((part[2] for part in parts), np.zeros((3, 3)))
         return Inertial(0.0, np.zeros(3), inertia)
-    centre = sum(m * c for m, c, _ in parts) / mass
+    centre = sum((m * c for m, c, _ in parts), np.zeros(3)) / mass
     inertia = np.zeros((3, 3))
     for m, c, i in parts:
         d = c - centre

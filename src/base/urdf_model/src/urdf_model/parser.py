@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 
 JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
 #: Of a material: rgba, and what it has besides.
-Look = tuple[tuple[float, ...] | None, Finish | None]
+Look = tuple[tuple[float, float, float, float] | None, Finish | None]
 Named = TypeVar("Named", Link, Joint)
+Default = TypeVar("Default", float, None)
 _MOMENTS = (((0, 0), "ixx"), ((0, 1), "ixy"), ((0, 2), "ixz"), ((1, 1), "iyy"), ((1, 2), "iyz"), ((2, 2), "izz"))
 
 
@@ -61,14 +62,15 @@ def parse_urdf(xml: str | bytes, source: str = "robot_description") -> Robot:
 class _Reader:
     def __init__(self, xml: str | bytes, source: str) -> None:
         self.source = source
-        self.warnings = []
+        self.warnings: list[str] = []
         try:
-            self.root = parse_xml(xml)
+            root = parse_xml(xml)
         except XmlRefused as error:
             raise UrdfError("%s %s" % (source, error)) from None
-        if self.root is None or self.root.tag != "robot":
-            found = "nothing" if self.root is None else "<%s>" % self.root.tag
+        if root is None or root.tag != "robot":
+            found = "nothing" if root is None else "<%s>" % root.tag
             raise UrdfError("%s is not a URDF: its root element is %s, expected <robot>" % (source, found))
+        self.root = root
 
     def error(self, element: etree._Element, text: str) -> UrdfError:
         return UrdfError("%s, line %s: %s" % (self.source, element.sourceline, text))
@@ -165,20 +167,21 @@ class _Reader:
         link = Link(self.name(element), line=element.sourceline)
         inertials = [*element.iterchildren("inertial")]
         parts = [*inertials[:1], *element.iterchildren("visual"), *element.iterchildren("collision")]
+        inertial = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
         for further in inertials[1:]:
             self.warn(further, "link '%s' has an <inertial> already; this one is ignored" % link.name)
         for count, part in enumerate(parts):
             try:
                 if part.tag == "inertial":
-                    link.inertial = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
-                    self.inertial(part, link)
+                    link.inertial = inertial
+                    self.inertial(part, inertial, link.name)
                     continue
                 shape = self.shape(part, looks, link.name)
             except UrdfError as error:
                 left = [one.tag for one in parts[count:]]
                 said = ["%d <%s>" % (left.count(tag), tag) for tag in ("visual", "collision") if tag in left]
                 if part.tag == "inertial":
-                    said.insert(0, "its mass is %g kg" % link.inertial.mass)
+                    said.insert(0, "its mass is %g kg" % inertial.mass)
                 self.warnings.append("%s. Link '%s' is read as by urdfdom, up to there: %s%s"
                                      % (error, link.name, ", ".join(said), " left out" if len(left) > 1 or
                                         part.tag != "inertial" else ""))
@@ -187,21 +190,21 @@ class _Reader:
                 (link.visuals if part.tag == "visual" else link.collisions).append(shape)
         return link
 
-    def inertial(self, element: etree._Element, link: Link) -> None:
-        """Read an <inertial> into ``link``."""
+    def inertial(self, element: etree._Element, inertial: Inertial, link: str) -> None:
+        """Read the <inertial> of ``link`` into ``inertial``."""
         origin = self.origin(element)
         mass = self.child(element, "mass")
-        value = self.number(mass, "value", required=True)
+        value = self.required_number(mass, "value")
         if value < 0.0:
-            self.warn(mass, "mass of link '%s' is %g kg; 0 is assumed" % (link.name, value))
-        link.inertial.mass = max(value, 0.0)
-        link.inertial.centre = origin[:3, 3].copy()
+            self.warn(mass, "mass of link '%s' is %g kg; 0 is assumed" % (link, value))
+        inertial.mass = max(value, 0.0)
+        inertial.centre = origin[:3, 3].copy()
         matrix = np.zeros((3, 3))
         inertia = element.find("inertia")
         missing = [key for _, key in _MOMENTS if inertia is None or inertia.get(key) is None]
         if missing:
             self.warn(element, "inertia of link '%s' has no %s; 0 is assumed (for urdfdom, such a link has no shapes)"
-                      % (link.name, ", ".join(missing)))
+                      % (link, ", ".join(missing)))
         if inertia is None:
             return
         for (i, j), key in _MOMENTS:
@@ -211,10 +214,10 @@ class _Reader:
             self.warn(
                 inertia,
                 "inertia of link '%s' has the negative principal moment %g kg m^2; no body has that"
-                % (link.name, smallest),
+                % (link, smallest),
             )
         rotation = origin[:3, :3]
-        link.inertial.inertia = rotation @ matrix @ rotation.T
+        inertial.inertia = rotation @ matrix @ rotation.T
 
     def shape(self, element: etree._Element, looks: dict[str, Look], link: str) -> Shape | None:
         """Return the Shape of a <visual> or <collision>; None for a mesh whose name is empty."""
@@ -235,7 +238,8 @@ class _Reader:
 
     def geometry(self, element: etree._Element, link: str) -> Box | Cylinder | Sphere | Mesh | None:
         if element.tag == "box":
-            return Box(tuple(self.positive(element, "size", 3, link)))
+            x, y, z = self.positive(element, "size", 3, link)
+            return Box((x, y, z))
         if element.tag == "cylinder":
             return Cylinder(self.positive(element, "radius", 1, link)[0], self.positive(element, "length", 1, link)[0])
         if element.tag == "sphere":
@@ -244,11 +248,11 @@ class _Reader:
             filename = element.get("filename")
             if filename is None:
                 raise self.error(element, "<mesh> of link '%s' has no filename" % link)
-            scale = self.vector(element, "scale", 3, default=(1.0, 1.0, 1.0))
+            x, y, z = self.vector(element, "scale", 3, default=(1.0, 1.0, 1.0))
             if not filename:
                 self.warn(element, "<mesh> of link '%s' has an empty filename and is left out" % link)
                 return None
-            return Mesh(filename, tuple(scale), element.get("submesh", ""), is_true(element.get("centred")))
+            return Mesh(filename, (x, y, z), element.get("submesh", ""), is_true(element.get("centred")))
         raise self.error(
             element, "link '%s' has a <%s>; known shapes are box, cylinder, sphere and mesh" % (link, element.tag)
         )
@@ -304,7 +308,7 @@ class _Reader:
                     "unlimited one" % (kind, name),
                 )
             return Limit()
-        limit = Limit(velocity=self.number(element, "velocity"), effort=self.number(element, "effort"))
+        limit = Limit(velocity=self.number(element, "velocity", None), effort=self.number(element, "effort", None))
         # Some tools write the largest float for "none".
         limit.velocity, limit.effort = (
             None if value is not None and value > bounds.NO_LIMIT else value
@@ -369,12 +373,12 @@ class _Reader:
             looks[name] = look
         return look if look != (None, None) else looks.get(name, look)
 
-    def colour(self, element: etree._Element | None, material: str) -> tuple[float, ...] | None:
+    def colour(self, element: etree._Element | None, material: str) -> tuple[float, float, float, float] | None:
         """Return the rgba of a <color>, None where it cannot be read."""
         if element is None:
             return None
         try:
-            rgba = self.vector(element, "rgba", None)
+            rgba = self.required_vector(element, "rgba", None)
         except UrdfError as error:
             self.warnings.append("%s; the colour of material '%s' is left out" % (error, material))
             return None
@@ -386,7 +390,8 @@ class _Reader:
             self.warn(element, "the colour of material '%s' has %d numbers, expected 4; urdfdom takes it for black"
                       % (material, len(rgba)))
             return (0.0, 0.0, 0.0, 1.0)
-        return tuple(rgba)
+        red, green, blue, opacity = rgba
+        return red, green, blue, opacity
 
     def own_look(self, element: etree._Element) -> Look:
         rgba = self.colour(element.find("color"), element.get("name", ""))
@@ -404,11 +409,14 @@ class _Reader:
         if texture is None and emission is None and gloss is None:
             return None
         none = Finish()
+        red, green, blue = self.vector(emission, "rgb", 3, default=none.emission)
+        strength = None if gloss is None else self.required_number(gloss, "value")
+        right, down = self.vector(texture, "repeats", 2, default=none.repeats)
         return Finish(
-            tuple(self.vector(emission, "rgb", 3, default=none.emission)),
-            None if gloss is None else self.number(gloss, "value", required=True),
+            (red, green, blue),
+            strength,
             "" if texture is None else texture.get("filename", ""),
-            tuple(self.vector(texture, "repeats", 2, default=none.repeats)),
+            (right, down),
             *(texture is not None and is_true(texture.get(key)) for key in ("cut_out", "two_sided")),
         )
 
@@ -438,7 +446,7 @@ class _Reader:
         return link
 
     def positive(self, element: etree._Element, key: str, count: int, link: str) -> list[float]:
-        values = self.vector(element, key, count)
+        values = self.required_vector(element, key, count)
         if all(value > 0.0 for value in values):
             return values
         # A picture of a negative size looks like that of a positive one.
@@ -448,25 +456,32 @@ class _Reader:
         return used
 
     def vector(self, element: etree._Element | None, key: str, count: int | None,
-               default: Sequence[float] | None = None) -> list[float]:
-        text = None if element is None else element.get(key)
-        if text is None:
-            if default is None:
-                raise self.error(element, "<%s> has no %s" % (element.tag, key))
+               default: Sequence[float]) -> list[float]:
+        """Return the numbers of an attribute, ``default`` where the element or the attribute is missing."""
+        if element is None or element.get(key) is None:
             return list(default)
+        return self.required_vector(element, key, count)
+
+    def required_vector(self, element: etree._Element, key: str, count: int | None) -> list[float]:
+        text = self.required(element, key)
         words = text.split()
         if count is not None and len(words) != count:
             raise self.error(element, "%s='%s' holds %d numbers, expected %d" % (key, text, len(words), count))
         return [self.parse_float(word, element, key) for word in words]
 
-    def number(self, element: etree._Element, key: str, default: float | None = None,
-               required: bool = False) -> float | None:
+    def number(self, element: etree._Element, key: str, default: Default) -> float | Default:
+        """Return the number of an attribute, ``default`` where that is missing."""
+        text = element.get(key)
+        return default if text is None else self.parse_float(text, element, key)
+
+    def required_number(self, element: etree._Element, key: str) -> float:
+        return self.parse_float(self.required(element, key), element, key)
+
+    def required(self, element: etree._Element, key: str) -> str:
         text = element.get(key)
         if text is None:
-            if required:
-                raise self.error(element, "<%s> has no %s" % (element.tag, key))
-            return default
-        return self.parse_float(text, element, key)
+            raise self.error(element, "<%s> has no %s" % (element.tag, key))
+        return text
 
     def parse_float(self, text: str, element: etree._Element, key: str) -> float:
         try:

@@ -50,7 +50,8 @@ def _add_shape(element, shape):
         origin = origin @ pose_matrix((0.0, 0.0, -_SHEET_M / 2.0))
         # A picture on a plane has x to the right, on the top of a box -y (Gazebo's MeshManager).
         origin = origin @ pose_matrix(rpy=(0.0, 0.0, math.pi / 2.0))
-        geometry = Box((*geometry.size[::-1], _SHEET_M))
+        width, height = geometry.size
+        geometry = Box((height, width, _SHEET_M))
     _add_origin(element, origin)
     holder = etree.SubElement(element, "geometry")
     if isinstance(geometry, Box):

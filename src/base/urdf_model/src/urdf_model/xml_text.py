@@ -39,7 +39,7 @@ def parse_xml(text: str | bytes, most_bytes: int = bounds.DESCRIPTION_BYTES,
         root = _without_name_spaces(data.strip(), parser)
         if root is None:
             root, what = (None, "") if repaired is None else _repaired(data.strip(), parser)
-            if root is None:
+            if root is None or repaired is None:
                 raise XmlRefused("is not well-formed XML: %s" % error) from None
             repaired("%s (%s)" % (what, error))
     if root is not None:

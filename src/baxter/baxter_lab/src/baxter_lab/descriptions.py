@@ -34,8 +34,7 @@ def _expanded(package, file, arguments):
     path = Path(packages.get_path(package)) / file
     with _engine, _answers(packages):
         # Here it is PyPI's, not the command of the same name in this workspace.
-        return xacro.process_file(  # pyright: ignore[reportAttributeAccessIssue]
-            str(path), mappings=dict(arguments)).toxml()
+        return xacro.process_file(str(path), mappings=dict(arguments)).toxml()
 
 
 def baxter_urdf(arguments: dict[str, str]) -> str:
