@@ -32,8 +32,8 @@ def actor_robot(document: Document, element: etree._Element, name: str) -> Robot
     skin = element.find("skin")
     if skin is not None:
         scale = document.number(skin, "scale", 1.0)
-        link.visuals.append(Shape(Mesh(file_of(document, document.text(skin, "filename")), (scale,) * 3), np.eye(4),
-                                  "skin", None, "link"))
+        figure = Mesh(file_of(document, document.text(skin, "filename")), (scale, scale, scale))
+        link.visuals.append(Shape(figure, np.eye(4), "skin", None, "link"))
     said = etree.Element("gazebo")
     etree.SubElement(said, "static").text = "true"
     motion = etree.SubElement(said, "plugin", name="actor", filename=PLUGIN)

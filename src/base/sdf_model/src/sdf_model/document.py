@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from lxml import etree
 
+Triple = tuple[float, float, float]
 ROOT_TAGS = ("sdf", "gazebo")
 #: The size of a shape whose size is 0 [m].
 NO_SIZE_M = 1e-4
@@ -37,7 +38,9 @@ class Notes:
     """Elements that are not understood or have no effect, from one or several files."""
 
     def __init__(self) -> None:
-        self._left_out, self._mended = {}, {}  # what -> file -> lines
+        # what -> file -> lines
+        self._left_out: dict[str, dict[str, list[int | str | None]]] = {}
+        self._mended: dict[str, dict[str, list[int | str | None]]] = {}
         self.idle = IdleElements()
 
     def add(self, what: str, source: str, line: int | None) -> None:
@@ -71,12 +74,13 @@ class Document:
         self.folder = folder
         self.notes = notes
         try:
-            self.root = parse_xml(xml, most_bytes, self._repaired)
+            root = parse_xml(xml, most_bytes, self._repaired)
         except XmlRefused as error:
             raise SdfError("%s %s" % (self.source, error)) from None
-        if self.root is None or self.root.tag not in ROOT_TAGS:
-            found = "nothing" if self.root is None else "<%s>" % self.root.tag
+        if root is None or root.tag not in ROOT_TAGS:
+            found = "nothing" if root is None else "<%s>" % root.tag
             raise SdfError("%s is not an SDF: its root element is %s, expected <sdf>" % (self.source, found))
+        self.root = root
         for what, line in attributes_to_elements(self.root):
             self.notes.mend(what, self.source, line)
         for idle in TABLE.find(self.root, "sdf"):
@@ -120,9 +124,11 @@ class Document:
         """Return the stripped text of a child; without ``default`` it must be there."""
         child = element.find(tag)
         text = "" if child is None else (child.text or "").strip()
-        if not text and default is None:
+        if text:
+            return text
+        if default is None:
             raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
-        return text or default
+        return default
 
     def flag(self, element: etree._Element, tag: str, default: bool = False) -> bool:
         """Return the truth of a child."""
@@ -133,18 +139,32 @@ class Document:
             raise self.error(element.find(tag), "<%s> is '%s', expected true or false" % (tag, text))
         return text in _TRUE
 
+    @overload
+    def number(self, element: etree._Element, tag: str, default: float, may_be_infinite: bool = False) -> float: ...
+
+    @overload
+    def number(self, element: etree._Element, tag: str, default: None = None,
+               may_be_infinite: bool = False) -> float | None: ...
+
     def number(self, element: etree._Element, tag: str, default: float | None = None,
                may_be_infinite: bool = False) -> float | None:
         """Return the number in a child, or ``default``, also where the child is empty."""
         child = self._filled(element, tag, default)
         return default if child is None else self.numbers(child, 1, may_be_infinite)[0]
 
+    @overload
+    def vector(self, element: etree._Element, tag: str, default: Triple) -> Triple: ...
+
+    @overload
+    def vector(self, element: etree._Element, tag: str, default: Sequence[float]) -> tuple[float, ...]: ...
+
     def vector(self, element: etree._Element, tag: str, default: Sequence[float]) -> tuple[float, ...]:
         """Return the numbers (tuple) in a child, as many as ``default`` has, which an empty one means, too."""
         child = self._filled(element, tag, default)
         return tuple(default) if child is None else self.numbers(child, len(default))
 
-    def _filled(self, element, tag, default):
+    def _filled(self, element: etree._Element, tag: str,
+                default: float | Sequence[float] | None) -> etree._Element | None:
         """The child ``tag``, None if there is none or nothing in it."""
         child = element.find(tag)
         if child is None or (child.text or "").strip():
@@ -152,6 +172,15 @@ class Document:
         self.mend(child, "<%s> without a number, for which %s is used" % (tag, "the default" if default is None else
                                                                          default))
         return None
+
+    @overload
+    def positive(self, element: etree._Element, tag: str, count: Literal[1]) -> tuple[float]: ...
+
+    @overload
+    def positive(self, element: etree._Element, tag: str, count: Literal[2]) -> tuple[float, float]: ...
+
+    @overload
+    def positive(self, element: etree._Element, tag: str, count: Literal[3]) -> Triple: ...
 
     def positive(self, element: etree._Element, tag: str, count: int) -> tuple[float, ...]:
         """Return ``count`` positive numbers in a child: SDF's 1 where there is none, NO_SIZE_M for 0, as in Gazebo, and
@@ -168,6 +197,18 @@ class Document:
         if max(values) > bounds.LENGTH.high:
             self.mend(child, "<%s> of %s, of which %g is used at most" % (tag, child.text.strip(), bounds.LENGTH.high))
         return tuple(min(value or NO_SIZE_M, bounds.LENGTH.high) for value in values)
+
+    @overload
+    def numbers(self, element: etree._Element, count: Literal[2]) -> tuple[float, float]: ...
+
+    @overload
+    def numbers(self, element: etree._Element, count: Literal[3]) -> Triple: ...
+
+    @overload
+    def numbers(self, element: etree._Element, count: Literal[4]) -> tuple[float, float, float, float]: ...
+
+    @overload
+    def numbers(self, element: etree._Element, count: int, may_be_infinite: bool = False) -> tuple[float, ...]: ...
 
     def numbers(self, element: etree._Element, count: int, may_be_infinite: bool = False) -> tuple[float, ...]:
         """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something.

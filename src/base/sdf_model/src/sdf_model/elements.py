@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The elements of SDF 1.7 and their effect here. The harmless texts are SDF's defaults, or those that Gazebo saves."""
 
+from collections.abc import Mapping
+
 from urdf_model.element_table import ElementTable
 
 _NO_WIND = "there is no wind"
@@ -107,7 +109,7 @@ HARMLESS = {
     "sensor/lidar/range": "resolution",
 }
 #: (Parent, {element: harmless texts}, why it has no effect).
-WITHOUT_EFFECT = (
+WITHOUT_EFFECT: tuple[tuple[str, Mapping[str, str | None], str], ...] = (
     ("world", {"audio": None}, _NO_SOUND),
     ("world/wind", {"linear_velocity": "0 0 0"}, _NO_WIND),
     ("world", {"magnetic_field": "5.5645e-6 22.8758e-6 -42.3884e-6|6e-06 2.3e-05 -4.2e-05"},

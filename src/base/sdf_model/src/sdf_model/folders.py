@@ -87,10 +87,10 @@ def description_file(folder: str | Path) -> Path | None:
     named = []
     try:
         manifest = parse_xml(read_file(folder / "model.config", bounds.DESCRIPTION_BYTES))
-        for element in manifest.iterchildren("sdf"):
+        for element in () if manifest is None else manifest.iterchildren("sdf"):
             version = tuple(int(word) for word in re.findall(r"\d+", element.get("version", "")))
             named.append((version, folder / (element.text or "").strip()))
-    except (OSError, XmlRefused, AttributeError):  # the last for a file without an element
+    except (OSError, XmlRefused):
         named = []
     for _, path in [*sorted(named, reverse=True), ((), folder / "model.sdf")]:
         if path.is_file():

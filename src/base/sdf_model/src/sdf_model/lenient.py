@@ -6,7 +6,7 @@ from __future__ import annotations
 from lxml import etree
 
 # Element -> the attributes that are elements in it today.
-_INSIDE = {
+_INSIDE: dict[str, tuple[str, ...]] = {
     "box": ("size",),
     "cylinder": ("radius", "length"),
     "sphere": ("radius",),

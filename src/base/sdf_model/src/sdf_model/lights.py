@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from .document import Document, Notes
+from .document import Document, Notes, Triple
 
 if TYPE_CHECKING:
     from lxml import etree
+
+Rgba = tuple[float, float, float, float]
+Default = TypeVar("Default", bound=Rgba | None)
 
 
 @dataclass
@@ -21,21 +24,21 @@ class Light:
     name: str
     type: str
     pose: np.ndarray  # 4x4, in the world
-    diffuse: tuple
-    specular: tuple
-    attenuation: tuple  # constant, linear, quadratic
-    direction: tuple  # in the frame of its pose
+    diffuse: Rgba
+    specular: Rgba
+    attenuation: Triple  # constant, linear, quadratic
+    direction: Triple  # in the frame of its pose
     cast_shadows: bool
     range_m: float = 10.0  # further away it lights nothing
-    spot: tuple | None = None  # of a spot light: inner angle, outer angle [rad, of the whole cone], falloff
+    spot: Triple | None = None  # of a spot light: inner angle, outer angle [rad, of the whole cone], falloff
 
 
 @dataclass
 class Scene:
     """Ambient light, background, sky and shadows of a world. Colours red, green, blue from 0 to 1; None: not given."""
 
-    ambient: tuple | None = None
-    background: tuple | None = None
+    ambient: Triple | None = None
+    background: Triple | None = None
     shadows: bool = True
     sky: bool = False
 
@@ -47,10 +50,9 @@ def read_light(document: Document, element: etree._Element, origin: np.ndarray) 
     range_m = Light.range_m
     if attenuation is not None:
         range_m = document.number(attenuation, "range", range_m)
-        factors = tuple(
-            document.number(attenuation, tag, default)
-            for tag, default in zip(("constant", "linear", "quadratic"), factors, strict=True)
-        )
+        constant, linear, quadratic = factors
+        factors = (document.number(attenuation, "constant", constant), document.number(attenuation, "linear", linear),
+                   document.number(attenuation, "quadratic", quadratic))
     spot = element.find("spot")
     return Light(
         document.name(element),
@@ -62,18 +64,17 @@ def read_light(document: Document, element: etree._Element, origin: np.ndarray) 
         document.vector(element, "direction", (0.0, 0.0, -1.0)),
         document.flag(element, "cast_shadows"),
         range_m,
-        None if spot is None else tuple(
-            document.number(spot, tag, default)
-            for tag, default in (("inner_angle", 0.0), ("outer_angle", 0.0), ("falloff", 0.0))
-        ),
+        None if spot is None else (document.number(spot, "inner_angle", 0.0), document.number(spot, "outer_angle", 0.0),
+                                   document.number(spot, "falloff", 0.0)),
     )
 
 
 def read_scene(document: Document, element: etree._Element) -> Scene:
     """Return the Scene of the ``<scene>`` element."""
+    ambient, background = (colour(document, element, tag, None) for tag in ("ambient", "background"))
     return Scene(
-        *(None if element.find(tag) is None else colour(document, element, tag, None)[:3]
-          for tag in ("ambient", "background")),
+        None if ambient is None else ambient[:3],
+        None if background is None else background[:3],
         document.flag(element, "shadows", True),
         element.find("sky") is not None,
     )
@@ -88,10 +89,11 @@ def parse_light(xml: bytes, source: str) -> Light:
     return read_light(document, document.root.find("light"), np.eye(4))
 
 
-def colour(document: Document, element: etree._Element, tag: str, default: tuple | None) -> tuple | None:
+def colour(document: Document, element: etree._Element, tag: str, default: Default) -> Rgba | Default:
     """Return red, green, blue, alpha of a child; alpha may be left out."""
     child = element.find(tag)
     if child is None:
         return default
-    values = document.numbers(child, 3 if len((child.text or "").split()) == 3 else 4)
-    return values if len(values) == 4 else (*values, 1.0)
+    if len((child.text or "").split()) == 3:
+        return (*document.numbers(child, 3), 1.0)
+    return document.numbers(child, 4)

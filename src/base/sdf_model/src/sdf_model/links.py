@@ -37,8 +37,9 @@ def read_link(document: Document, element: etree._Element, name: str, materials:
     link.gravity = document.flag(element, "gravity", True)
     decay = element.find("velocity_decay")
     if decay is not None:
-        said = tuple(document.number(decay, tag, 0.0) for tag in ("linear", "angular"))
-        link.decay = tuple(min(max(part, 0.0), 1.0) for part in said)
+        said = document.number(decay, "linear", 0.0), document.number(decay, "angular", 0.0)
+        linear, angular = (min(max(part, 0.0), 1.0) for part in said)
+        link.decay = (linear, angular)
         if link.decay != said:
             document.mend(decay, "<velocity_decay> of %g and %g, of which parts from 0 to 1 are used" % said)
     for child in element.iterchildren("collision"):
@@ -102,11 +103,12 @@ def _shape(document: Document, element: etree._Element, link: str) -> Shape | No
     elif kind.tag == "mesh":
         scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
         submesh = kind.find("submesh")
-        part = () if submesh is None else (document.text(submesh, "name"), document.flag(submesh, "center"))
-        found = Mesh(file_of(document, document.text(kind, "uri")), scale, *part)
+        part, centred = ("", False) if submesh is None else (document.text(submesh, "name"),
+                                                             document.flag(submesh, "center"))
+        found = Mesh(file_of(document, document.text(kind, "uri")), scale, part, centred)
     elif kind.tag == "heightmap":
         size = document.vector(kind, "size", (1.0, 1.0, 1.0))
-        found = Mesh(file_of(document, document.text(kind, "uri")), tuple(size))
+        found = Mesh(file_of(document, document.text(kind, "uri")), size)
         origin = origin @ pose_matrix(document.vector(kind, "pos", (0.0, 0.0, 0.0)))
     elif kind.tag == "polyline":
         found = Mesh(_polylines(document, shapes))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from urdf_model import Finish, bounds, read_file
 from urdf_model.materials import GLOWS, MATERIALS
 
-from .lights import colour
+from .lights import Rgba, colour
 from .ogre_script import parse_materials
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _MAX_SCRIPTS = 100
 class Look:
     """Colour (rgba) and Finish of a material; None where it says nothing."""
 
-    colour: tuple | None = None
+    colour: Rgba | None = None
     finish: Finish | None = None
 
 
@@ -40,7 +40,7 @@ class MaterialScripts:
     def __init__(self, folders: ModelFolders) -> None:
         """``folders``: ModelFolders, in which the names of scripts are looked up."""
         self._folders = folders
-        self._read = {}
+        self._read: dict[Path, dict[str, Material]] = {}
 
     def find(self, name: str, uris: Iterable[str], base: str | Path | None) -> Look | None:
         """Return the Look of the material ``name`` in the scripts ``uris``, or None.
@@ -97,7 +97,7 @@ def _is_there(path: Path) -> bool:
 
 
 def read_material(document: Document, visual: etree._Element,
-                  materials: MaterialScripts) -> tuple[tuple | None, Finish | None]:
+                  materials: MaterialScripts) -> tuple[Rgba | None, Finish | None]:
     """Return (rgba or None, Finish or None) of a <visual>. ``materials``: MaterialScripts.
 
     Colours in the <material> itself come before those of the script that it names, as in Gazebo.

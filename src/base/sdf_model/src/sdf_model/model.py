@@ -362,8 +362,8 @@ def _joint(document: Document, element: etree._Element, frames: Frames, own_fram
     implicit = any(document.flag(element, "physics/ode/" + tag) for tag in ("implicit_spring_damper", "cfm_damping"))
     ends = [_end(document, element, "parent"), *("%s_cross%d" % (name, number) for number in range(1, len(rows))),
             _end(document, element, "child")]
-    found = [SdfJoint(name if number == 0 else "%s_axis%d" % (name, number + 1), turning, *ends[number:number + 2],
-                      frame, axis, limit, dynamics, implicit, element)
+    found = [SdfJoint(name if number == 0 else "%s_axis%d" % (name, number + 1), turning, ends[number],
+                      ends[number + 1], frame, axis, limit, dynamics, implicit, element)
              for number, (turning, limit, axis, dynamics) in enumerate(rows)]
     if kind == "screw":
         found[1].follows = Gear(found[0].name, found[1].name, -1.0 / _pitch(document, element))
@@ -382,9 +382,12 @@ def _pitch(document: Document, screw: etree._Element) -> float:
 def _gearbox(document: Document, element: etree._Element, frames: Frames, own_frame: str) -> Gearbox:
     """Return the Gearbox of a <joint>."""
     name, frame = document.name(element), frames.where(own_frame, element)
-    axes = [frame[:3, :3] @ _turn(document, element, tag, "revolute", frame, frames)[2] for tag in ("axis", "axis2")]
-    ends = [frames.plain(_end(document, element, role)) for role in ("parent", "child", "gearbox_reference_body")]
-    return Gearbox(name, *ends, document.number(element, "gearbox_ratio", 1.0), tuple(axes), element)
+    first, second = (frame[:3, :3] @ _turn(document, element, tag, "revolute", frame, frames)[2]
+                     for tag in ("axis", "axis2"))
+    parent, child, reference = (frames.plain(_end(document, element, role))
+                                for role in ("parent", "child", "gearbox_reference_body"))
+    return Gearbox(name, parent, child, reference, document.number(element, "gearbox_ratio", 1.0), (first, second),
+                   element)
 
 
 def _turn(document: Document, joint: etree._Element, tag: str, kind: str, frame: np.ndarray,

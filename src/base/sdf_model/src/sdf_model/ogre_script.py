@@ -29,12 +29,12 @@ class Material:
     ``repeats``: how often it lies side by side, and one below the other; ``cut_out``: whether transparent pixels are
     holes; ``two_sided``: whether it is also seen from behind."""
 
-    ambient: tuple | None = None
-    diffuse: tuple | None = None
-    specular: tuple | None = None
-    emission: tuple = (0.0, 0.0, 0.0)
+    ambient: tuple[float, float, float] | None = None
+    diffuse: tuple[float, float, float] | None = None
+    specular: tuple[float, float, float] | None = None
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texture: str = ""
-    repeats: tuple = (1.0, 1.0)
+    repeats: tuple[float, float] = (1.0, 1.0)
     cut_out: bool = False
     two_sided: bool = False
 

@@ -137,7 +137,8 @@ def _opens(points: np.ndarray, ring: list[int], place: int, target: np.ndarray) 
 
 def _ears(points: np.ndarray, ring: list[int]) -> list[tuple[int, int, int]]:
     """Triangles of the area in a counter-clockwise ring: ears, corners without another point in them, are cut off."""
-    ring, faces = list(ring), []
+    faces: list[tuple[int, int, int]] = []
+    ring = list(ring)
     while len(ring) > 3:
         place = next((place for place in range(len(ring)) if _is_ear(points, ring, place)), None)
         if place is None:
@@ -148,7 +149,7 @@ def _ears(points: np.ndarray, ring: list[int]) -> list[tuple[int, int, int]]:
         else:
             faces.append(_corner(ring, place))
         del ring[place]
-    return [*faces, tuple(ring)]
+    return [*faces, (ring[0], ring[1], ring[2])]
 
 
 def _corner(ring: list[int], place: int) -> tuple[int, int, int]:

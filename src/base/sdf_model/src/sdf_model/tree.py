@@ -66,8 +66,8 @@ class Parts:
 def crosses(joints: Sequence[SdfJoint],
             links: Mapping[str, tuple[Link, np.ndarray]]) -> dict[str, tuple[Link, np.ndarray]]:
     """Return the links between the ``joints`` of one <joint>, as Parts has them: so light that they change little."""
-    masses = [links[end][0].inertial for end in (joints[0].parent, joints[-1].child)
-              if end in links and links[end][0].inertial is not None]
+    inertials = [links[end][0].inertial for end in (joints[0].parent, joints[-1].child) if end in links]
+    masses = [inertial for inertial in inertials if inertial is not None]
     if not masses:
         masses = [Inertial(1.0, np.zeros(3), np.eye(3))]
     lightest = min(masses, key=lambda inertial: inertial.mass)

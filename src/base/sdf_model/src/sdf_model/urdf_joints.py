@@ -38,22 +38,22 @@ def add_loops(robot: Robot) -> None:
 
 
 def _loop(element: etree._Element, places: Mapping[str, np.ndarray]) -> Loop:
-    kind, ends = element.get("type", ""), [(element.findtext(role) or "").strip() for role in ("parent", "child")]
+    kind = element.get("type", "")
+    parent, child = ((element.findtext(role) or "").strip() for role in ("parent", "child"))
     if kind not in _KINDS:
         raise ValueError("its type is '%s', expected one of %s" % (kind, ", ".join(_KINDS)))
-    unknown = [end for end in ends if end not in places]
-    if unknown or ends[0] == ends[1]:
-        raise ValueError("it joins '%s' and '%s', expected two of the links %s" % (*ends, ", ".join(places)))
+    if parent not in places or child not in places or parent == child:
+        raise ValueError("it joins '%s' and '%s', expected two of the links %s" % (parent, child, ", ".join(places)))
     pose = _numbers(element, "pose", 6, (0.0,) * 6)
     in_child = pose_matrix(pose[:3], pose[3:])
-    frame = places[ends[1]] @ in_child
+    frame = places[child] @ in_child
     axis = np.array(_numbers(element, "axis/xyz", 3, (0.0, 0.0, 1.0)))
     if (element.findtext("axis/use_parent_model_frame") or "").strip().lower() in ("1", "true"):
         axis = frame[:3, :3].T @ axis
     length = np.linalg.norm(axis)
     if length < 1e-9:
         raise ValueError("its axis is zero, expected a direction such as 0 0 1")
-    return Loop(element.get("name", ""), kind, *ends, inverse(places[ends[0]]) @ frame, in_child, axis / length)
+    return Loop(element.get("name", ""), kind, parent, child, inverse(places[parent]) @ frame, in_child, axis / length)
 
 
 def _numbers(element: etree._Element, path: str, count: int, default: Sequence[float]) -> list[float]:

@@ -13,7 +13,7 @@ from urdf_model import Box, Link, OutOfBounds, Robot, Shape, bounds, read_file
 from urdf_model.model import is_true
 from urdf_model.transforms import pose_matrix
 
-from .document import Document, Notes, SdfError
+from .document import Document, Notes, SdfError, Triple
 from .folders import ModelFolders
 from .frames import Frames
 from .lights import Light, Scene, read_light, read_scene
@@ -37,7 +37,7 @@ class SdfWorld:
     """
 
     name: str
-    gravity: tuple | None = None  # m/s^2
+    gravity: Triple | None = None  # m/s^2
     time_step_s: float | None = None
     models: list[SdfModel] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
@@ -60,19 +60,19 @@ def parse_sdf_world(path: str | Path, folders: ModelFolders | None = None) -> Sd
     worlds = document.root.findall("world")
     if len(worlds) != 1:
         raise document.error(document.root, "it holds %d <world>, expected one" % len(worlds))
-    return _WorldReader(document, folders or ModelFolders([])).world(worlds[0])
+    return _WorldReader(document, folders or ModelFolders([]), worlds[0]).world()
 
 
 class _WorldReader:
-    def __init__(self, document: Document, folders: ModelFolders) -> None:
+    def __init__(self, document: Document, folders: ModelFolders, element: etree._Element) -> None:
         self._document = document
+        self._element = element
         self._models = ModelReader(folders)
         self._frames = Frames(document)
-        self._world = None
-
-    def world(self, element: etree._Element) -> SdfWorld:
-        document = self._document
         self._world = SdfWorld(element.get("name", "default"))
+
+    def world(self) -> SdfWorld:
+        document, element = self._document, self._element
         for child in element.iterchildren(*_NAMED):
             document.note(child, "%s '%s'" % (child.tag, child.get("filename") or child.get("name", "")))
         if element.find("gravity") is not None:
@@ -107,11 +107,11 @@ class _WorldReader:
         if element.find("gravity") is not None:  # where older files have it
             self._world.gravity = self._gravity(element)
 
-    def _gravity(self, element: etree._Element) -> tuple[float, ...]:
+    def _gravity(self, element: etree._Element) -> Triple:
         return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", _GRAVITY),
                              element.find("gravity"))
 
-    def _bounded(self, bound: bounds.Bound, values: tuple[float, ...], element: etree._Element) -> tuple[float, ...]:
+    def _bounded(self, bound: bounds.Bound, values: Triple, element: etree._Element) -> Triple:
         try:
             return bound.check(values, "<%s>" % element.tag)
         except OutOfBounds as error:
