@@ -31,6 +31,7 @@ COMPILED=("python3 -m arm_kinematics && python3 -m baxter_sim_hardware && python
     "python3 -m motion_planning && python3 -m moveit_servo && rosrun motion_planning prepare_robots $(printf '%q ' "${PLANNED_FOR[@]}")")
 # Robots whose meshes are made ready for pictures.
 PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/courses/cwru_baxter_sim/cwru_baxter.urdf.xacro")
+PREPARE_PICTURES="timeout 900 python3 -m sensor_renderer.prepare $(printf '%q ' "${PICTURED[@]}")"
 declare -A TITLES=(
     [apt]="Debian packages"
     [venv]="virtual environment"
@@ -327,16 +328,23 @@ step_urdf() {
     stamp "$key"
 }
 
-# Compiling takes about ten seconds; without this, the first launch would seem to hang.
+# Without this, the first launch would compile for a minute or two and seem to hang. The robots for pictures are made beside
+# it, by the core that is free first; the step after this one tells what became of them.
 step_kernels() {
-    local group
-    # On all cores, and then once more one after the other: numba does not compile again what is in the cache, and what
-    # fails, perhaps for lack of memory, is repeated alone and told.
+    local group groups=("${COMPILED[@]}")
+    if pictures_missing; then
+        write "$STATE/pictures.key" "$pictures_key"
+        groups+=("$PREPARE_PICTURES && mv $(printf '%q ' "$STATE"/pictures.{key,stamp})")
+    fi
+    # On all cores. What fails, perhaps for lack of memory, is repeated alone and told: numba does not compile again what
+    # is in the cache.
     run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\0" "$@" |
-        xargs -0 -P "$(nproc)" -n 1 bash -c || true' compile "$LAB_ROOT" "${COMPILED[@]}"
-    for group in "${COMPILED[@]}"; do
-        run bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' compile "$LAB_ROOT" "$group"
-    done
+        xargs -0 -P "$(nproc)" -n 1 bash -c || echo "A group failed; each is repeated alone."' compile "$LAB_ROOT" "${groups[@]}"
+    if grep -q "^A group failed" "$step_log"; then
+        for group in "${COMPILED[@]}"; do
+            run bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' compile "$LAB_ROOT" "$group"
+        done
+    fi
     # Message packages are much generated code, 9 MB for moveit_msgs alone. Where Python is not to write bytecode, each node
     # would compile it at every start: a second, and 20 MB.
     if [[ -d devel/lib/python3/dist-packages ]]; then
@@ -344,25 +352,30 @@ step_kernels() {
     fi
 }
 
-# Without this, the first pictures wait for the meshes' levels of detail: half a minute, on a busy machine some. The
-# levels are in the user's cache.
-step_pictures() {
-    local cache=${XDG_CACHE_HOME:-${HOME:-}/.cache}/bullet_gazebo key
-    if [[ ! -d src/simulator/sensor_renderer ]]; then
-        note="skipped: no simulator/sensor_renderer in src/"
-        return
-    fi
-    key="$cache $(find src/simulator/{sensor_renderer,world_picture}/src "$DESCRIPTION" "$GRIPPERS" \
+# pictures_missing: are robots to be made ready for pictures? Sets `pictures_key`, what they are made of; empty if this
+# workspace has no part that draws. Their levels of detail are in the user's cache.
+pictures_missing() {
+    local cache=${XDG_CACHE_HOME:-${HOME:-}/.cache}/bullet_gazebo
+    pictures_key=""
+    [[ -d src/simulator/sensor_renderer ]] || return 1
+    pictures_key="$cache $(find src/simulator/{sensor_renderer,world_picture}/src "$DESCRIPTION" "$GRIPPERS" \
         src/{probot/probot_description,courses/cwru_baxter_sim} -type f ! -name '*.pyc' -print0 2>/dev/null |
         LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
-    if stamp_is "$key" && [[ -d $cache/results ]]; then
-        note="up to date"
+    [[ ! -d $cache/results || ! -f $STATE/pictures.stamp || $(<"$STATE/pictures.stamp") != "$pictures_key" ]]
+}
+
+# Without this, the first pictures wait for the meshes' levels of detail: half a minute, on a busy machine some. What is
+# made already is only read.
+step_pictures() {
+    if ! pictures_missing; then
+        note=${pictures_key:+up to date}
+        note=${note:-skipped: no simulator/sensor_renderer in src/}
         return
     fi
     # A machine that cannot draw needs no pictures; one that can makes them at the first start.
-    if timeout 900 bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
-        python3 -m sensor_renderer.prepare "$@"' prepare "$LAB_ROOT" "${PICTURED[@]}" >>"$step_log" 2>&1 </dev/null; then
-        stamp "$key"
+    if bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' prepare "$LAB_ROOT" "$PREPARE_PICTURES" \
+        >>"$step_log" 2>&1 </dev/null; then
+        stamp "$pictures_key"
     else
         note="not made, see $step_log; the first start makes them"
     fi
