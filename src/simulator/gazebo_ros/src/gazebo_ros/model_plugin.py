@@ -8,15 +8,14 @@ their own, messages are sent without waiting.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 
 from loop_ros.node_handle import NodeHandle
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import Any, Self
 
     import numpy.typing as npt
@@ -131,7 +130,7 @@ def with_tf_prefix(parameters: dict[str, Any], namespace: str, name: str) -> str
     if name.startswith("/"):
         return name.lstrip("/")
     found, branch = "", parameters
-    for part in (*namespace.strip("/").split("/"), None):
+    for part in (*namespace.strip("/").split("/"), ""):
         if not isinstance(branch, dict):
             break
         found = branch.get("tf_prefix", found)
@@ -143,17 +142,22 @@ def with_tf_prefix(parameters: dict[str, Any], namespace: str, name: str) -> str
 class PluginSource(NamedTuple):
     """The place of a plugin in a description; :class:`PluginContext` documents the fields."""
 
-    robot: object = None
-    element: object = None
+    robot: Robot
+    element: Any
     namespace: str = ""
     urdf_xml: str = ""
+
+
+def _no_screen(link: str, *arguments: object) -> PictureWriter | NoPicture:
+    raise PluginError("a screen is on link '%s', but nothing here shows screens" % link)
 
 
 class PluginHost(NamedTuple):
     """The functions that :meth:`PluginContext.screen` and :meth:`PluginContext.plugins` call."""
 
-    add_screen: Callable = None
-    plugins: Callable = tuple
+    add_screen: Callable[[str, np.ndarray, Sequence[float], Sequence[int], bool, float],
+                         PictureWriter | NoPicture] = _no_screen
+    plugins: Callable[[], Iterable[ModelPlugin]] = tuple
 
 
 _NO_HOST = PluginHost()
@@ -184,7 +188,7 @@ class PluginContext(NodeHandle):
         :class:`PluginSource`; ``host``: :class:`PluginHost`."""
         self.world = world
         self.model = model
-        self.robot, self.element, _, self.urdf_xml = source
+        self.robot, self.element, self.urdf_xml = source.robot, source.element, source.urdf_xml
         super().__init__(ros, source.namespace)
         self.log = log
         self._parameters = parameters
@@ -205,9 +209,9 @@ class PluginContext(NodeHandle):
         a :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         # It belongs to the model and is closed with it.
-        place = np.asarray(place, dtype=float)
+        at = np.asarray(place, dtype=float)
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
-                             lambda: self._host.add_screen(link, place, size_m, pixels, glows, radius_m), closes=False)
+                             lambda: self._host.add_screen(link, at, size_m, pixels, glows, radius_m), closes=False)
 
     def param(self, name: str, default: Any = None) -> Any:
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""
@@ -222,6 +226,12 @@ class PluginContext(NodeHandle):
         """The frame ``name`` as messages have it: behind the parameter ``tf_prefix`` of the namespace, or of one above
         it, unless the name is absolute."""
         return with_tf_prefix(self._parameters, self.namespace, name)
+
+    @overload
+    def element_text(self, tag: str, default: str) -> str: ...
+
+    @overload
+    def element_text(self, tag: str, default: None = None) -> str | None: ...
 
     def element_text(self, tag: str, default: str | None = None) -> str | None:
         """Stripped text of a child of the ``<plugin>`` element, or ``default`` where it is missing or empty."""

@@ -59,25 +59,25 @@ class Prepared:
     name: str
     #: The description as text; the :mod:`urdf_model` robot of it; the same with its fixed links merged.
     xml: str
-    robot: object
-    merged: object
+    robot: Robot
+    merged: MergedRobot
     #: URDF text for viewers, or None for a floor.
     drawing: str | None
     #: Joint name to start position [rad, m].
-    start: dict
+    start: dict[str, float]
     #: (class, element, namespace) of each plugin; the data for the renderer about sensors that need pictures, and about
     #: lights in links.
-    plugins: list
-    sensors: list
-    lights: list
+    plugins: list[tuple[type[ModelPlugin], Any, str]]
+    sensors: list[dict[str, Any]]
+    lights: list[dict[str, Any]]
     #: The tree of the parameter server, {} where no plugin needs it.
-    parameters: dict
+    parameters: dict[str, Any]
     #: Further arguments of ``World.spawn``.
-    options: dict
+    options: dict[str, Any]
     #: Which shapes replace meshes that could not be loaded, in one line; "" for none.
     mended: str
     #: Pose of the model in the frame that it is spawned in (4x4); an SDF may give one. None: identity.
-    origin: object = None
+    origin: np.ndarray | None = None
 
 
 class Library(NamedTuple):
@@ -104,13 +104,13 @@ class Spawner:
         self._on_change = on_change
         self._mesh_files = simulation.world.mesh_files
         #: What viewers draw for the models that were spawned here: {model name: URDF text, or None for a floor}.
-        self.drawings = {}
+        self.drawings: dict[str, str | None] = {}
         #: The sensors that need pictures, for the renderer: {model name: list of dictionaries}.
-        self.sensors = {}
+        self.sensors: dict[str, list[dict[str, Any]]] = {}
         #: The lights in their links, likewise.
-        self.lights = {}
+        self.lights: dict[str, list[dict[str, Any]]] = {}
         # The screens that plugins have: {model name: list of (what the scene says, PictureWriter)}.
-        self._screens = {}
+        self._screens: dict[str, list[tuple[dict[str, Any], PictureWriter]]] = {}
         self._folder = None if folder is None else Path(folder)
         self._number = itertools.count()
 
@@ -324,11 +324,12 @@ class Spawner:
                 asked = name
             namespace = urdf_extras.namespace_of(element, asked)
             if issubclass(plugin_class, DrawnSensor):
-                if urdf_extras.sensor_of(element)[0] is None:
+                sensor, link = urdf_extras.sensor_of(element)
+                if sensor is None or link is None:
                     self._leave_out(robot.name, "plugin '%s' stands outside of a <sensor>; expected "
                                     "<gazebo reference=\"LINK\"><sensor><plugin>" % filename)
                 else:
-                    sensors.append((element, namespace))
+                    sensors.append((sensor, link, element, namespace))
                 continue
             options.update(plugin_class.spawn_options(robot, element))
             found.append((plugin_class, element, namespace))
@@ -364,9 +365,8 @@ def _slow_bodies(merged: MergedRobot) -> list[str]:
             or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
-def _drawn(merged: MergedRobot, plugin: Any, namespace: str) -> dict[str, Any]:
-    """The scene's entry of a sensor that needs pictures."""
-    sensor, link = urdf_extras.sensor_of(plugin)
+def _drawn(merged: MergedRobot, sensor: Any, link: str, plugin: Any, namespace: str) -> dict[str, Any]:
+    """The scene's entry of the plugin of a ``<sensor>`` on ``link`` that needs pictures."""
     frame = merged.frames[link]
     return {"link": frame.link, "offset": frame.offset.ravel().tolist(),
             "frame": (plugin.findtext("frameName") or "").strip() or link,

@@ -70,6 +70,8 @@ def test_files_of_packages_add_to_the_table_and_a_broken_one_is_left_out(tmp_pat
     with pytest.raises(PluginError, match="first:B"):
         table.find("libb.so")
     assert len(warnings) == 3 and all("is left out" in line for line in warnings)
+    with pytest.raises(PluginError, match="broken.yaml"):
+        PluginTable.from_yaml(paths["ours"], others=[paths["broken"]])
 
 
 def test_our_own_table_is_well_formed():
@@ -78,7 +80,7 @@ def test_our_own_table_is_well_formed():
 
 def test_names_in_a_context_are_relative_to_its_namespace():
     parameters = {"robot": {"rate": 50.0}, "settings": {"enable": True}}
-    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, None, parameters)
+    context = PluginContext(None, None, PluginSource(None, None, "/robot"), None, None, parameters)
     assert context.resolve("joint_states") == "/robot/joint_states"
     assert context.resolve("/tf") == "/tf"
     assert context.param("rate") == 50.0
@@ -89,7 +91,7 @@ def test_names_in_a_context_are_relative_to_its_namespace():
 
 def test_a_plugin_that_restarts_keeps_what_it_opened():
     ros = FakeRos()
-    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {},
+    context = PluginContext(None, None, PluginSource(None, None, "/robot"), None, ros, {},
                             PluginHost(add_screen=lambda *_: object()))
 
     class Plugin(ModelPlugin):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from controller_manager import Controller
-from loop_ros.action_server import ActionServer
+from loop_ros.action_server import ActionServer, GoalHandle
 
 if TYPE_CHECKING:
     from controller_manager import ControllerContext
@@ -19,13 +19,15 @@ class Crew(Protocol):
 
 
 class GoalController(Controller):
-    """A controller with one goal at a time; ``busy``: whether it has one. Subclasses have ``_on_goal(handle)`` and
-    ``_on_cancel(handle)``, and write ``_goal``, the handle of the goal that they follow."""
+    """A controller with one goal at a time; ``busy``: whether it has one. Subclasses write ``_goal``, the handle of the
+    goal that they follow."""
+
+    _server: ActionServer  # from :meth:`serve` on
 
     def __init__(self, name: str, hardware: RobotHardware, context: ControllerContext, crew: Crew) -> None:
         super().__init__(name, hardware, context)
         self._crew, self._runs, self._time_s = crew, False, 0.0
-        self._goal = self._server = None
+        self._goal: GoalHandle | None = None
 
     def serve(self, action: str, action_class: type) -> None:
         """Open the action, at the end of a subclass's constructor."""
@@ -46,7 +48,13 @@ class GoalController(Controller):
         self._time_s = time_s
         self._server.spin(time_s)
 
-    def _take(self, handle, refusal=None):
+    def _on_goal(self, handle: GoalHandle) -> None:
+        raise NotImplementedError
+
+    def _on_cancel(self, handle: GoalHandle) -> None:
+        raise NotImplementedError
+
+    def _take(self, handle: GoalHandle, refusal: str | None = None) -> bool:
         """Whether a goal is followed from now on, in place of the one before: unless there is a ``refusal``, or the
         controller may not start; then it is rejected with the reason."""
         if refusal is None and not self._runs:
@@ -59,7 +67,7 @@ class GoalController(Controller):
         self._goal = handle
         return True
 
-    def _end(self, why):
+    def _end(self, why: str) -> None:
         handle, self._goal = self._goal, None
         if handle is not None:
             handle.cancel(text=why)

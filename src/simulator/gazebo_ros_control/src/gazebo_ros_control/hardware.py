@@ -278,14 +278,17 @@ class _YieldingGroup(_Group):
         elif written.any():
             self._write(self._model_index[written], command[written], self._effort[written])
 
+    def _write(self, model_index: np.ndarray, command: np.ndarray, effort: np.ndarray) -> None:
+        raise NotImplementedError
+
 
 class _VelocityGroup(_YieldingGroup):
-    def _write(self, model_index, command, effort):
+    def _write(self, model_index: np.ndarray, command: np.ndarray, effort: np.ndarray) -> None:
         self._model.drive_velocity(model_index, command, effort)
 
 
 class _EffortGroup(_YieldingGroup):
-    def _write(self, model_index, command, effort):
+    def _write(self, model_index: np.ndarray, command: np.ndarray, effort: np.ndarray) -> None:
         self._model.drive_effort(model_index, command)
 
 

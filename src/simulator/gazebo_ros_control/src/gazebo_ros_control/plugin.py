@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import rospkg
 import rospy
@@ -69,7 +69,7 @@ class GazeboRosControl(ModelPlugin):
         self._restart = False
         topic = context.element_text("eStopTopic")
         self._stop_messages = context.subscription(topic, Bool) if topic else None
-        self._stopped = False
+        self._stopped, self._stop_joints = False, hardware.stop
         self._types = _Types()
         self._services = ControllerManagerServices(self._manager, self._types.table, context, robot)
         self._hardware = hardware
@@ -123,7 +123,7 @@ class GazeboRosControl(ModelPlugin):
             # A goal ends with the stop: its time goes on, and a stopped joint could appear to reach it.
             self._restart = True
         self._stopped = message.data
-        self._hardware.stop(message.data)
+        self._stop_joints(message.data)
 
     @staticmethod
     def _description(context):
@@ -175,8 +175,9 @@ class _Types:
     def __init__(self) -> None:
         path = os.path.join(rospkg.RosPack().get_path("ros_controllers"), "config", "controllers.yaml")
         with open(path, encoding="utf-8") as file:
-            self._own = yaml.safe_load(file)
-        self._entries, self._table = None, None
+            self._own = cast("dict[str, str]", yaml.safe_load(file))  # yaml does not say that a file has a mapping
+        self._entries: dict[str, Any] = {}
+        self._table: ControllerTable | None = None
 
     def table(self) -> ControllerTable:
         """Any thread, one at a time: the :class:`ControllerTable`."""
@@ -185,7 +186,7 @@ class _Types:
             raise ControlError("parameter %s is %r, expected a mapping of controller type to module:Class"
                                % (rospy.resolve_name(MORE_TYPES), more))
         entries = {**self._own, **_flat(more)}
-        if entries != self._entries:
+        if self._table is None or entries != self._entries:
             self._entries, self._table = entries, ControllerTable(entries)
         return self._table
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from controller_manager import ControllerContext
     from gazebo_ros_control.cascade import CascadeHardware
     from gazebo_ros_control.goal_controller import Crew
+    from loop_ros.action_server import GoalHandle
     from urdf_model import Robot
 
 FEEDBACK_HZ = 50.0
@@ -92,7 +93,8 @@ class PointHead(GoalController):
         self._upper = np.array([math.inf if limit.upper is None else limit.upper for limit in limits])
         self._speed = np.minimum(hardware.velocity_limit[self._index], np.where(
             np.isfinite(hardware.velocity_limit[self._index]), math.inf, SPEED_RAD_S))
-        self._waiting = self._tf = None
+        self._waiting: GoalHandle | None = None
+        self._tf: TransformSource | None = None
         self._asked_s = 0.0
         self._from = self._to = np.zeros(2)
         self._begin_s, self._length_s, self._point = 0.0, 0.0, np.zeros(3)
@@ -107,7 +109,7 @@ class PointHead(GoalController):
     def idle(self, time_s: float) -> None:
         super().idle(time_s)
         if self._waiting is not None:
-            self._begin()
+            self._begin(self._waiting)
 
     def update(self, time_s: float, dt: float) -> None:
         self.idle(time_s)
@@ -119,12 +121,12 @@ class PointHead(GoalController):
         self.hardware.command[VELOCITY][self._index] = (
             way * 6.0 * share * (1.0 - share) / self._length_s if share < 1.0 else 0.0)
         if self._goal is not None:
-            self._watch(time_s, share)
+            self._watch(self._goal, time_s, share)
 
     def close(self) -> None:
         self._stop_listening()
 
-    def _on_goal(self, handle):
+    def _on_goal(self, handle: GoalHandle) -> None:
         wanted = handle.goal
         point = wanted.target.point
         numbers = point.x, point.y, point.z, wanted.max_velocity
@@ -134,9 +136,9 @@ class PointHead(GoalController):
             return
         self._forget_waiting("another goal took its place")
         self._waiting, self._asked_s = handle, self._time_s
-        self._begin()
+        self._begin(handle)
 
-    def _on_cancel(self, handle):
+    def _on_cancel(self, handle: GoalHandle) -> None:
         if handle is self._waiting:
             self._forget_waiting("")
         elif handle is self._goal:
@@ -145,9 +147,9 @@ class PointHead(GoalController):
             self._length_s = 0.0
             self._end("")
 
-    def _begin(self):
+    def _begin(self, handle: GoalHandle) -> None:
         """Start the motion of the goal that waits, if the pose of its frame is known."""
-        handle, wanted = self._waiting, self._waiting.goal
+        wanted = handle.goal
         frame = wanted.target.header.frame_id.lstrip("/")
         placed = self._pose_of(frame)
         if placed is None:
@@ -190,15 +192,15 @@ class PointHead(GoalController):
     def _positions(self):
         return dict(zip(self.hardware.joint_names, self.hardware.position.tolist(), strict=True))
 
-    def _watch(self, time_s, share):
+    def _watch(self, handle: GoalHandle, time_s: float, share: float) -> None:
         if self._pace.take(time_s) and self._server.feedback_is_heard:
-            self._goal.publish_feedback(PointHeadFeedback(pointing_angle_error=self._error()))
+            handle.publish_feedback(PointHeadFeedback(pointing_angle_error=self._error()))
         off = float(np.abs(self._to - self.hardware.position[self._index]).max())
         if share >= 1.0 and off < ARRIVED_RAD:
-            handle, self._goal = self._goal, None
+            self._goal = None
             handle.succeed(text="it points %.3f rad beside the target" % self._error())
         elif time_s - self._begin_s > self._length_s + LATE_S:
-            handle, self._goal = self._goal, None
+            self._goal = None
             handle.abort(text="the head is %.3f rad from where it was sent, after %.1f s"
                               % (off, time_s - self._begin_s))
 

@@ -24,6 +24,7 @@ from sim_time.pace import Pace
 
 if TYPE_CHECKING:
     from gazebo_ros.model_plugin import PluginContext
+    from loop_ros.action_server import GoalHandle
     from loop_ros.protocol import Log
 
 #: The node whose private parameters name the controllers and the joints' gains, as Gazebo's node is called.
@@ -86,6 +87,8 @@ class _Gripper(GoalController):
     ``centering``, a PID from the difference of the fingers' positions to the difference of their efforts.
     """
 
+    hardware: CascadeHardware
+
     def __init__(self, name: str, hardware: CascadeHardware, context: ControllerContext, crew: _Crew) -> None:
         super().__init__(name, hardware, context, crew)
         self._index = self.claim(POSITION, [context.param(side + "_gripper_joint", side + "_gripper_finger_joint")
@@ -119,9 +122,9 @@ class _Gripper(GoalController):
         for i, effort in zip(index, (self._effort - shift, self._effort + shift), strict=True):
             hardware.largest_effort[i] = min(max(effort, 0.0), hardware.largest_effort[i])
         if self._goal is not None:
-            self._watch(time_s)
+            self._watch(self._goal, time_s)
 
-    def _on_goal(self, handle):
+    def _on_goal(self, handle: GoalHandle) -> None:
         command = handle.goal.command
         is_finite = math.isfinite(command.position) and math.isfinite(command.max_effort)
         if not self._take(handle, None if is_finite else "position %r and max_effort %r must be finite"
@@ -132,20 +135,20 @@ class _Gripper(GoalController):
         self._last, self._moved_s = self._opening, self._time_s
         self._pace.restart()
 
-    def _on_cancel(self, handle):
+    def _on_cancel(self, handle: GoalHandle) -> None:
         if handle is self._goal:
             self._end("")
 
-    def _watch(self, time_s):
+    def _watch(self, handle: GoalHandle, time_s: float) -> None:
         opening, effort = self._opening, float(self.hardware.effort[self._index].sum())
         self._moved_s = min(self._moved_s, time_s)  # time may have gone back in a reset
         if self._pace.take(time_s) and self._server.feedback_is_heard:
-            self._goal.publish_feedback(GripperCommandFeedback(position=opening, effort=effort))
-        reached = abs(opening - self._goal.goal.command.position) < REACHED_M
+            handle.publish_feedback(GripperCommandFeedback(position=opening, effort=effort))
+        reached = abs(opening - handle.goal.command.position) < REACHED_M
         if abs(opening - self._last) > STALL_M:
             self._last, self._moved_s = opening, time_s
         if reached or time_s - self._moved_s > STALL_S:
-            handle, self._goal = self._goal, None
+            self._goal = None
             handle.succeed(GripperCommandResult(opening, effort, not reached, reached))
 
 
@@ -193,7 +196,7 @@ class _Base(DiffDriveController):
 
 
 def _follower_context(name, host, given):
-    constraints = {"goal_time": GOAL_TIME_S, "stopped_velocity_tolerance": 0.0}
+    constraints: dict[str, Any] = {"goal_time": GOAL_TIME_S, "stopped_velocity_tolerance": 0.0}
     joints = given.get("joints")
     for joint in joints if isinstance(joints, list) else ():
         constraints[str(joint)] = {"goal": GOAL_POSITION}

@@ -69,7 +69,8 @@ class SimulatedForceTorque:
         if self._axes == "parent":
             parent, child = (self._model.link_pose(link).matrix()[:3, :3] for link in (self.frame, self._child))
             turn = parent.T @ child
-        return tuple(self._sign * (turn @ part) for part in found)
+        force, torque = found
+        return self._sign * (turn @ force), self._sign * (turn @ torque)
 
 
 def sensor_place(sensor: etree._Element) -> np.ndarray:
