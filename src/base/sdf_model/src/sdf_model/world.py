@@ -21,8 +21,8 @@ from .model import ModelReader, SdfModel, actor, unused
 
 # Left out, with a note.
 _NAMED = ("plugin",)
-# SDF's [s, m/s^2].
-_STEP_S, _GRAVITY = 0.001, (0.0, 0.0, -9.8)
+#: SDF's defaults of a world: length of a step [s], gravity [m/s^2].
+STEP_S, GRAVITY = 0.001, (0.0, 0.0, -9.8)
 _ROAD_HEIGHT_M = 0.002
 _AT_REST = 0.01  # m/s and rad/s: what Gazebo saves of bodies that stand
 _ASPHALT = (0.25, 0.25, 0.25, 1.0)
@@ -30,15 +30,15 @@ _ASPHALT = (0.25, 0.25, 0.25, 1.0)
 
 @dataclass
 class SdfWorld:
-    """The content of a world file. None: not given.
+    """The content of a world file; what it does not give is SDF's default.
 
     ``problems`` are parts that cannot be used, one line each; the world is made without them. ``warning`` names what
     was not understood.
     """
 
     name: str
-    gravity: Triple | None = None  # m/s^2
-    time_step_s: float | None = None
+    gravity: Triple = GRAVITY  # m/s^2
+    time_step_s: float = STEP_S
     models: list[SdfModel] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     scene: Scene = field(default_factory=Scene)
@@ -99,7 +99,7 @@ class _WorldReader:
         document = self._document
         step = element.find("max_step_size")
         if step is not None:
-            value = document.number(element, "max_step_size", _STEP_S)
+            value = document.number(element, "max_step_size", STEP_S)
             used = min(max(value, bounds.TIME_STEP.low), bounds.TIME_STEP.high)
             if used != value:
                 document.mend(step, "<max_step_size> of %g s, for which %g s is used" % (value, used))
@@ -108,7 +108,7 @@ class _WorldReader:
             self._world.gravity = self._gravity(element)
 
     def _gravity(self, element: etree._Element) -> Triple:
-        return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", _GRAVITY),
+        return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", GRAVITY),
                              element.find("gravity"))
 
     def _bounded(self, bound: bounds.Bound, values: Triple, element: etree._Element) -> Triple:

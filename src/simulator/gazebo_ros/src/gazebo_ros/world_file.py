@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds and reads world files, and holds the defaults of worlds. ROS-free."""
+"""Finds and reads world files. ROS-free."""
 from __future__ import annotations
 
 from pathlib import Path
@@ -11,10 +11,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sdf_model import ModelFolders, SdfWorld
-
-#: SDF's defaults of a world: gravity [m/s^2], length of a tick [s].
-GRAVITY = (0.0, 0.0, -9.8)
-TIME_STEP_S = 0.001
 
 
 class WorldFileError(Exception):
@@ -36,14 +32,11 @@ def find_world(name: str | Path, folders: Iterable[str | Path]) -> Path:
 
 
 def read_world(path: str | Path, folders: ModelFolders) -> SdfWorld:
-    """The ``sdf_model.SdfWorld`` of the file at ``path``, with gravity and step size in any case.
+    """The ``sdf_model.SdfWorld`` of the file at ``path``.
 
     ``folders``: ``sdf_model.ModelFolders``. Raises :class:`WorldFileError`.
     """
     try:
-        world = parse_sdf_world(path, folders)
+        return parse_sdf_world(path, folders)
     except SdfError as error:
         raise WorldFileError(str(error)) from error
-    world.gravity = world.gravity or GRAVITY
-    world.time_step_s = world.time_step_s or TIME_STEP_S
-    return world
