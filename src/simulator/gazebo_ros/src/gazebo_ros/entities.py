@@ -85,14 +85,16 @@ class Entities:
         models = self._world.models
         if name in models:
             model = models[name]
-            return (model.model_pose().matrix(), *map(np.asarray, model.model_twist()))
+            linear, angular = model.model_twist()
+            return model.model_pose().matrix(), np.asarray(linear), np.asarray(angular)
         if "::" in name:
             model, link_name = self.link(name)
         else:
             model, link_name = next((model for model in models.values() if name in model.link_names), None), name
         if model is None:
             raise UnknownEntity("reference frame '%s' is no model and no link; models: %s" % (name, _known(models)))
-        return (model.link_pose(link_name).matrix(), *map(np.asarray, model.link_twist(link_name)))
+        linear, angular = model.link_twist(link_name)
+        return model.link_pose(link_name).matrix(), np.asarray(linear), np.asarray(angular)
 
     def pose_in_world(self, pose: Pose, reference: str) -> Pose:
         """Transform a :class:`Pose` from the frame ``reference`` to the world."""

@@ -4,7 +4,7 @@ be right."""
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import rosgraph
@@ -66,10 +66,11 @@ def root_element(xml: str) -> str:
     return found.group(1) if found else ""
 
 
-def _parameters():
+def _parameters() -> dict[str, Any]:
     """The whole parameter tree, read from the master itself: rospy answers "/" from a cache which, once the node has
     logged a line, is nearly empty."""
-    return rosgraph.Master(rospy.get_name()).getParam("/")
+    # rosgraph has no types; the master's "/" is a tree in any case.
+    return cast("dict[str, Any]", rosgraph.Master(rospy.get_name()).getParam("/"))
 
 
 class GazeboServices:

@@ -10,7 +10,7 @@ from sdf_model import elements as sdf
 from urdf_model.element_table import ElementTable, Idle, IdleElements
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from urdf_model import Robot
 
@@ -32,7 +32,7 @@ KNOWN = {
     "joint": "implicitSpringDamper cfmDamping springStiffness springReference provideFeedback sensor plugin "
              "preserveFixedJoint disableFixedJointLumping",
 }
-WITHOUT_EFFECT = (
+WITHOUT_EFFECT: tuple[tuple[str, Mapping[str, str | None], str], ...] = (
     ("link", {"minDepth": sdf.KEPT_DEPTH}, sdf.WHOLE_DEPTH),
     ("link", {"laserRetro": "0"}, "intensities of lasers are 0"),
     ("link", {"kinematic": "false"}, "links move freely"),

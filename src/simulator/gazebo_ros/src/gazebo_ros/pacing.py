@@ -180,8 +180,8 @@ class SlownessWatch:
         self._windows = windows
         self._quiet_s = quiet_s
         self._clock = clock
-        self._slow = []
-        self._told_at = None
+        self._slow: list[float] = []
+        self._told_at: float | None = None
         self._sum, self._count = 0.0, 0
 
     def news(self, factor: float, wanted: float) -> tuple[float, float | None, float | None] | None:
@@ -205,7 +205,7 @@ class SlownessWatch:
 
 def slowness_line(wanted: float, factor: float, mean: float | None, ago_s: float | None) -> str:
     """The log line about a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
-    if mean is None:
+    if mean is None or ago_s is None:
         return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "
                 "(gui:=false) and other programs. Said again every five minutes at most."
                 % (factor, wanted))

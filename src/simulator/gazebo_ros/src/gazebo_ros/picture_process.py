@@ -31,7 +31,8 @@ class PictureProcess:
         """
         self._command, self._runs_already, self._log, self._restart_s = command, runs_already, log, restart_s
         self._wanted, self._closing = threading.Event(), threading.Event()
-        self._lock, self._process = threading.Lock(), None
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
         self._thread = threading.Thread(target=self._run, name="picture process", daemon=True)
         self._thread.start()
 
@@ -43,7 +44,7 @@ class PictureProcess:
         """End the renderer and wait for its end."""
         with self._lock:
             self._closing.set()
-            if self._process is not None:
+            if self._process is not None and self._process.stdin is not None:
                 self._process.stdin.close()
         self._wanted.set()
         self._thread.join(_ENDS_S)
@@ -53,24 +54,25 @@ class PictureProcess:
     def _run(self) -> None:
         self._wanted.wait()
         while not self._runs_already():
-            if not self._start():
+            process = self._start()
+            if process is None:
                 return
-            code = self._process.wait()
+            code = process.wait()
             if self._closing.is_set() or code == 0:
                 # Another node took its name, or somebody ended it.
                 return
             self._log.warn("sensor_renderer ended with code %d and is started again" % code)
             self._closing.wait(self._restart_s)
 
-    def _start(self) -> bool:
-        """Start the process; return whether it runs."""
+    def _start(self) -> subprocess.Popen[bytes] | None:
+        """Start the process; return it, or None where it does not run."""
         with self._lock:
             if self._closing.is_set():
-                return False
+                return None
             self._log.info("the world has cameras and no launch file starts what draws them: starting sensor_renderer")
             try:
                 self._process = subprocess.Popen(self._command, stdin=subprocess.PIPE)
             except OSError as error:
                 self._log.warn("no pictures: %s" % error)
-                return False
-            return True
+                return None
+            return self._process

@@ -32,20 +32,23 @@ class PluginTable:
             if not isinstance(target, str) or target.count(":") != 1 or not all(target.split(":")):
                 raise PluginError("model plugin %s: found %r, expected \"module:Class\"" % (filename, target))
         self._entries = dict(entries)
-        self._classes = {}
+        self._classes: dict[str, type[ModelPlugin]] = {}
 
     @classmethod
     def from_yaml(cls, path: str | os.PathLike[str], extra: dict[str, str] | None = None,
                   others: Sequence[str | os.PathLike[str]] = (),
                   warn: Callable[[str], object] | None = None) -> PluginTable:
         """The table of a YAML file, with the entries of the mapping ``extra`` added or replaced. ``others``: further
-        files, the first one of which counts; one that cannot be used is left out, after a call of ``warn(text)``."""
+        files, the first one of which counts; one that cannot be used is left out, after a call of ``warn(text)``, or
+        raises :class:`PluginError` where there is no ``warn``."""
         entries = _read(path)
         for other in reversed(others):
             try:
                 more = _read(other)
                 cls(more)
             except (OSError, UnicodeDecodeError, yaml.YAMLError, PluginError) as error:
+                if warn is None:
+                    raise PluginError("%s: %s" % (other, error)) from error
                 warn("%s is left out: %s" % (other, error))
             else:
                 entries.update(more)

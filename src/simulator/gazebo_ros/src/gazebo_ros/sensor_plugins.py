@@ -39,8 +39,9 @@ _SLOWEST_HZ = 1e-9
 class PacedSensor(ModelPlugin):
     """Base class: one topic, published at a rate while it has subscribers. Names come from the plugin's elements."""
 
-    message_class = None
-    topic_tag, default_topic = "topicName", None
+    message_class: type[genpy.Message]
+    topic_tag = "topicName"
+    default_topic: str | None = None
     required = False
 
     def __init__(self, context: PluginContext) -> None:
@@ -53,6 +54,8 @@ class PacedSensor(ModelPlugin):
         topic = context.element_text(self.topic_tag, self.default_topic)
         if topic is None:
             raise PluginError("%s names no topic; expected <%s>" % (self.what, self.topic_tag))
+        #: The topic as it is written.
+        self.topic = topic
         self.publisher = context.publisher(topic, self.message_class)
 
     def number(self, tag: str, default: float) -> float:
@@ -91,7 +94,7 @@ class PacedSensor(ModelPlugin):
         """The link that the plugin's element ``tag`` names; raises ``PluginError``."""
         name = self.context.element_text(tag)
         found = None if name is None else unscoped(self.context.model.name, name)
-        if found not in self.context.model.merged.frames:
+        if found is None or found not in self.context.model.merged.frames:
             raise PluginError("%s: <%s> is '%s', expected one of the links %s"
                               % (self.what, tag, name or "", ", ".join(self.context.model.merged.frames)))
         return found
@@ -115,9 +118,10 @@ class RaySensor(PacedSensor):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
-        if self.sensor is None:
+        if self.sensor is None or self.link is None:
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
                               % self.what)
+        self._link = self.link
         element = self.sensor.find("ray")
         try:
             self.pattern = RayPattern(element if element is not None else self.sensor.find("lidar"), self.what)
@@ -125,7 +129,7 @@ class RaySensor(PacedSensor):
             raise PluginError(str(error)) from error
         for remark in self.pattern.remarks:
             context.log.warn(remark)
-        self.frame = context.frame(context.element_text("frameName", self.link))
+        self.frame = context.frame(context.element_text("frameName", self._link))
         self._offset = self.sensor_pose()
         self._start_sweep()
         self._sweeping = False
@@ -136,7 +140,7 @@ class RaySensor(PacedSensor):
                 return
             self._sweeping = True
             self._began_s = time_s
-        ranges = self._sweep.go_on(self.context.model.link_pose(self.link).matrix() @ self._offset)
+        ranges = self._sweep.go_on(self.context.model.link_pose(self._link).matrix() @ self._offset)
         if ranges is not None:
             self._sweeping = False
             self.publisher.publish(self.stamped(self.message(ranges), self._began_s, self.frame))
@@ -302,7 +306,7 @@ class Bumper(PacedSensor):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
-        if self.link is None:
+        if self.sensor is None or self.link is None:
             raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
                               % self.what)
         self._frame = context.frame(context.element_text("frameName", "world"))

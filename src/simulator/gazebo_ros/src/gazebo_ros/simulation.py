@@ -50,7 +50,7 @@ class HostedPlugin:
         self.model_name = model_name
         self.label = label
         self.failures, self.last_error, self.has_failed = 0, "", False
-        self.failed_at = []  # simulation times of the newest failures [s]
+        self.failed_at: list[float] = []  # simulation times of the newest failures [s]
 
 
 class _Advance:
@@ -59,7 +59,7 @@ class _Advance:
         self.awaited = awaited
         self.timeout_s = timeout_s
         self.give_up_at = give_up_at
-        self.future = Future()
+        self.future: Future[tuple[int, int]] = Future()
 
 
 class Simulation:
@@ -79,13 +79,14 @@ class Simulation:
         self.on_step_change = lambda: None
         #: In a paced world, the ticks up to a multiple of this follow each other at once: fewer wake-ups, which make a
         #: tick take longer. The second number is for a world that is late.
-        self.turn_lengths = 1, 1
+        self.turn_lengths: tuple[int, int] = 1, 1
         self.world = world
         self.requests = requests
         self.paused = paused
-        self.plugins = []
+        self.plugins: list[HostedPlugin] = []
         self.tick = 0
-        self._working, self._failed = [], []  # of the plugins
+        self._working: list[HostedPlugin] = []
+        self._failed: list[HostedPlugin] = []
         self._log = log
         self._faults = faults
         self._deliveries = deliveries
@@ -93,8 +94,8 @@ class Simulation:
         self._step_ns = round(world.time_step_s * 1e9)
         self._step_since = 0, 0  # tick and time [ns] since which a tick has its present length
         self._pacer = Pacer(self._step_s, real_time_factor)
-        self._advance = None
-        self._delivered_before = {}
+        self._advance: _Advance | None = None
+        self._delivered_before: dict[str, int] = {}
 
     @property
     def time_ns(self) -> int:
@@ -159,14 +160,14 @@ class Simulation:
                 self._pacer.forget_lag()
             self._faults.guarded("between two ticks", self.on_turn)
             if self._advance is not None:
-                self._advance_turn()
+                self._advance_turn(self._advance)
             elif self.paused:
                 requests.wait(IDLE_S)
                 self._pacer.restart()
             else:
                 self._pacer.wait(self._some_ticks())
         if self._advance is not None:
-            self._end_advance(AdvanceRefused("the simulator is shutting down"))
+            self._end_advance(self._advance, AdvanceRefused("the simulator is shutting down"))
 
     def _some_ticks(self) -> int:
         """The ticks of one turn; returns how many."""
@@ -257,10 +258,9 @@ class Simulation:
         for hosted in [h for h in self.plugins if model_name is None or h.model_name == model_name]:
             self._close(hosted)
 
-    def _advance_turn(self) -> None:
-        advance = self._advance
+    def _advance_turn(self, advance: _Advance) -> None:
         if not self.paused:
-            self._end_advance(AdvanceRefused(
+            self._end_advance(advance, AdvanceRefused(
                 "the world was unpaused with %s left" % counted(advance.remaining, "tick")))
             return
         if advance.awaited:
@@ -268,8 +268,8 @@ class Simulation:
             advance.awaited = [topic for topic in advance.awaited
                                if counts.get(topic, 0) <= self._delivered_before.get(topic, 0)]
             if advance.awaited and time.monotonic() > advance.give_up_at:
-                self._end_advance(AdvanceRefused("no message within %g s on %s"
-                                                 % (advance.timeout_s, ", ".join(advance.awaited))))
+                self._end_advance(advance, AdvanceRefused("no message within %g s on %s"
+                                                          % (advance.timeout_s, ", ".join(advance.awaited))))
             elif advance.awaited:
                 self.requests.wait(AWAIT_S)
             return
@@ -277,10 +277,10 @@ class Simulation:
             self.do_tick()
             advance.remaining -= 1
         if not advance.remaining:
-            self._end_advance(None)
+            self._end_advance(advance, None)
 
-    def _end_advance(self, error: AdvanceRefused | None) -> None:
-        advance, self._advance = self._advance, None
+    def _end_advance(self, advance: _Advance, error: AdvanceRefused | None) -> None:
+        self._advance = None
         if error is not None:
             advance.future.set_exception(error)
             return

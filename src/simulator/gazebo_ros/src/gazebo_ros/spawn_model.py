@@ -36,7 +36,7 @@ def arguments(argv: Iterable[str]) -> argparse.Namespace:
     """The command line, parsed."""
     # Launch files are full of "-1e-05", which argparse takes for an option; a blank in front makes it a value.
     argv = [" " + word if word.startswith("-") and is_number(word) else word for word in argv]
-    parser = argparse.ArgumentParser(prog="spawn_model", description=__doc__.split("\n")[0], allow_abbrev=False)
+    parser = argparse.ArgumentParser(prog="spawn_model", description=(__doc__ or "").split("\n")[0], allow_abbrev=False)
     kind = parser.add_mutually_exclusive_group(required=True)
     kind.add_argument("-urdf", action="store_true", help="the description is a URDF")
     kind.add_argument("-sdf", action="store_true", help="the description is an SDF")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from loop_ros.protocol import Topics
 
 # Transforms that are kept [s], and messages with transforms between two ticks.
-TF_CACHE_S, TF_DEPTH = 10.0, 100
+TF_CACHE_S, TF_DEPTH = 10, 100
 
 
 class TransformSource:

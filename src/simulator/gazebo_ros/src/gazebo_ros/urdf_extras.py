@@ -66,7 +66,7 @@ def visual_of(plugin: Any) -> tuple[str | None, str | None]:
     return visual.getparent().get("reference"), visual.get("name")
 
 
-def sensor_of(plugin: Any) -> tuple[Any, str | None]:
+def sensor_of(plugin: Any) -> tuple[Any, str] | tuple[None, None]:
     """The ``<sensor>`` that a plugin element stands in and the name of its link or joint; ``(None, None)`` outside of
     one."""
     sensor = plugin.getparent()
