@@ -39,9 +39,10 @@ class ConveyorBelt(ModelPlugin):
                               % (self._what, name, ", ".join(belts) or "(there are none)"))
         self._joint = context.model.index([name])
         text = context.element_text("speed", "0.1")
-        self._speed = self._checked(text)
-        if self._speed is None:
+        speed = self._checked(text)
+        if speed is None:
             raise PluginError("%s: <speed> is '%s', expected -%g to %g m/s" % (self._what, text, MAX_M_S, MAX_M_S))
+        self._speed = speed
         self._commands = context.subscription(context.element_text("commandTopic", "conveyor/command"), Float64)
 
     def update(self, time_s: float, dt: float) -> None:

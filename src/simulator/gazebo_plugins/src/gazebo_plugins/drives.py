@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Twist
@@ -96,13 +96,17 @@ class Drive(ModelPlugin):
         self.moved(time_s, self.context.world.time_step_s)
         if not self._pace.take(time_s):
             return
-        wanted = [topic is not None and topic.has_listeners for topic in (self._odometry, self._tf)]
-        if any(wanted):
+        odometry, tf = self._odometry, self._tf
+        if odometry is not None and not odometry.has_listeners:
+            odometry = None
+        if tf is not None and not tf.has_listeners:
+            tf = None
+        if odometry is not None or tf is not None:
             pose, linear, angular = self.where()
-            if wanted[0]:
-                self._odometry.publish(self._message(stamp(time_s), pose, linear, angular))
-            if wanted[1]:
-                self._tf.publish(TFMessage([transform_msg(time_s, self._odometry_frame, self._base_frame, pose)]))
+            if odometry is not None:
+                odometry.publish(self._message(stamp(time_s), pose, linear, angular))
+            if tf is not None:
+                tf.publish(TFMessage([transform_msg(time_s, self._odometry_frame, self._base_frame, pose)]))
         self.also_publish(time_s)
 
     def also_publish(self, time_s: float) -> None:
@@ -125,6 +129,12 @@ class Drive(ModelPlugin):
         return message
 
     # -- elements ----------------------------------------------------------------------------------------------------
+
+    @overload
+    def text(self, tag: str, default: str) -> str: ...
+
+    @overload
+    def text(self, tag: str, default: None = None) -> str | None: ...
 
     def text(self, tag: str, default: str | None = None) -> str | None:
         """The text of an element, or ``default``. Kinds whose elements have other names override it."""
@@ -169,6 +179,13 @@ class Drive(ModelPlugin):
 
 class _Wheels(Drive):
     """Wheels on two sides."""
+
+    #: The element with the torque of a wheel.
+    torque_tag: str
+    #: Of the rims, at most [m/s^2]; 0: any.
+    acceleration: float
+    _separation: float  # of the sides [m]
+    _radius: float  # of a wheel [m]
 
     def sides(self) -> tuple[list[str], list[str]]:
         """(joints of the left wheels, joints of the right ones), names."""
@@ -292,8 +309,9 @@ class SkidSteer(_Wheels):
     acceleration = 0.0
 
     def sides(self) -> tuple[list[str], list[str]]:
-        return tuple([self.joint("%s%sJoint" % (side, end), "%s_%s_joint" % (side, end.lower())) for end in
-                      ("Front", "Rear")] for side in ("left", "right"))
+        left, right = ([self.joint("%s%sJoint" % (side, end), "%s_%s_joint" % (side, end.lower()))
+                        for end in ("Front", "Rear")] for side in ("left", "right"))
+        return left, right
 
     def configure(self) -> None:
         super().configure()

@@ -14,6 +14,8 @@ from gazebo_ros.urdf_extras import unscoped
 from urdf_model import OutOfBounds, bounds
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from gazebo_ros.model_plugin import PluginContext
 
 # A joint goes to its target with these speeds for each metre that it is away [1/s], and with these largest forces [N]:
@@ -44,8 +46,9 @@ class Elevator(ModelPlugin):
         self._height = self._number("floor_height", 3.0)
         self._wait_s = self._number("door_wait_time", 5.0)
         self._targets = np.zeros(2)  # of door and lift [m]
-        self._states = deque()  # functions of the time that tell whether the next one may come
-        self._until_s = None
+        # Functions of the time that tell whether the next one may come.
+        self._states: deque[Callable[[float], bool]] = deque()
+        self._until_s: float | None = None
         self._commands = context.subscription(context.element_text("topic", "elevator"), String)
 
     def _joint(self, tag: str) -> str:

@@ -46,8 +46,11 @@ class ForceTorqueSensor(PacedSensor):
             return
         self._measuring = False
         self._pace.took(time_s)
-        message = WrenchStamped(wrench=_wrench(*self._joint.measure(), self._noise, self.context.world.random))
-        self.publisher.publish(self.stamped(message, time_s, self._frame))
+        force, torque = self._joint.measure()
+        if self._noise:
+            random = self.context.world.random
+            force, torque = force + random.normal(0.0, self._noise, 3), torque + random.normal(0.0, self._noise, 3)
+        self.publisher.publish(self.stamped(WrenchStamped(wrench=_wrench(force, torque)), time_s, self._frame))
 
     def reset(self) -> None:
         super().reset()
@@ -122,9 +125,6 @@ class Force(ModelPlugin):
         self._commands.take()
 
 
-def _wrench(force: np.ndarray, torque: np.ndarray, noise: float = 0.0,
-            random: np.random.Generator | None = None) -> Wrench:
-    if noise:
-        force, torque = force + random.normal(0.0, noise, 3), torque + random.normal(0.0, noise, 3)
+def _wrench(force: np.ndarray, torque: np.ndarray) -> Wrench:
     return Wrench(Vector3(*force), Vector3(*torque))
 

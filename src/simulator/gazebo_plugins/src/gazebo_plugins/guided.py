@@ -49,7 +49,6 @@ class HandOfGod(ModelPlugin):
         self._body = frames[self._link].link
         self._frame = context.element_text("frameId", "hog")
         self._asked = self._number("kl", 200.0), self._number("ka", 200.0)
-        self._springs = ()
         self.step_changed(context.world.time_step_s)
         self._frames = TransformSource(context)
         self._sent = context.publisher("/tf", TFMessage)
@@ -70,16 +69,17 @@ class HandOfGod(ModelPlugin):
     def step_changed(self, step_s: float) -> None:
         inertial = self.context.model.inertial(self._body)
         moments = np.linalg.eigvalsh(inertial.inertia)
-        springs = []
-        for tag, asked, inertia, least in (("kl", self._asked[0], inertial.mass, inertial.mass),
-                                           ("ka", self._asked[1], inertial.inertia[0, 0], moments[0])):
-            # So damped, the spring is stable up to 0.68 of the least inertia / step^2.
-            stiffness = min(asked, _STABLE * least / step_s ** 2)
-            if stiffness < asked:
-                self.context.log.warn("%s: <%s> of %g is unstable on an inertia of %g at steps of %g s; %.4g is used"
-                                      % (self._what, tag, asked, least, step_s, stiffness))
-            springs.append((stiffness, 2.0 * math.sqrt(stiffness * inertia)))
-        self._springs = tuple(springs)
+        self._springs = (self._spring("kl", self._asked[0], inertial.mass, inertial.mass, step_s),
+                         self._spring("ka", self._asked[1], inertial.inertia[0, 0], moments[0], step_s))
+
+    def _spring(self, tag: str, asked: float, inertia: float, least: float, step_s: float) -> tuple[float, float]:
+        """(stiffness, damping) of the spring ``tag``, whose stiffness is ``asked`` where that is stable."""
+        # So damped, the spring is stable up to 0.68 of the least inertia / step^2.
+        stiffness = min(asked, _STABLE * least / step_s ** 2)
+        if stiffness < asked:
+            self.context.log.warn("%s: <%s> of %g is unstable on an inertia of %g at steps of %g s; %.4g is used"
+                                  % (self._what, tag, asked, least, step_s, stiffness))
+        return stiffness, 2.0 * math.sqrt(stiffness * inertia)
 
     def update(self, time_s: float, dt: float) -> None:
         self._frames.take()
@@ -121,7 +121,7 @@ class WorldOdometry(PacedSensor):
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._link = self.link_named("frameName")
-        self._frame = context.element_text("frameName")
+        self._frame = context.element_text("frameName", self._link)
         if self._pace.rate == 0.0:
             self._pace.rate = 1000.0
 

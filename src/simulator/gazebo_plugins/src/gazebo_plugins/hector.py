@@ -51,7 +51,7 @@ class _LinkSensor(PacedSensor):
         self._frame = context.element_text("frameId", self.default_frame or self._link)
         self._last_s = None
 
-    default_frame = None
+    default_frame: str | None = None
 
     def elapsed(self, time_s: float) -> float:
         """Seconds since the last call, 0 at first."""
@@ -79,7 +79,6 @@ class HectorImu(_LinkSensor):
 
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
-        topic = context.element_text("topicName", self.default_topic)
         self._accel, self._rate = error_model(self, "accel"), error_model(self, "rate")
         self._yaw = error_model(self, "yaw", 1)
         both = self.number("gaussianNoise", 0.0)
@@ -88,8 +87,8 @@ class HectorImu(_LinkSensor):
             self._accel.noise = self._rate.noise = np.full(3, both)
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, "rpyOffset", (0.0,) * 3))[:3, :3]
         self._velocity = None
-        self._bias = context.publisher(context.element_text("biasTopicName", topic + "/bias"), Imu)
-        self._service = context.service(context.element_text("serviceName", topic + "/calibrate"), Empty,
+        self._bias = context.publisher(context.element_text("biasTopicName", self.topic + "/bias"), Imu)
+        self._service = context.service(context.element_text("serviceName", self.topic + "/calibrate"), Empty,
                                         self._calibrate)
 
     def publish(self, time_s: float) -> None:

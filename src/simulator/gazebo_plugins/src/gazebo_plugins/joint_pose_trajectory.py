@@ -62,7 +62,11 @@ class JointPoseTrajectory(ModelPlugin):
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
-        self._playback, self._index, self._columns, self._anchor = None, None, None, None
+        self._playback: Playback | None = None
+        # Of the trajectory: its joints in the model and in its points, the link that stays where it is.
+        self._index = context.model.index([])
+        self._columns: list[int] = []
+        self._anchor: str | None = None
         self._now_s = 0.0
         # Last, since a trajectory may come at once.
         self._commands = context.subscription(context.element_text("topicName", "set_joint_trajectory"),
@@ -79,11 +83,13 @@ class JointPoseTrajectory(ModelPlugin):
         positions = playback.take(time_s)
         if positions is None:
             return
-        model = self.context.model
-        place = None if self._anchor is None else model.link_pose(self._anchor).matrix()
-        model.set_joint_positions(self._index, positions[self._columns])
-        if place is not None:
-            moved = model.link_pose(self._anchor).matrix()
+        model, anchor = self.context.model, self._anchor
+        if anchor is None:
+            model.set_joint_positions(self._index, positions[self._columns])
+        else:
+            place = model.link_pose(anchor).matrix()
+            model.set_joint_positions(self._index, positions[self._columns])
+            moved = model.link_pose(anchor).matrix()
             model.set_base_pose(Pose.from_matrix(place @ np.linalg.inv(moved) @ model.base_pose().matrix()))
         if playback.is_over:
             self._playback = None

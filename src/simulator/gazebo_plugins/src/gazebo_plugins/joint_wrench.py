@@ -44,9 +44,9 @@ class JointWrench:
         self.offset = inverse(found.child_offset)
         behind = _links_behind(robot, found.child)
         #: {body: Inertial of its part behind the joint, in the frame of the link it is named after}.
-        self._parts = {}
+        self._parts: dict[str, Inertial] = {}
         #: {body that the joint divides: all its links}.
-        self._divided = {}
+        self._divided: dict[str, list[str]] = {}
         self._behind = behind
         for body, merged in model.merged.links.items():
             members = [link for link in merged.members if link in behind]
@@ -55,7 +55,8 @@ class JointWrench:
             self._parts[body] = _inertial(model, members)
             if len(members) < len(merged.members):
                 self._divided[body] = merged.members
-        self._before = None
+        #: (momentum, angular momentum) before the step, of :meth:`note`.
+        self._before: tuple[np.ndarray, np.ndarray]
 
     def note(self) -> None:
         """Call before the step that is to be measured."""
@@ -128,7 +129,7 @@ class JointWrench:
         if body not in self._divided:
             return True
         away = {link: _distance(self._model, link, where) for link in self._divided[body]}
-        return min(away, key=away.get) in self._behind
+        return min(away, key=away.__getitem__) in self._behind
 
 
 def contact_forces(world: World, model: Model,

@@ -2,7 +2,7 @@
 """The base of TurtleBot 2."""
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
@@ -41,6 +41,12 @@ class Kobuki(DiffDrive):
         self._last = None  # (time, linear velocity in the world)
         context.log.warn("%s: bumper, cliff and wheel drop events, sensors/core and motor_power (kobuki_msgs) are not "
                          "served" % self.what)
+
+    @overload
+    def text(self, tag: str, default: str) -> str: ...
+
+    @overload
+    def text(self, tag: str, default: None = None) -> str | None: ...
 
     def text(self, tag: str, default: str | None = None) -> str | None:
         if tag == "commandTopic":

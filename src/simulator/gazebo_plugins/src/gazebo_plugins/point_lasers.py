@@ -18,6 +18,8 @@ _FIELDS = {"x": (PointField.FLOAT32, "<f4"), "y": (PointField.FLOAT32, "<f4"), "
            "intensity": (PointField.FLOAT32, "<f4"), "ring": (PointField.UINT16, "<u2"),
            "time": (PointField.FLOAT32, "<f4")}
 _POINT = np.dtype([(name, kind) for name, (_, kind) in _FIELDS.items()])
+# Field -> where it begins. numpy's types allow for None, which plain numbers have for fields.
+_OFFSETS = {name: place[1] for name, place in (_POINT.fields or {}).items()}
 
 
 class BlockLaser(RaySensor):
@@ -58,9 +60,7 @@ class VelodyneLaser(RaySensor):
         self._organized = context.element_text("organize_cloud", "false").lower() in ("true", "1")
         self._points = np.zeros(len(self.pattern.directions), _POINT)
         self._points["ring"] = np.repeat(np.arange(self.pattern.rows), self.pattern.columns)
-        offsets = [_POINT.fields[name][1] for name in _FIELDS]
-        self._fields = [PointField(name, offset, kind, 1)
-                        for (name, (kind, _)), offset in zip(_FIELDS.items(), offsets, strict=True)]
+        self._fields = [PointField(name, _OFFSETS[name], kind, 1) for name, (kind, _) in _FIELDS.items()]
 
     def message(self, ranges: np.ndarray) -> PointCloud2:
         hit = (ranges > self._least) & (ranges < self._most)

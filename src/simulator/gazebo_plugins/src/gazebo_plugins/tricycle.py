@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import overload
 
 import numpy as np
 
@@ -26,6 +27,12 @@ class Tricycle(DiffDrive):
     ``odometrySource`` (world; encoder), ``publishWheelJointState``, ``publishWheelTF`` (false). The wheels'
     tolerances have no effect.
     """
+
+    @overload
+    def text(self, tag: str, default: str) -> str: ...
+
+    @overload
+    def text(self, tag: str, default: None = None) -> str | None: ...
 
     def text(self, tag: str, default: str | None = None) -> str | None:
         return super().text(_NAMES.get(tag, tag), _DEFAULTS.get(tag, default))

@@ -92,7 +92,7 @@ def _scale(shape: Shape) -> tuple[float, float, float]:
     if isinstance(found, Cylinder):
         return 2.0 * found.radius, 2.0 * found.radius, found.length
     if isinstance(found, Sphere):
-        return (2.0 * found.radius,) * 3
+        return 2.0 * found.radius, 2.0 * found.radius, 2.0 * found.radius
     if isinstance(found, Mesh):
         return abs(found.scale[0]), abs(found.scale[1]), abs(found.scale[2])
     return found.size[0], found.size[1], 1.0  # a plane
