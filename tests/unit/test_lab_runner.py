@@ -399,6 +399,25 @@ def test_examples_are_few_unless_long_tests_run_and_their_time_is_no_failure(tmp
     assert done.stdout.splitlines().count("one of quick") == examples
 
 
+CONSTANTS = """import sys
+sys.path += ["src", "devel"]
+import generated, own
+from hypothesis import given, strategies
+from hypothesis.internal.conjecture import providers
+@given(strategies.integers())
+def test_one(number):
+    assert set(providers._get_local_constants().integers) == {12345}
+"""
+
+
+def test_examples_take_constants_of_the_workspace_and_none_of_generated_code(tmp_path):
+    for folder, name, number in (("src", "own", 12345), ("devel", "generated", 67890)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / f"{name}.py").write_text(f"NUMBER = {number}")
+    (tmp_path / "test_one.py").write_text(CONSTANTS)
+    assert run_pytest(tmp_path).stdout.splitlines()[-1].startswith("1 passed, 0 failed")
+
+
 COLLECTED = """import os
 with open(os.environ["PYTEST_XDIST_WORKER"] + ".txt", "a") as stream:
     stream.write(__name__ + "\\n")
@@ -409,29 +428,23 @@ def test_one(): pass
 def test_each_worker_begins_its_collection_with_other_files(tmp_path):
     for name in "abcdef":
         (tmp_path / f"test_{name}.py").write_text(COLLECTED)
-    done = run_pytest(tmp_path, "-n3", "--dist=loadscope")
+    done = run_pytest(tmp_path, "-n4", "--dist=loadscope")
     assert done.stdout.splitlines()[-1].startswith("6 passed, 0 failed")
-    firsts = [(tmp_path / f"gw{number}.txt").read_text().split()[0] for number in range(3)]
-    assert firsts == ["test_a", "test_c", "test_e"]
+    firsts = [(tmp_path / f"gw{number}.txt").read_text().split()[0] for number in range(2)]
+    assert firsts == ["test_a", "test_d"]
 
 
-class WorkerNode:
-    def __init__(self, name, ended):
-        self.gateway, self.shutdown = SimpleNamespace(id=name), lambda: ended.append(name)
-
-
-@pytest.mark.parametrize(("left", "runs"), [(["gw2"], "gw2"), (["gw0", "gw2"], None)])
-def test_a_worker_beside_the_cores_runs_what_nobody_else_is_there_for(monkeypatch, tmp_path, left, runs):
-    """xdist ends the last of more workers than files, in the order in which they began."""
-    taken, ended = [], []
-    monkeypatch.setattr(plugin.LoadScopeScheduling, "_assign_work_unit", lambda _, node: taken.append(node.gateway.id))
-    nodes = [WorkerNode(name, ended) for name in left]
-    made = object.__new__(plugin.FileScheduling)
-    made.config, made.numnodes = SimpleNamespace(rootpath=tmp_path), 3
-    made.workqueue = OrderedDict({"test_one.py": {"test_one.py::test_one": False}})
-    made.assigned_work = {node: {} for node in nodes}
-    made._assign_work_unit(next(node for node in made.assigned_work if node.gateway.id == "gw2"))
-    assert (taken, ended) == (([runs], []) if runs else ([], ["gw2"]))
+@pytest.mark.parametrize("waiting", [0, 1, 3])
+@pytest.mark.parametrize("files", [1, 4])
+def test_workers_beside_the_cores_import_no_python_file_and_run_what_waits(tmp_path, fake_rostest, files, waiting):
+    for name in "abcd"[:files]:
+        (tmp_path / f"test_{name}.py").write_text(COLLECTED)
+    (tmp_path / "rostest").mkdir()
+    for number in range(waiting):
+        (tmp_path / f"rostest/works_{number}.test").write_text("<!-- beside others --><launch/>")
+    done = run_pytest(tmp_path, "-n3", "--dist=loadscope")
+    assert done.stdout.splitlines()[-1].startswith(f"{files + waiting} passed, 0 failed"), done.stdout
+    assert {path.stem for path in tmp_path.glob("gw*.txt")} == {"gw0"}
 
 
 def test_modules_are_compiled_once_for_all_programs_of_a_run(monkeypatch, tmp_path):

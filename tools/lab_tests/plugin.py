@@ -2,7 +2,8 @@
 """The pytest plugin of `./baxter.sh test`: .test files as tests, some at a time, and the counts.
 
 The controller of pytest-xdist gives whole files to its workers, the longest first; files that share a lab are one.
-There is a worker for each core, and two more, which run only the .test files that leave the processor to others.
+There is a worker for each core, and two more, which collect and run only the .test files that leave the processor to
+others.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from lab_tests.results import Tally, summary
 from lab_tests.shared_labs import lab_of
 
 if TYPE_CHECKING:
+    from xdist.remote import Producer
     from xdist.workermanage import WorkerController
 
 LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
@@ -42,6 +44,8 @@ MIN_DURATION_S = 2.0
 MAX_NAMED = 20
 # Examples of a test by Hypothesis that names no number: everywhere, and with --long.
 QUICK_EXAMPLES, DEEP_EXAMPLES = 50, 500
+#: The Worker of a process that collects and runs tests.
+WORKER: pytest.StashKey[Worker] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -65,8 +69,11 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Controller(config), "lab controller")
     # A few files run in this process itself.
     if is_worker or not config.option.numprocesses:
-        config.pluginmanager.register(Worker(config), "lab worker")
-        load_hypothesis_profile(config)
+        worker = Worker(config)
+        config.pluginmanager.register(worker, "lab worker")
+        config.stash[WORKER] = worker
+        if not worker.is_extra:
+            load_hypothesis_profile(config)
 
 
 def load_hypothesis_profile(config: pytest.Config) -> None:
@@ -77,6 +84,12 @@ def load_hypothesis_profile(config: pytest.Config) -> None:
         # How long an example takes is the machine's doing, not the code's.
         hypothesis.settings.register_profile(name, max_examples=examples, deadline=None,
                                              suppress_health_check=[hypothesis.HealthCheck.too_slow])
+    # It parses every module that is not installed, for constants to try: those of 900 modules of generated messages and of
+    # Debian's ROS are no hints, and took a worker of a fresh clone 14 of 36 seconds of processor time.
+    from hypothesis.internal.conjecture import providers
+
+    own, is_local = str(config.rootpath / "src"), providers.is_local_module_file
+    providers.is_local_module_file = lambda path: path.startswith(own) and is_local(path)
     if not config.getoption("hypothesis_profile", None):
         hypothesis.settings.load_profile("deep" if config.option.long else "quick")
 
@@ -104,7 +117,7 @@ class Rostest(pytest.Item):
     """One .test file, run by rostest; the tests in it are counted one by one."""
 
     def runtest(self) -> None:
-        tally = self.config.pluginmanager.get_plugin("lab worker").run_rostest(self)
+        tally = self.config.stash[WORKER].run_rostest(self)
         tally.refuse_bare_skips()
         self.user_properties += [("passed", tally.passed), ("failed", tally.failed), ("skips", tally.skips)]
         if tally.failed:
@@ -136,6 +149,11 @@ def unit_of(root: Path, nodeid: str) -> str:
     return file_of(nodeid) if lab is None else f"lab {hashlib.sha256(lab.encode()).hexdigest()[:12]}"
 
 
+def is_extra(number: int, count: int) -> bool:
+    """Whether a worker is one beside the cores. One that replaces a worker that died has a higher number, and is not."""
+    return max(1, count - WORKERS_BESIDE_CORES) <= number < count
+
+
 def read_durations(folder: Path) -> dict[str, float]:
     """File below the root -> seconds that it took last time."""
     found: dict[str, float] = {}
@@ -154,7 +172,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
                     if item.get_closest_marker("long") and not str(config.rootpath / item.nodeid).startswith(named)]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in set(left_out)]
-        _tell(config, "long", [item.nodeid for item in left_out])
+        if not config.stash[WORKER].is_extra:
+            _tell(config, "long", [item.nodeid for item in left_out])
     durations = read_durations(work_folder(config))
     units: dict[str, list] = {}
     for item in items:
@@ -187,7 +206,10 @@ class Worker:
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
-        self._begin_elsewhere()
+        told = getattr(config, "workerinput", {"workerid": "gw0", "workercount": 1})
+        number, count = int(told["workerid"].removeprefix("gw")), told["workercount"]
+        self.is_extra = is_extra(number, count)
+        self._choose_files(number, max(1, count - WORKERS_BESIDE_CORES))
         # For programs outside of this process: unit tests change variables, some of them when they are imported.
         self.environment = dict(os.environ)
         os.environ.update(comma_locale.variables(LOCALE_FOLDER))
@@ -208,11 +230,13 @@ class Worker:
             self._shared.update(rostests.run_shared(paths, folder, self.environment, stretch))
         return self._shared.pop(item.path)
 
-    def _begin_elsewhere(self):
-        """Collect the files in another order than the other workers do: what one compiles, the others find compiled."""
-        told = getattr(self._config, "workerinput", {"workerid": "gw0", "workercount": 1})
+    def _choose_files(self, number: int, cores: int):
+        """Collect only what this worker may run; and in another order than the others do: what one compiles, the others
+        find compiled."""
         arguments = self._config.args
-        begin = len(arguments) * int(told["workerid"].removeprefix("gw")) // told["workercount"]
+        if self.is_extra:
+            arguments[:] = [one for one in arguments if mostly_waits(self._config.rootpath / file_of(one))]
+        begin = len(arguments) * (number % cores) // cores
         arguments[:] = arguments[begin:] + arguments[:begin]
 
     @pytest.hookimpl(wrapper=True)
@@ -258,21 +282,22 @@ class Controller:
         self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
         os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
 
-    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: object) -> FileScheduling:
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Producer | None) -> FileScheduling:
         return FileScheduling(config, log)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         took = self._took.setdefault(file_of(report.nodeid), [0.0, 0.0])
         took[0] += report.duration
-        properties = dict(report.user_properties)
+        properties: dict[str, Any] = dict(report.user_properties)
         if report.when == "teardown":
             took[1] += properties.get("processor_s", 0.0)
         is_rostest = report.when == "call" and report.nodeid.endswith(".test::rostest")
         if report.failed or is_rostest:
             # pytest itself tells failures at the end; a whole run is long.
             terminal = self._config.pluginmanager.get_plugin("terminalreporter")
-            terminal.ensure_newline()
-            terminal.write_line(f"{report.outcome.upper()} {report.nodeid} ({report.duration:.0f} s)")
+            if terminal is not None:  # without -p no:terminal
+                terminal.ensure_newline()
+                terminal.write_line(f"{report.outcome.upper()} {report.nodeid} ({report.duration:.0f} s)")
         if report.failed:
             self._total.failed += max(1, properties.get("failed", 1) if report.when == "call" else 1)
             self._total.details.append(f"{report.nodeid}\n{report.longreprtext}")
@@ -335,16 +360,30 @@ class FileScheduling(LoadScopeScheduling):
         return unit_of(self.config.rootpath, nodeid)
 
     def _is_extra(self, node) -> bool:
-        return int(node.gateway.id.removeprefix("gw")) >= max(1, self.numnodes - WORKERS_BESIDE_CORES)
+        return is_extra(int(node.gateway.id.removeprefix("gw")), self.numnodes)
+
+    def _check_nodes_have_same_collection(self) -> bool:
+        """The others must have; a worker beside the cores has collected a part of it."""
+        # xdist takes the first collection for all of it, and ends the last of more workers than units: those beside come
+        # last, however fast they began.
+        self.assigned_work = dict(sorted(self.assigned_work.items(), key=lambda pair: self._is_extra(pair[0])))
+        collected = sorted(self.registered_collections.items(), key=lambda pair: self._is_extra(pair[0]))
+        self.registered_collections = {node: names for node, names in collected if not self._is_extra(node)}
+        try:
+            return super()._check_nodes_have_same_collection()
+        finally:
+            self.registered_collections = dict(collected)
 
     def _assign_work_unit(self, node):
-        waiting = {unit: mostly_waits(self.config.rootpath / file_of(next(iter(tests))))
-                   for unit, tests in self.workqueue.items()}
-        wanted = next((unit for unit, waits in waiting.items() if waits == self._is_extra(node)), None)
-        # xdist has ended the last of more workers than files; which ones these are depends on how fast they began.
-        others = any(not self._is_extra(other) for other in self.assigned_work)
-        if wanted is None and self._is_extra(node) and others:
+        firsts = {unit: next(iter(tests)) for unit, tests in self.workqueue.items()}
+        if self._is_extra(node):
+            known = set(self.registered_collections[node])
+            wanted = next((unit for unit, first in firsts.items() if first in known), None)
+        else:
+            wanted = next((unit for unit, first in firsts.items()
+                           if not mostly_waits(self.config.rootpath / file_of(first))), next(iter(firsts)))
+        if wanted is None:
             node.shutdown()
             return
-        self.workqueue.move_to_end(wanted or next(iter(self.workqueue)), last=False)
+        self.workqueue.move_to_end(wanted, last=False)
         super()._assign_work_unit(node)
