@@ -8,15 +8,13 @@ import subprocess
 import sys
 import tempfile
 import uuid
-from collections import OrderedDict
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 import run_tests
 from lab_testing.waiting import wait_until
-from lab_tests import comma_locale, plugin, processes, rostests
+from lab_tests import comma_locale, processes, rostests
 from lab_tests.discovery import SelectionError, changed_files, is_long, mostly_waits, select, take_inventory
 from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 

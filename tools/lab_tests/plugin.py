@@ -84,8 +84,8 @@ def load_hypothesis_profile(config: pytest.Config) -> None:
         # How long an example takes is the machine's doing, not the code's.
         hypothesis.settings.register_profile(name, max_examples=examples, deadline=None,
                                              suppress_health_check=[hypothesis.HealthCheck.too_slow])
-    # It parses every module that is not installed, for constants to try: those of 900 modules of generated messages and of
-    # Debian's ROS are no hints, and took a worker of a fresh clone 14 of 36 seconds of processor time.
+    # It parses every module that is not installed, for constants to try: those of 900 modules of generated messages and
+    # of Debian's ROS are no hints, and took a worker of a fresh clone 14 of 36 seconds of processor time.
     from hypothesis.internal.conjecture import providers
 
     own, is_local = str(config.rootpath / "src"), providers.is_local_module_file
@@ -150,7 +150,7 @@ def unit_of(root: Path, nodeid: str) -> str:
 
 
 def is_extra(number: int, count: int) -> bool:
-    """Whether a worker is one beside the cores. One that replaces a worker that died has a higher number, and is not."""
+    """Whether a worker is one beside the cores. One that replaces a dead worker has a higher number, and is not."""
     return max(1, count - WORKERS_BESIDE_CORES) <= number < count
 
 
@@ -364,8 +364,8 @@ class FileScheduling(LoadScopeScheduling):
 
     def _check_nodes_have_same_collection(self) -> bool:
         """The others must have; a worker beside the cores has collected a part of it."""
-        # xdist takes the first collection for all of it, and ends the last of more workers than units: those beside come
-        # last, however fast they began.
+        # xdist takes the first collection for all of it, and ends the last of more workers than units: those beside
+        # come last, however fast they began.
         self.assigned_work = dict(sorted(self.assigned_work.items(), key=lambda pair: self._is_extra(pair[0])))
         collected = sorted(self.registered_collections.items(), key=lambda pair: self._is_extra(pair[0]))
         self.registered_collections = {node: names for node, names in collected if not self._is_extra(node)}
