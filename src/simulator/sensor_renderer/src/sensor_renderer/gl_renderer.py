@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -84,6 +84,14 @@ class GlRenderer:
         self._context.front_face = "cw"
         # The sky is at the largest depth.
         self._context.depth_func = "<="
+
+    @overload
+    def render(self, mirror: Mirror, pinhole: Pinhole, pose: np.ndarray, colour: Literal[True] = True,
+               depth: bool = False) -> tuple[np.ndarray, np.ndarray | None]: ...
+
+    @overload
+    def render(self, mirror: Mirror, pinhole: Pinhole, pose: np.ndarray, colour: bool = True,
+               depth: bool = False) -> tuple[np.ndarray | None, np.ndarray | None]: ...
 
     def render(self, mirror: Mirror, pinhole: Pinhole, pose: np.ndarray, colour: bool = True,
                depth: bool = False) -> tuple[np.ndarray | None, np.ndarray | None]:

@@ -25,6 +25,9 @@ _STEP = 2.0 ** 0.25
 _MIN_HALF_M, _MAX_HALF_M = 1.0, 8.0
 # How far behind the furthest thing that casts shadows a camera sees any on the floor [m].
 _BEYOND_M = 1.5
+# A picture whose pixels see more than a texel of a map of everything, at this distance [m], is shaded by such a map: all
+# small pictures of a state share it, and it is exactly of that state.
+_SMALL_AT_M = 0.5
 # Texels along the map's border to which nothing is drawn: outside of the map is no shadow.
 _BORDER = 3
 # Surfaces are compared this many texels of the map outside of themselves: else lit ones are specked.
@@ -98,12 +101,14 @@ class Shadows:
     def _draw_sun(self, casters, spheres, pinhole, pose):
         turn = np.array([self._right, self._up, self._away])
         places, radii = spheres[0] @ turn.T, spheres[1]
-        low, high = self._region(spheres, places, pinhole, pose)
-        half = float(np.clip(np.max(high - low) / 2.0, _MIN_HALF_M, _MAX_HALF_M))
-        half = _STEP ** math.ceil(math.log(half, _STEP) - 1e-9)
-        texel = 2.0 * half / (self._pixels - 2 * _BORDER)
+        low, high = self._extent(places, radii)
+        half, texel = self._sides(low, high)
+        shared = texel * max(pinhole.fx, pinhole.fy) <= _SMALL_AT_M
+        if not shared:
+            low, high = self._region(spheres, low, high, pinhole, pose)
+            half, texel = self._sides(low, high)
         centre = np.round((low + high) / 2.0 / texel) * texel
-        if self._drawn == (half, *centre) and not self._poses.moved(casters, texel / 2.0):
+        if self._drawn == (half, *centre) and not self._poses.moved(casters, 0.0 if shared else texel / 2.0):
             return False
         self._drawn = (half, *centre)
         self._poses = _Poses(casters)
@@ -132,12 +137,23 @@ class Shadows:
             self._context.front_face = "cw"
         return True
 
-    def _region(self, spheres, places, pinhole, pose):
-        """Corners (2), (2) along the map's axes of what a camera may see shaded: in its view and in some shadow."""
-        centres, radii = spheres
+    def _extent(self, places, radii):
+        """Corners (2), (2) along the map's axes of all that casts shadows."""
         if not len(radii):
             return np.zeros(2), np.zeros(2)
-        low, high = (places[:, :2] - radii[:, None]).min(axis=0), (places[:, :2] + radii[:, None]).max(axis=0)
+        return (places[:, :2] - radii[:, None]).min(axis=0), (places[:, :2] + radii[:, None]).max(axis=0)
+
+    def _sides(self, low, high):
+        """Half of the side of a map with these corners in it, and its texels' side [m]."""
+        half = float(np.clip(np.max(high - low) / 2.0, _MIN_HALF_M, _MAX_HALF_M))
+        half = _STEP ** math.ceil(math.log(half, _STEP) - 1e-9)
+        return half, 2.0 * half / (self._pixels - 2 * _BORDER)
+
+    def _region(self, spheres, low, high, pinhole, pose):
+        """Of these corners, those of what a camera may see shaded: in its view and in some shadow."""
+        centres, radii = spheres
+        if not len(radii):
+            return low, high
         reach = float(((centres - pose[:3, 3]) @ pose[:3, 2] + radii).max()) + _BEYOND_M
         reach = min(max(reach, 0.1), pinhole.far)
         sides = np.array([(u, v) for u in (-0.5, pinhole.width - 0.5) for v in (-0.5, pinhole.height - 0.5)])

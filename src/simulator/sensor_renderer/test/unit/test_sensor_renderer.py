@@ -15,6 +15,7 @@ from sensor_renderer.errors import SensorError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import MAX_UNUSED, Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
+from sensor_renderer.shadows import Shadows
 from sensor_renderer.tiny_renderer import TinyRenderer
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse, pose_matrix
@@ -213,6 +214,27 @@ def test_bodies_come_and_go(renderer, tmp_path):
     mirror.set_state(np.array([0.7, 0.1, 0.05, 0, 0, 0, 1]))
     seen.append(reddish(renderer.render(mirror, pinhole, pose)[0]).any())
     assert seen == [True, False, True]
+
+
+@pytest.mark.parametrize("shift_m", [0.0005, 0.001, 0.0015])
+def test_small_pictures_of_a_state_share_one_map_of_shadows_which_is_exactly_of_it(tmp_path, monkeypatch, shift_m):
+    """Pictures for learning: a state that returns looks the same to the last bit, whatever was drawn before."""
+    drawn = []
+    draw_from = Shadows._draw_from
+    monkeypatch.setattr(Shadows, "_draw_from", lambda self, *given: drawn.append(1) or draw_from(self, *given))
+    pinhole = Pinhole.from_field_of_view(84, 84, 1.0, 0.05, 20.0)
+    views = [looking_down_on(0.7, 0.1, height) for height in (0.5, 1.0, 2.0)]
+    mirror, renderer = world([FLOOR, CUBE_ON_FLOOR], tmp_path), GlRenderer()
+    for view in views:
+        renderer.render(mirror, pinhole, view)
+    assert len(drawn) == 1
+    mirror.set_state(np.array([0, 0, 0, 0, 0, 0, 1, 0.7 + shift_m, 0.1, 0.05, *TURN]))
+    after = [np.array(renderer.render(mirror, pinhole, view)[0]) for view in views]
+    assert len(drawn) == 2
+    renderer.close()
+    fresh = GlRenderer()
+    np.testing.assert_array_equal(after, [np.array(fresh.render(mirror, pinhole, view)[0]) for view in views])
+    fresh.close()
 
 
 def test_a_shadow_falls_on_the_floor(tmp_path):
