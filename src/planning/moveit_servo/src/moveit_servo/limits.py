@@ -40,10 +40,9 @@ def stoppable(lower: np.ndarray, upper: np.ndarray, velocity: np.ndarray, accele
     """
     time = (1.0 - _SHARE_OF_LAG) * stopping_time
     braking = (1.0 - _SHARE_OF_JERK) * time
-    if acceleration is None:
-        acceleration = velocity / braking
-    velocity = np.minimum(velocity, acceleration * braking)
-    return JointLimits(lower, upper, velocity, acceleration, acceleration / (_SHARE_OF_JERK * time))
+    most = velocity / braking if acceleration is None else acceleration
+    velocity = np.minimum(velocity, most * braking)
+    return JointLimits(lower, upper, velocity, most, most / (_SHARE_OF_JERK * time))
 
 
 @compiled

@@ -66,7 +66,7 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
             positions=positions if settings.publish_joint_positions else [],
             velocities=velocities if settings.publish_joint_velocities else [],
             accelerations=accelerations if settings.publish_joint_accelerations else [],
-            time_from_start=rospy.Duration(first + number * settings.publish_period)))
+            time_from_start=rospy.Duration.from_sec(first + number * settings.publish_period)))
     return trajectory
 
 

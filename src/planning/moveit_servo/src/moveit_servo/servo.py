@@ -20,7 +20,7 @@ from moveit_servo.settings import STOP_DISTANCE, SettingsError
 from moveit_servo.straight import StraightWay
 
 if TYPE_CHECKING:
-    from motion_planning.model import PlanningModel
+    from motion_planning.model import Group, PlanningModel
     from moveit_servo.settings import ServoSettings
     from moveit_servo.surroundings import Surroundings
 
@@ -107,15 +107,13 @@ class Servo:
     def __init__(self, model: PlanningModel, settings: ServoSettings) -> None:
         """Raises SettingsError for a group or link that cannot be steered."""
         self.model = model
-        group = _group(model, settings.move_group_name)
-        self.group, self.tip = group, group.tip
-        self._chain = _chain_to(model, group)
+        self.group, base, self.tip = _steered(model, settings.move_group_name)
+        self._chain = _chain_of(model, self.group, base, self.tip)
         self.joints = self._chain.joint_names
         self._indices = np.array([model.index[name] for name in self.joints])
-        self._rows = np.searchsorted(group.indices, self._indices)
+        self._rows = np.searchsorted(self.group.indices, self._indices)
         #: Pose (4, 4) of the model's root in its frame.
         self.base = np.eye(4)
-        base = self._chain.base
         self._base_moves = any(joint.movable for joint in model.robot.chain(model.root, base))
         self._base_in_root = model.frame_of(model.default_state().q, base)
         self._nothing_near = (np.empty(0), np.empty((0, len(self.joints))), np.empty(0), np.empty(0, dtype=bool))
@@ -174,7 +172,7 @@ class Servo:
         motion = self._motion
         if motion is None:
             motion = self._motion = Motion(measured, self.limits)
-        away, at_rest = np.abs(motion.position - measured), self._at_rest()
+        away, at_rest = np.abs(motion.position - measured), _at_rest(motion)
         moved = ""
         if away.max() > (_SAME_RAD if at_rest else _MOVED_RAD):
             motion.rest_at(measured)
@@ -187,12 +185,12 @@ class Servo:
         whole[self._indices] = motion.position
         reached = False
         if command.pose is not None:
-            command, reached = self._towards(whole, command, seconds)
+            command, reached = self._towards(whole, command, command.pose, seconds)
             self._way.reset()
         else:
             self._target = None
             command = self._along(whole, command, seconds)
-        if not command and self._at_rest():
+        if not command and _at_rest(motion):
             motion.rest_at(motion.position)
             self._rests = True
             return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(),
@@ -202,7 +200,7 @@ class Servo:
         self._moving += seconds
         wanted = _Wanted(np.zeros(len(measured)))
         if command:
-            wanted = self._wanted(whole, velocity, measured, command)
+            wanted = self._wanted(whole, velocity, motion.position, measured, command)
         status, reason = (Status.JOINT_BOUND, moved) if moved else (wanted.status, wanted.reason)
         if status is not Status.NO_WARNING:
             self._way.reset()
@@ -214,13 +212,9 @@ class Servo:
         return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), status, reason, False,
                     reached, self._moving)
 
-    def _at_rest(self) -> bool:
-        motion = self._motion
-        return np.abs(motion.velocity).max() < _AT_REST and np.abs(motion.acceleration).max() < 1e3 * _AT_REST
-
-    def _towards(self, whole: np.ndarray, command: Command, seconds: float) -> tuple[Command, bool]:
-        """The twist towards the command's pose, and whether that is reached."""
-        target = command.pose
+    def _towards(self, whole: np.ndarray, command: Command, target: np.ndarray,
+                 seconds: float) -> tuple[Command, bool]:
+        """The twist towards the command's pose, ``target`` (4, 4), and whether that is reached."""
         if self._target is None:
             self._tracker.reset()
         self._target = target
@@ -246,8 +240,10 @@ class Servo:
 
     # -- the motion that is wanted and possible ------------------------------------------------------------------
 
-    def _wanted(self, whole, velocity, measured, command) -> _Wanted:
-        q, settings = self._motion.position, self.settings
+    def _wanted(self, whole: np.ndarray, velocity: np.ndarray, q: np.ndarray, measured: np.ndarray,
+                command: Command) -> _Wanted:
+        """q (k,): the set-points; measured (k,): where the joints are."""
+        settings = self.settings
         lost, condition = 0.0, 1.0
         if command.twist is not None and command.twist.any():
             limits = self.limits
@@ -267,7 +263,7 @@ class Servo:
         bounds = possible(wanted, metric, (q, measured), self.limits, near, self._rates)
         found = bounds.velocity
         if self.surroundings is not None:
-            found = self._open_cells(whole, found)
+            found = self._open_cells(self.surroundings, whole, found)
         status, reason = self._status(shares(jacobian, wanted, found, slope, bounds), found, lost, condition, bounds)
         if status is Status.JOINT_BOUND:
             behind = np.abs(q - measured)
@@ -287,14 +283,14 @@ class Servo:
         near = self.surroundings.near(whole, velocity, _REACH_M)
         return near.distance, np.ascontiguousarray(near.slope[:, self._rows]), near.drift, near.of_robot
 
-    def _open_cells(self, whole: np.ndarray, found: np.ndarray) -> np.ndarray:
+    def _open_cells(self, surroundings: Surroundings, whole: np.ndarray, found: np.ndarray) -> np.ndarray:
         """``found``, shortened where it leads into postures at which links may touch that spheres cannot tell apart."""
         ahead = whole.copy()
-        if self.surroundings.closed(whole):
+        if surroundings.closed(whole):
             return found
         for share in (1.0, 0.5, 0.25, 0.0):
             ahead[self._indices] = whole[self._indices] + 2.0 * share * self.settings.stopping_time * found
-            if not self.surroundings.closed(ahead):
+            if not surroundings.closed(ahead):
                 return share * found
         return 0.0 * found
 
@@ -324,6 +320,10 @@ class Servo:
         return Status.NO_WARNING, ""
 
 
+def _at_rest(motion: Motion) -> bool:
+    return np.abs(motion.velocity).max() < _AT_REST and np.abs(motion.acceleration).max() < 1e3 * _AT_REST
+
+
 def _rates(settings: ServoSettings) -> Rates:
     """The Rates of settings, in ``possible``'s words."""
     clearance, threshold = _CLEARANCE_M, (settings.self_collision_proximity_threshold,
@@ -335,24 +335,25 @@ def _rates(settings: ServoSettings) -> Rates:
                               clearance, *times)))
 
 
-def _group(model, name):
-    steerable = [one for one in model.groups.values() if one.chain is not None or one.tip is not None]
+def _steered(model: PlanningModel, name: str) -> tuple[Group, str, str]:
+    """The group to steer, and the links at the ends of its chain: base and tip."""
+    steerable = [one for one in model.groups.values() if one.tip is not None]
     if not name and len(steerable) == 1:
-        return steerable[0]
+        name = steerable[0].name
     if name not in model.groups:
         raise SettingsError("move_group_name is '%s'; the groups of robot '%s' are %s"
                             % (name, model.name, ", ".join(model.groups) or "none"))
     group = model.groups[name]
-    if group.tip is None:
+    if group.base is None or group.tip is None:
         raise SettingsError("move_group_name is '%s', which is not one chain; expected one of %s, and a servo for each"
                             % (name, ", ".join(one.name for one in steerable) or "none"))
-    return group
+    return group, group.base, group.tip
 
 
-def _chain_to(model, group):
+def _chain_of(model: PlanningModel, group: Group, base: str, tip: str) -> Chain:
     if group.chain is not None:
         return group.chain
     try:
-        return Chain.from_robot(model.robot, group.base, group.tip)
+        return Chain.from_robot(model.robot, base, tip)
     except ChainError as error:
         raise SettingsError("group '%s' cannot be steered: %s" % (group.name, error)) from None

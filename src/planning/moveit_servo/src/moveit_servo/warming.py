@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Calls every compiled function once."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from motion_planning.model import PlanningModel
@@ -10,6 +14,9 @@ from moveit_servo.settings import ServoSettings
 from moveit_servo.straight import StraightWay
 from moveit_servo.surroundings import Surroundings
 from urdf_model import Box
+
+if TYPE_CHECKING:
+    from motion_planning.shapes import TriangleMesh
 
 _URDF = """<robot name="small"><link name="base"/><link name="arm">
 <collision><geometry><box size="0.4 0.05 0.05"/></geometry></collision></link>
@@ -23,7 +30,8 @@ def warm_up() -> None:
     model = PlanningModel.from_xml(_URDF, _SRDF)
     servo = Servo(model, ServoSettings(move_group_name="arm", command_out_topic="command"))
     scene = Scene(model).with_object(WorldObject("box", np.eye(4), ((Box((0.1, 0.9, 0.1)), np.eye(4)),)))
-    servo.surroundings = Surroundings(SphereModel.of(model, None), servo.group, scene)
+    no_meshes: dict[str, TriangleMesh] = {}
+    servo.surroundings = Surroundings(SphereModel.of(model, no_meshes.__getitem__), servo.group, scene)
     turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
     for command in (Command(joints=np.array([0.5])), Command(twist=turn), Command(pose=np.eye(4))):
         servo.step(np.zeros(1), np.zeros(1), command, 0.01)
