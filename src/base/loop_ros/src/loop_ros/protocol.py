@@ -7,16 +7,18 @@
 """
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 
 class Publisher(Protocol):
     """One topic that is published."""
 
+    #: Its absolute name.
+    topic: str
     #: Function without arguments -> messages, or None. While the world is paused, when nothing else is published, who
     #: connects gets these: the state that the world is in.
-    present: Callable[[], list[Any]] | None
+    present: Callable[[], Sequence[Any]] | None
 
     @property
     def has_listeners(self) -> bool:
@@ -51,7 +53,7 @@ class Subscription(Protocol):
         """Call ``handler(message)`` for each unread message, oldest first; if it raises, the message is dropped and the
         error is counted."""
 
-    def guarded(self, handler: Callable[[Any], Any], *arguments: Any) -> None:
+    def guarded(self, handler: Callable[..., Any], *arguments: Any) -> None:
         """Call ``handler(*arguments)``; an error is counted as the fault of a message."""
 
     def close(self) -> None:

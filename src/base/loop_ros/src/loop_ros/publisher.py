@@ -16,7 +16,7 @@ import os
 import socket
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any
 
@@ -138,7 +138,7 @@ class LoopPublisher:
         #: until the next message. A plain attribute for speed: a robot checks a hundred topics per tick.
         self.has_listeners = False
         #: See :class:`loop_ros.protocol.Publisher`.
-        self.present: Callable[[], list[Any]] | None = None
+        self.present: Callable[[], Sequence[Any]] | None = None
         self._unserved: list[Peer] = []
         self._hub = hub
         self._keep_last = latch or greet

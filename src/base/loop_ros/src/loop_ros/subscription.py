@@ -63,7 +63,7 @@ class Subscription:
         for message in self.drain():
             self.guarded(handler, message)
 
-    def guarded(self, handler: Callable[[Any], Any], *arguments: Any) -> None:
+    def guarded(self, handler: Callable[..., Any], *arguments: Any) -> None:
         """Loop thread: call ``handler(*arguments)`` for one message; an error is counted and not passed on."""
         try:
             handler(*arguments)

@@ -7,7 +7,7 @@ answers of services are the real code.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from loop_ros.faults import Faults
@@ -185,7 +185,7 @@ class FakePublisher:
     def __init__(self, sent: _Sent, msg_class: type, keeps_last: bool, publishers: dict[str, FakePublisher],
                  topic: str) -> None:
         self.topic, self.msg_class, self.is_closed = topic, msg_class, False
-        self.present: Callable[[], list[Any]] | None = None
+        self.present: Callable[[], Sequence[Any]] | None = None
         self.renewed = 0
         self.keeps_last = keeps_last
         self._sent = sent
