@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -227,7 +227,7 @@ class Baxter:
         """Disable it: the arms hold."""
         self.apply(Event.DISABLE)
 
-    def put(self, angles: dict[str, Sequence[float]]) -> None:
+    def put(self, angles: Mapping[str, Sequence[float] | np.ndarray]) -> None:
         """Put arms at angles {side: (7,)} at once, at rest; commands are forgotten. Nothing in between is simulated."""
         model = self.simulated.model
         for side, values in angles.items():
