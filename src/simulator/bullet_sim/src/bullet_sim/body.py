@@ -69,7 +69,7 @@ class Body:
         self._late_twists = {}  # index of a root -> velocity
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
-        self._pairs = ()
+        self._pairs: tuple[tuple[int, int], ...] = ()
         self._firm = set()  # indices of links with friction that does not creep
         self.set_self_collision_pairs(())
         #: {body's name: parts of its speed and turn rate that each step takes}
@@ -291,9 +291,9 @@ class Body:
         Bullet keeps contacts from step to step, and sometimes a false one: its normal comes from two nearly parallel
         edges, and it can hold a body that should come free.
         """
-        link = self.merged.links[self._frame(link).link]
-        surfaces = link.surface, *(patch.surface for patch in link.patches)
-        for place, surface in zip(self.parts.all_places(self._link_index[link.name]), surfaces, strict=True):
+        body = self.merged.links[self._frame(link).link]
+        surfaces = body.surface, *(patch.surface for patch in body.patches)
+        for place, surface in zip(self.parts.all_places(self._link_index[body.name]), surfaces, strict=True):
             set_collision_filter(self._client, place, surface, renew=True)
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
@@ -317,42 +317,42 @@ class Body:
         index = self._link_index[body]
         if self.static and index == BASE:
             raise BulletSimError("link '%s' of '%s' is fixed in the world; its mass has no effect" % (body, self.name))
-        inertia = np.asarray(inertia, dtype=float)
+        given = np.asarray(inertia, dtype=float)
         if not (math.isfinite(mass) and mass > 0.0):
             raise BulletSimError("a mass of %g kg cannot be set; expected a positive number" % mass)
         within(bounds.MASS, mass, "the mass of link '%s'" % body)
-        within(bounds.INERTIA, inertia.ravel(), "the inertia of link '%s'" % body)
+        within(bounds.INERTIA, given.ravel(), "the inertia of link '%s'" % body)
         if mass < bounds.MIN_MASS_KG:
             raise BulletSimError(
                 "a mass of %g kg cannot be set; expected at least %g kg" % (mass, bounds.MIN_MASS_KG)
             )
         offset = self.merged.frames[body].offset
         rotation = offset[:3, :3]
-        inertia = rotation @ inertia @ rotation.T
-        centre = link.inertial.centre if centre is None else within(
-            bounds.POSITION, offset[:3, 3] + rotation @ np.asarray(centre, dtype=float),
-            "the centre of mass of link '%s'" % body)
+        new = Inertial(mass, link.inertial.centre, rotation @ given @ rotation.T)
+        if centre is not None:
+            new.centre = within(bounds.POSITION, offset[:3, 3] + rotation @ np.asarray(centre, dtype=float),
+                                "the centre of mass of link '%s'" % body)
         arguments = {"physicsClientId": self._client}
         place = self.parts.places[index]
         info = pybullet.getDynamicsInfo(*place, **arguments)
         axes = Pose((0.0, 0.0, 0.0), info[4]).matrix()[:3, :3]
-        turned = axes.T @ inertia @ axes
+        turned = axes.T @ new.inertia @ axes
         moments = np.diag(turned)
         is_turned = np.abs(turned - np.diag(moments)).max() > 1e-3 * moments.max()
         if is_turned:
-            moments = np.linalg.eigvalsh(inertia)
+            moments = np.linalg.eigvalsh(new.inertia)
         if moments.min() <= 0.0:
-            raise BulletSimError("the inertia %s has a moment that is not positive" % inertia.tolist())
+            raise BulletSimError("the inertia %s has a moment that is not positive" % new.inertia.tolist())
         if moments.min() < bounds.MIN_INERTIA_PER_MASS_M2 * mass:
             raise BulletSimError("the inertia %s has a moment of %g kg m^2; expected at least %g for a mass of %g kg"
-                                 % (inertia.tolist(), moments.min(), bounds.MIN_INERTIA_PER_MASS_M2 * mass, mass))
-        if is_turned or not np.allclose(centre, link.inertial.centre, rtol=0.0, atol=1e-9):
-            self._rebuild_with(link, Inertial(mass, centre, inertia))
+                                 % (new.inertia.tolist(), moments.min(), bounds.MIN_INERTIA_PER_MASS_M2 * mass, mass))
+        if is_turned or not np.allclose(new.centre, link.inertial.centre, rtol=0.0, atol=1e-9):
+            self._rebuild_with(link, new)
         else:
             pybullet.changeDynamics(*place, mass=mass, **arguments)
             # After the mass, which makes PyBullet guess an inertia of its own.
             pybullet.changeDynamics(*place, localInertiaDiagonal=moments.tolist(), **arguments)
-            link.inertial = Inertial(mass, link.inertial.centre, inertia)
+            link.inertial = Inertial(mass, link.inertial.centre, new.inertia)
         if not self.has_weight(body):
             self._weightless[body] = mass, None
         self.wake()
@@ -362,12 +362,12 @@ class Body:
         motion, index = self.motion(), self._link_index[link.name]
         link.inertial = inertial
         if index in self.free:
-            old, offset = self._offsets[index], inertial_frame(link)
-            base, twist = (motion.base, motion.twist) if index == BASE else motion.loose[index]
-            frame = Pose(*base).matrix() @ old[1]
+            old, offset = self._offsets[index][0], inertial_frame(link)
+            linear, angular = pybullet.getBaseVelocity(self.parts.places[index].body, physicsClientId=self._client)
+            frame = self._body_matrix(index)
             # PyBullet's is that of the centre of mass.
-            moved = frame[:3, :3] @ (offset[:3, 3] - old[0][:3, 3])
-            twist = np.asarray(twist[0]) + np.cross(twist[1], moved), twist[1]
+            moved = frame[:3, :3] @ (offset[:3, 3] - old[:3, 3])
+            twist = np.asarray(linear) + np.cross(angular, moved), angular
             self._set_root_offset(index, offset)
             pose = Pose.from_matrix(frame @ offset)
             base = pose.position, pose.quaternion
@@ -375,7 +375,15 @@ class Body:
                 motion = motion._replace(base=base, twist=twist)
             else:
                 motion.loose[index] = base, twist
-        self._world.rebuild([self], {self: motion})
+        self._rebuild(motion)
+
+    def motion(self) -> Motion:
+        """In Model: the state that it needs to continue the present motion when it is rebuilt."""
+        raise NotImplementedError
+
+    def _rebuild(self, motion: Motion | None = None) -> None:
+        """In Model: rebuild the multibodies; they go on with ``motion``, by default the present one."""
+        raise NotImplementedError
 
     def _set_root_offset(self, index: int, offset: np.ndarray) -> None:
         self._offsets[index] = offset, inverse(offset)
@@ -433,7 +441,7 @@ class Body:
         self._pairs = tuple(sorted(wanted))
         if wanted and not self.blueprint.self_collision:
             self.blueprint = self.blueprint._replace(self_collision=True)
-            self._world.rebuild([self])
+            self._rebuild()
             return
         if not self.blueprint.self_collision and len(self.parts.bodies) == 1:
             return
@@ -466,8 +474,7 @@ class Body:
 
     def _restore_collisions(self) -> None:
         """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
-        pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
-        self.set_self_collision_pairs([tuple(pair) for pair in pairs])
+        self.set_self_collision_pairs([(self._link_names[a], self._link_names[b]) for a, b in self._pairs])
         for place in (place for index in self._firm for place in self.parts.all_places(index)):
             pybullet.changeDynamics(*place, frictionAnchor=1, physicsClientId=self._client)
 
@@ -525,13 +532,13 @@ class Body:
     def _push(self, index: int, force: Sequence[float] | np.ndarray,
               torque: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
               position: Sequence[float] | np.ndarray | None = None) -> None:
-        place = self.parts.places[index]
-        if position is None:
+        place, point = self.parts.places[index], position
+        if point is None:
             if index < 0:
-                position = pybullet.getBasePositionAndOrientation(place.body, physicsClientId=self._client)[0]
+                point = pybullet.getBasePositionAndOrientation(place.body, physicsClientId=self._client)[0]
             else:
-                position = pybullet.getLinkState(*place, physicsClientId=self._client)[0]
+                point = pybullet.getLinkState(*place, physicsClientId=self._client)[0]
         arguments = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
-        pybullet.applyExternalForce(*place, list(force), list(position), **arguments)
+        pybullet.applyExternalForce(*place, list(force), list(point), **arguments)
         if any(torque):
             pybullet.applyExternalTorque(*place, list(torque), **arguments)

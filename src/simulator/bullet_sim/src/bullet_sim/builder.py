@@ -7,6 +7,7 @@ copies, the inertia exactly as merged, and 10 ms where loading the same robot fr
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -294,14 +295,14 @@ def _pressing(surface: Surface) -> dict[str, float]:
     arguments = {}
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
-    stiffness, damping = surface.stiffness, _DEFAULT_DAMPING if surface.damping is None else surface.damping
-    speed = surface.leaving_speed
-    if speed is not None and (is_rigid(stiffness) and speed < _QUICK_M_PER_S or not is_rigid(stiffness)):
+    stiffness, damping = stiffness_of(surface), _DEFAULT_DAMPING if surface.damping is None else surface.damping
+    speed, is_rigid = surface.leaving_speed, stiffness == math.inf
+    if speed is not None and (is_rigid and speed < _QUICK_M_PER_S or not is_rigid):
         # Bullet turns an overlap d into the speed d k / (dt k + c) at most, for a stiffness k and a damping c.
-        stiffness = _RIGID_N_PER_M if is_rigid(stiffness) else stiffness
+        stiffness = min(stiffness, _RIGID_N_PER_M)
         damping = max(damping, stiffness * _DEEP_M / max(speed, _SLOWEST_M_PER_S))
         arguments.update(contactStiffness=stiffness, contactDamping=damping)
-    elif not is_rigid(stiffness):
+    elif not is_rigid:
         arguments.update(contactStiffness=stiffness, contactDamping=damping)
     return arguments
 
@@ -348,9 +349,10 @@ def _as_built(surface: Surface | None, most: float) -> tuple:
     return tuple(sorted(arguments.items())), ways, ALL_BITS if surface.bitmask is None else surface.bitmask
 
 
-def is_rigid(stiffness: float | None) -> bool:
-    """Whether contacts of a surface with a stiffness [N/m] are rigid; None: it is not given."""
-    return stiffness is None or stiffness >= _RIGID_N_PER_M
+def stiffness_of(surface: Surface) -> float:
+    """The stiffness of the contacts of a urdf_model.Surface [N/m]; infinite where they are rigid."""
+    given = surface.stiffness
+    return math.inf if given is None or given >= _RIGID_N_PER_M else given
 
 
 _COLUMNS = (

@@ -42,17 +42,17 @@ def directed(surface: Surface | None, most: float) -> Directed | None:
 def turned(moments: np.ndarray, axes: np.ndarray, direction: Sequence[float]) -> tuple[np.ndarray, np.ndarray, float]:
     """Return (moments (3,), axes (3, 3), [rad]) of an inertia, with an axis as near as possible to ``direction`` (3,),
     and the angle between them."""
-    direction = np.asarray(direction, dtype=float)
+    wanted = np.asarray(direction, dtype=float)
     if np.ptp(moments) <= _SAME * moments.max():
-        first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+        first = np.cross(wanted, np.eye(3)[np.abs(wanted).argmin()])
         first /= np.linalg.norm(first)
-        return moments, np.stack([direction, first, np.cross(direction, first)], axis=1), 0.0
-    near = np.abs(axes.T @ direction)
+        return moments, np.stack([wanted, first, np.cross(wanted, first)], axis=1), 0.0
+    near = np.abs(axes.T @ wanted)
     for third in range(3):
         one, other = (third + 1) % 3, (third + 2) % 3
         spread = abs(moments[one] - moments[other])
         if spread <= _SAME * max(moments[one], moments[other]) and near[third] < math.sin(_CLOSE):
-            first = direction - axes[:, third] * (axes[:, third] @ direction)
+            first = wanted - axes[:, third] * (axes[:, third] @ wanted)
             first /= np.linalg.norm(first)
             found = axes.copy()
             found[:, one], found[:, other] = first, np.cross(axes[:, third], first)

@@ -38,7 +38,7 @@ class Part(NamedTuple):
     """A shape in PyBullet's terms."""
 
     geometry: Any  # of urdf_model; of a mesh only the scale counts here
-    file: str | None  # Wavefront file of a mesh, [m] before the scale
+    file: str  # Wavefront file of a mesh, [m] before the scale; "" for another geometry
     origin: np.ndarray  # (4, 4)
     hollow: bool  # triangles, instead of convex bodies
 

@@ -17,7 +17,7 @@ import subprocess
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from processes.priority import as_before, give_way
 
@@ -42,6 +42,14 @@ class LimitError(Exception):
     """The work failed, or exceeded a limit; the text says which."""
 
 
+class _Worker(NamedTuple):
+    """The process, and the pipes to it and from it."""
+
+    process: subprocess.Popen[bytes]
+    requests: IO[bytes]
+    answers: IO[bytes]
+
+
 class LimitedProcess:
     """Calls functions in a process that starts on demand and ends after some idle time.
 
@@ -53,7 +61,7 @@ class LimitedProcess:
         self._limits = processor_s, memory_bytes
         self._waiting_s = waiting_s
         self._lock = threading.Lock()
-        self._process = None
+        self._worker: _Worker | None = None
 
     def call(self, function: Callable, *arguments: Any) -> Any:
         """Return ``function(*arguments)``: a function of a module, arguments and result as JSON has them.
@@ -75,58 +83,58 @@ class LimitedProcess:
 
     def _ask(self, request: bytes) -> bytes:
         for _ in range(2):
-            if self._process is None:
-                self._process = _start(*self._limits)
-            line = self._exchange(request)
+            if self._worker is None:
+                self._worker = _start(*self._limits)
+            line = self._exchange(self._worker, request)
             if line is not None:
                 return line
         raise LimitError("the process for it cannot be started")
 
-    def _exchange(self, request: bytes) -> bytes | None:
+    def _exchange(self, worker: _Worker, request: bytes) -> bytes | None:
         """Return the answer's line, or None if the process had ended after its idle time."""
-        process, line, gives_up_at = self._process, b"", time.monotonic() + self._waiting_s
+        process, line, gives_up_at = worker.process, b"", time.monotonic() + self._waiting_s
         used_s = _processor_s(process)
         try:
-            process.stdin.write(request)
-            process.stdin.flush()
+            worker.requests.write(request)
+            worker.requests.flush()
         except OSError:
             self._end()
             return None
         while not line.endswith(b"\n"):
-            readable = select.select([process.stdout], [], [], max(0.0, gives_up_at - time.monotonic()))[0]
+            readable = select.select([worker.answers], [], [], max(0.0, gives_up_at - time.monotonic()))[0]
             before_s, used_s = used_s, used_s if readable else _processor_s(process)
             if used_s - before_s > _WORKS_SHARE * self._waiting_s:
                 gives_up_at = time.monotonic() + self._waiting_s
                 continue
-            part = os.read(process.stdout.fileno(), 65536) if readable else b""
+            part = os.read(worker.answers.fileno(), 65536) if readable else b""
             if not part:
                 if readable and process.wait() == 0:
                     self._end()
                     return None
-                raise LimitError(self._why(bool(readable)))
+                raise LimitError(self._why(process, bool(readable)))
             line += part
         return line
 
-    def _why(self, has_ended: bool) -> str:
+    def _why(self, process: subprocess.Popen[bytes], has_ended: bool) -> str:
         if not has_ended:
             self._end()
             return "it did nothing for %g s" % self._waiting_s
-        code = self._process.wait()
+        code = process.wait()
         self._end()
         if code == -signal.SIGXCPU:
             return "it took more than %g s of processor time" % self._limits[0]
         return "the process that worked on it ended with code %d" % code
 
     def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is not None:
-            process.kill()
-            process.wait()
-            process.stdin.close()
-            process.stdout.close()
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.process.kill()
+            worker.process.wait()
+            worker.requests.close()
+            worker.answers.close()
 
 
-def _processor_s(process: subprocess.Popen) -> float:
+def _processor_s(process: subprocess.Popen[bytes]) -> float:
     """Processor time that a process has used [s]; 0 after its end."""
     try:
         with open("/proc/%d/stat" % process.pid, "rb") as file:
@@ -136,14 +144,15 @@ def _processor_s(process: subprocess.Popen) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def _start(processor_s: int, memory_bytes: int) -> subprocess.Popen:
+def _start(processor_s: int, memory_bytes: int) -> _Worker:
     # One thread is enough, and each of a numerical library's own takes memory.
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    return as_before(
+    process = as_before(
         subprocess.Popen, [sys.executable, "-c", _START, str(processor_s), str(memory_bytes)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, bufsize=0,
         start_new_session=True,
     )
+    return _Worker(process, process.stdin, process.stdout)
 
 
 def serve() -> None:

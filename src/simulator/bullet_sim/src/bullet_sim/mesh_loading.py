@@ -7,6 +7,7 @@ Call it in a process with limits (``limited``): a hostile file can make a format
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,14 +56,14 @@ class MeshError(ValueError):
     """A mesh that cannot be used; the text continues after the mesh's name: "… holds no triangles"."""
 
 
-class _Beside:
-    """Resolver for trimesh: only files in the mesh's own folder, and only materials and buffers."""
+class _Beside(Mapping[str, bytes]):
+    """Resolver for trimesh: only files in the mesh's own folder, and only materials and buffers. It lists none."""
 
     def __init__(self, folder: Path, textures: bool) -> None:
         self._folder = folder
         self._textures = textures
 
-    def get(self, name: str) -> bytes:
+    def __getitem__(self, name: str) -> bytes:
         name = str(name)
         if self._textures and name.lower().endswith(PICTURES):
             return _picture_of(name)
@@ -71,10 +72,11 @@ class _Beside:
             raise FileNotFoundError(name)
         return read_file(path, MAX_BYTES_BESIDE)
 
-    __getitem__ = get
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
 
-    def keys(self) -> tuple:
-        return ()
+    def __len__(self) -> int:
+        return 0
 
 
 def load_scene(path: str | Path, part: tuple[str, bool] = WHOLE, textures: bool = False) -> trimesh.Scene:
@@ -100,8 +102,8 @@ def load_scene(path: str | Path, part: tuple[str, bool] = WHOLE, textures: bool 
         content = _group(content, name)
     elif name:
         raise MeshError("it has no part '%s'; only Collada and Wavefront files have parts with names" % name)
-    scene = trimesh.load(
-        io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent, textures), process=False
+    scene = trimesh.load_scene(
+        io.BytesIO(content), file_type=kind, resolver=_Beside(path.parent, textures), process=False
     )
     triangles = 0
     for name in scene.graph.geometry_nodes:
@@ -251,18 +253,18 @@ def to_wavefront(path: str | Path, target: str, planes: Iterable[Sequence], part
     part of it. If the hull has very many points, ``target`` + ".hull" holds one that is as good. Raises MeshError.
     Returns a remark, "" where there is none.
     """
+    import trimesh
+
     from .convex_parts import cut
 
-    scene = load_scene(path, part)
-    mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
-    faces = np.asarray(getattr(mesh, "faces", ()))
-    if len(faces) == 0:
+    mesh = load_scene(path, part).to_geometry()
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
         raise MeshError("it holds no triangles")
     if planes:
         parts = [hull_points(np.array(points)) for points in cut(mesh.triangles, [tuple(plane) for plane in planes])]
         _write(target, parts_as_wavefront([[tuple(point) for point in points.tolist()] for points in parts]))
         return ""
-    remark = ""
+    remark, faces = "", np.asarray(mesh.faces)
     if len(faces) > MAX_HOLLOW_TRIANGLES:
         _write(target + ".hull", _cloud(hull_points(outermost(np.asarray(mesh.vertices)))))
         vertices, thinned = thin_out(np.asarray(mesh.vertices), faces, MAX_HOLLOW_TRIANGLES)
@@ -304,7 +306,7 @@ def even_directions(count: int) -> np.ndarray:
     return np.stack([level * np.cos(turn), level * np.sin(turn), height], axis=1)
 
 
-def parts_as_wavefront(parts: Iterable[Sequence]) -> list[str]:
+def parts_as_wavefront(parts: Iterable[Sequence[Sequence[float]] | np.ndarray]) -> list[str]:
     """Return the lines of a file with one object for each list of points; Bullet makes a convex hull of each."""
     lines, first = [], 1
     for number, points in enumerate(parts):

@@ -82,8 +82,8 @@ class Model(Body):
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
-        self._gears = {}  # of (joint, other), by index
-        self._couplings = {}  # the same -> ratio
+        self._gears: dict[tuple[int, int], int] = {}  # of (joint, other), by index
+        self._couplings: dict[tuple[int, int], float] = {}  # of the same -> ratio
         self._loops = close_loops(client, self.merged, parts)
         self._damping = JointDamping(self, client, world.time_step_s, {
             index: within(bounds.DAMPING, joint.damping, "the damping of joint '%s'" % joint.name)
@@ -151,12 +151,12 @@ class Model(Body):
         if velocity is not None:
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
             position = position - velocity * self._world.time_step_s
-        position = position.tolist()
-        self._refuse_nan(index, position, "position")
+        targets = position.tolist()
+        self._refuse_nan(index, targets, "position")
         self.parts.command(
             index,
             pybullet.POSITION_CONTROL,
-            targetPositions=position,
+            targetPositions=targets,
             targetVelocities=[0.0] * gains if velocity is None else velocity.tolist(),
             forces=max_effort.tolist(),
             positionGains=[POSITION_GAIN] * gains,
@@ -170,9 +170,9 @@ class Model(Body):
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
         self._forget(index)
         self._drive_otherwise(index)
-        velocity = velocity.tolist()
-        self._refuse_nan(index, velocity, "velocity")
-        self.parts.command(index, pybullet.VELOCITY_CONTROL, targetVelocities=velocity, forces=max_effort.tolist())
+        targets = velocity.tolist()
+        self._refuse_nan(index, targets, "velocity")
+        self.parts.command(index, pybullet.VELOCITY_CONTROL, targetVelocities=targets, forces=max_effort.tolist())
 
     def carry(self, index: np.ndarray, position: np.ndarray, velocity: np.ndarray | None = None) -> None:
         """Put joints ``index`` (k,) at ``position`` (k,) and hold them there during the next step, with unlimited
@@ -181,13 +181,13 @@ class Model(Body):
         They move without inertia: links before the joint feel no reaction, as with Gazebo's ``Joint::SetPosition``.
         Links behind it, and touched bodies, do.
         """
-        position = position.tolist()
-        self._refuse_nan(index, position, "position")
+        places = position.tolist()
+        self._refuse_nan(index, places, "position")
         self._drive_otherwise(index)
         velocity = np.zeros(len(index)) if velocity is None else velocity
         speeds = velocity.tolist()
         self._refuse_nan(index, speeds, "velocity")
-        self.parts.put(index, position, speeds)
+        self.parts.put(index, places, speeds)
         self._reading = None
         self.drive_velocity(index, velocity, np.full(len(index), _RIGID_EFFORT))
 
@@ -268,7 +268,7 @@ class Model(Body):
         if self.parts.places[pair[0]].body != self.parts.places[pair[1]].body:
             # Bullet's gear between two multibodies pulls the second one the wrong way where the ratio is negative.
             self.blueprint = self.blueprint._replace(in_limbs=False)
-            self._world.rebuild([self])
+            self._rebuild()
         if pair not in self._gears:
             self._gears[pair] = pybullet.createConstraint(
                 *self.parts.places[pair[0]], *self.parts.places[pair[1]],
@@ -440,7 +440,8 @@ class Model(Body):
     def last_good(self) -> Motion:
         """Return the state that :meth:`take_parts` needs to put the model at its last good state, at rest."""
         loose = {index: (centre, None) for index, centre in self._good_loose.items()}
-        return Motion(*self._good, None, np.zeros(len(self._all)), loose)
+        base, joints = self._good
+        return Motion(base, joints, None, np.zeros(len(self._all)), loose)
 
     def put_back(self) -> None:
         """Restore the last good state, at rest."""
@@ -480,6 +481,9 @@ class Model(Body):
         self._good, self._good_loose = (base, joints), {index: centre for index, (centre, _) in loose.items()}
 
     # -- inside -------------------------------------------------------------------------------------------------
+
+    def _rebuild(self, motion: Motion | None = None) -> None:
+        self._world.rebuild([self], None if motion is None else {self: motion})
 
     def _refuse_nan(self, index: np.ndarray, values: list[float], what: str) -> None:
         """Raise BulletSimError where one of ``values``, a list for joints ``index`` (k,), is not a number."""

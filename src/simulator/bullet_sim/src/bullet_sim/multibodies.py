@@ -116,7 +116,7 @@ class Parts:
         self._order = None
         if in_turn != sorted(in_turn):
             self._order = sorted(range(len(in_turn)), key=in_turn.__getitem__)
-        self._indices = {place: index for index, place in self.places.items()}
+        self._indices: dict[tuple[int, int], int] = {place: index for index, place in self.places.items()}
         #: {index: the Places of its patches, in their order}
         self.patches = {}
         seen = set()
@@ -155,9 +155,9 @@ class Parts:
 
     def put(self, index: np.ndarray, position: list[float], velocity: list[float]) -> None:
         """Put joints ``index`` (k,), an int array, at ``position`` and ``velocity``, lists of k, at once."""
-        position, velocity = [[value] for value in position], [[value] for value in velocity]
+        positions, velocities = [[value] for value in position], [[value] for value in velocity]
         for body, local, rows in self._share(index):
-            values = (position, velocity) if rows is None else (_rows(position, rows), _rows(velocity, rows))
+            values = (positions, velocities) if rows is None else (_rows(positions, rows), _rows(velocities, rows))
             # In one call, since each call computes all link poses.
             pybullet.resetJointStatesMultiDof(body, local, *values, physicsClientId=self._client)
 

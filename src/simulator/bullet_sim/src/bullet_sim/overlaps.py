@@ -7,6 +7,7 @@ ground, then flies 100 m high. Gazebo (ODE) corrects an overlap by the position 
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +15,13 @@ import numpy as np
 from urdf_model import Surface
 from urdf_model.model import ALL_BITS
 
-from .builder import is_rigid
+from .builder import stiffness_of
 from .quiet_pybullet import pybullet
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from .model import Model
+    from .body import Body
 
 # Shallower overlaps stay: bodies that rest on each other have them [m]. Soft surfaces, whose stiffness turns an overlap
 # into a speed, keep no more than the one in which they bear the model's weight, and this at least.
@@ -29,7 +30,7 @@ _ALLOWED_M, _MIN_M = 1e-3, 1e-5
 _ROUNDS = 10
 
 
-def come_out(client: int, model: Model, index: int, others: Iterable[Model], gravity: Sequence[float]) -> None:
+def come_out(client: int, model: Body, index: int, others: Iterable[Body], gravity: Sequence[float]) -> None:
     """Move a free root of a Model, by its ``index``, out of the Models ``others``; its velocity is kept.
 
     It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's; ``gravity`` (3,)
@@ -55,7 +56,7 @@ def _put(client: int, body: int, place: Sequence[float], turn: Sequence[float], 
     pybullet.resetBaseVelocity(body, *twist, physicsClientId=client)
 
 
-def _deepest(client: int, model: Model, body: int, others: Iterable[Model], weight: float) -> np.ndarray | None:
+def _deepest(client: int, model: Body, body: int, others: Iterable[Body], weight: float) -> np.ndarray | None:
     """Return the way (3,) [m, world] out of what the multibody ``body`` of ``model`` is deepest in, or None."""
     depth, way = 0.0, None
     for obstacle, owner in ((obstacle, other) for other in others for obstacle in other.parts.bodies):
@@ -70,10 +71,8 @@ def _deepest(client: int, model: Model, body: int, others: Iterable[Model], weig
 
 def _allowed(weight: float, surfaces: Iterable[Surface]) -> float:
     """The depth [m] in which two surfaces may stay, of which one belongs to a model of this ``weight`` [N]."""
-    softest = min((surface.stiffness for surface in surfaces if not is_rigid(surface.stiffness)), default=None)
-    if softest is None:
-        return _ALLOWED_M
-    return min(max(weight / softest, _MIN_M), _ALLOWED_M) if softest > 0.0 else _ALLOWED_M
+    softest = min(map(stiffness_of, surfaces))
+    return min(max(weight / softest, _MIN_M), _ALLOWED_M) if 0.0 < softest < math.inf else _ALLOWED_M
 
 
 def _bits(surface: Surface) -> int:

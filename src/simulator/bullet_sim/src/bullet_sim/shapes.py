@@ -191,7 +191,7 @@ class MeshFiles:
                                  % (shapes[0].link, len(shapes), _MAX_SHAPES_OF_BODY))
         parts = []
         for shape in shapes:
-            geometry, origin, file, planes = shape.geometry, shape.origin, None, ()
+            geometry, origin, file, planes = shape.geometry, shape.origin, "", ()
             if isinstance(geometry, Mesh):
                 planes = (mesh_cuts or {}).get(shape.link, ())
                 file = self.wavefront(geometry, planes, concave)
@@ -248,7 +248,7 @@ class ShapeStore:
             columns["halfExtents"].append([side / 2.0 for side in getattr(geometry, "size", (0.0, 0.0, 0.0))])
             columns["radii"].append(getattr(geometry, "radius", 0.0))
             columns["lengths"].append(getattr(geometry, "length", 0.0))
-            columns["fileNames"].append(file or "")
+            columns["fileNames"].append(file)
             columns["meshScales"].append(list(getattr(geometry, "scale", (1.0, 1.0, 1.0))))
             columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if hollow else 0)
             columns["collisionFramePositions"].append(origin[:3, 3].tolist())

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
+    from .body import Body
     from .model import Model
     from .world import World
 
@@ -77,7 +78,7 @@ class StateWatch:
         """A model was added or removed."""
         self._sorted = False
 
-    def note_touched(self, model: Model) -> None:
+    def note_touched(self, model: Body) -> None:
         """A force or a new state was applied to ``model``."""
         if model.still_for >= _ASLEEP_STEPS:
             model.still_for = 0

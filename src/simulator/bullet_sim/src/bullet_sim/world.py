@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from urdf_model import MergedRobot
+    from urdf_model import MergedLink, MergedRobot
 
+    from .body import Body
     from .multibodies import Motion
+    from .sliding_wheels import SlidingWheels
     from .slipping_wheels import Slip
 
 # Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.
@@ -63,7 +65,7 @@ def self_colliding(merged: MergedRobot) -> list[tuple[str, str]]:
     return [pair for pair in itertools.combinations(links, 2) if frozenset(pair) not in joined]
 
 
-def _has_mesh(link: Link | None) -> bool:
+def _has_mesh(link: Link | MergedLink | None) -> bool:
     """Whether a link does not exist, or has a collision mesh."""
     return link is None or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)
 
@@ -97,23 +99,23 @@ class World:
         self.tick = 0
         #: Number of steps since the start; a reset of the time does not reset it.
         self.steps = 0
-        self.models = {}
+        self.models: dict[str, Model] = {}
         self.random = np.random.default_rng(seed)
         self._warn = warn
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._client: int = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise BulletSimError("PyBullet gave no physics client; are too many worlds open in this process?")
         #: MeshFiles, which any thread may ask.
         self.mesh_files = MeshFiles(find_mesh, MeshCache(warn=warn))
         self._shapes = ShapeStore(self._client, self.mesh_files)
-        self._weightless = []  # models of which some link has no weight
-        self._sliding = {}  # model -> its SlidingWheels
-        self._slipping = {}  # model -> its SlippingWheels
-        self._directions = {}  # model -> its WorldDirections
-        self._acting = {}  # model -> functions that act on it before each step
+        self._weightless: list[Body] = []  # models of which some link has no weight
+        self._sliding: dict[Model, list[SlidingWheels]] = {}
+        self._slipping: dict[Model, list[SlippingWheels]] = {}
+        self._directions: dict[Model, WorldDirections] = {}
+        self._acting: dict[Model, list[Callable[[], None]]] = {}  # functions that act on it before each step
         self._watch = StateWatch(self, error)
-        self._touched = []  # models that were touched since the last step, perhaps asleep
-        self._placed = []  # free models that were put somewhere since the last step
+        self._touched: list[Body] = []  # models that were touched since the last step, perhaps asleep
+        self._placed: list[Body] = []  # free models that were put somewhere since the last step
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
             numSolverIterations=self.solver_iterations,
@@ -217,7 +219,8 @@ class World:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
         for gear in merged.gears:
-            model.couple(*model.index([gear.joint, gear.other]), gear.ratio)
+            joint, other = model.index([gear.joint, gear.other]).tolist()
+            model.couple(joint, other, gear.ratio)
         if pairs and not self_collision_pairs:
             self._part_rough_pairs(model, pairs)
         if model.free:
@@ -322,17 +325,17 @@ class World:
             for wheels in groups:
                 wheels.models_changed()
 
-    def note_weightless(self, model: Model, wanted: bool) -> None:
+    def note_weightless(self, model: Body, wanted: bool) -> None:
         """For Model: whether ``model`` has links whose weight must be taken away at each step."""
         self._weightless = [other for other in self._weightless if other is not model] + [model] * wanted
 
-    def note_touched(self, model: Model) -> None:
+    def note_touched(self, model: Body) -> None:
         """For Model: something was done to ``model``, which may be asleep."""
         if model not in self._touched:
             self._touched.append(model)
         self._watch.note_touched(model)
 
-    def note_placed(self, model: Model) -> None:
+    def note_placed(self, model: Body) -> None:
         """For Model: ``model``, which is free, was put somewhere; the next step moves it out of what it overlaps."""
         if model not in self._placed:
             self._placed.append(model)
@@ -376,7 +379,7 @@ class World:
                 model.reapply_wrenches()
         self._watch.look()
 
-    def rebuild(self, models: Iterable[Model], motions: Mapping[Model, Motion] | None = None) -> None:
+    def rebuild(self, models: Collection[Model], motions: Mapping[Model, Motion] | None = None) -> None:
         """Rebuild the multibodies of ``models``.
 
         ``motions``: {model: result of ``Model.motion`` or ``Model.last_good``}. All bodies are removed before the first
@@ -452,9 +455,9 @@ class World:
 
     def close(self) -> None:
         """Disconnect the physics client. The world cannot be used afterwards."""
-        if self._client is not None:
+        if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
-            self._client = None
+            self._client = -1
             self.models = {}
 
     def _models_by_body(self) -> dict[int, Model]:

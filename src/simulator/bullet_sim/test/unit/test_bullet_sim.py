@@ -12,6 +12,7 @@ import pytest
 
 from bullet_sim import BulletSimError, Pose, World
 from bullet_sim.mass_matrix import mass_matrix_of
+from bullet_sim.quiet_pybullet import pybullet
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, pose_matrix, rigid
 
@@ -402,6 +403,14 @@ def test_mesh_is_converted_once_and_a_missing_one_gets_a_stand_in(tmp_path, monk
 def test_what_is_wrong_is_said(world, arm, act, message):
     with pytest.raises(BulletSimError, match=message):
         act(world)
+
+
+def test_a_closed_world_is_not_connected():
+    world = World()
+    world.close()
+    world.close()
+    with pytest.raises(pybullet.error, match="Not connected"):
+        world.step()
 
 
 def test_core_loads_without_ros():

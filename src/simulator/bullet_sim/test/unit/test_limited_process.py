@@ -64,7 +64,7 @@ def test_a_function_that_takes_all_memory_ends(process):
 def test_a_call_holds_neither_the_interpreter_nor_a_process_that_died(process):
     pid = process.call(os.getpid)
     os.kill(pid, 9)
-    wait_until(lambda: process._process.poll() is not None, "the process to be gone")
+    wait_until(lambda: process._worker.process.poll() is not None, "the process to be gone")
     assert process.call(os.getpid) != pid
 
 
