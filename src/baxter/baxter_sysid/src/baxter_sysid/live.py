@@ -19,7 +19,7 @@ from baxter_model.readiness import UNFOLD
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms import avoidance
 from baxter_sim_hardware.arms.guarding import guards_of
-from baxter_sim_hardware.arms.safety import Safety
+from baxter_sim_hardware.arms.safety import Distances
 from urdf_model import Robot
 
 from .arm_body import Array
@@ -75,7 +75,7 @@ class Space:
         self.chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=tip_of(side)) for side in SIDES}
         links = {side: [robot.joints[name].child for name in joint_names(side)] for side in SIDES}
         self._guards = guards_of(robot)
-        self._safety = Safety(effects.read(effects.physical_robot()), None, links, arm_radius(robot))
+        self._distances = Distances(effects.read(effects.physical_robot()), links, arm_radius(robot))
 
     def near(self, side: str, postures: dict[str, Array]) -> list[str]:
         """Names of the links that one arm is too near to; postures: {side: (7,)} of both arms."""
@@ -84,8 +84,8 @@ class Space:
                   for each, posture in postures.items()}
         still = np.zeros(len(postures[side]))
         found = avoidance.field(self._guards, *frames[side], still)
-        found = self._safety.around(found, side, [frames], still)
-        found = self._safety.between(found, side, [frames], still)
+        found = self._distances.around(found, side, [frames], still)
+        found = self._distances.between(found, side, [frames], still)
         return sorted({*found.near, *found.other, *found.body})
 
     def require_free(self, side: str, way: Array, other: Array) -> None:

@@ -27,32 +27,20 @@ class Felt(NamedTuple):
     own_effort: np.ndarray
 
 
-class Safety:
-    """numbers: {section: {number: {name: value}}} as `effects.read` has them; load: `external_load.ExternalLoad`;
-    links: {side: (7,) names of the links behind its joints}; radius: of the arms [m]. Raises HardwareError.
+class Distances:
+    """How far arms keep away from each other and from the body.
 
-    Attributes: `hold_s` [s] for which an arm stands that has collided; `collides`: {side: whether it did at the last
-    look}.
+    numbers: {section: {number: {name: value}}} as `effects.read` has them; links: {side: (7,) names of the links behind
+    its joints}; radius: of the arms [m]. Raises HardwareError.
     """
 
-    def __init__(self, numbers: Mapping[str, Mapping[str, Mapping[str, float]]], load: ExternalLoad,
-                 links: Mapping[str, Sequence[str]], radius: float) -> None:
+    def __init__(self, numbers: Mapping[str, Mapping[str, Mapping[str, float]]], links: Mapping[str, Sequence[str]],
+                 radius: float) -> None:
         rows = numbers["safety"]
-        self.load, self._links, self._blocks = load, links, blocks_of(numbers["body"])
-        self.hold_s, self._closing_s, margin, body_margin = (
-            effects.positive(rows, number, "arm") for number in ("hold", "closing_time", "margin", "body_margin"))
+        self._links, self._blocks = links, blocks_of(numbers["body"])
+        self._closing_s, margin, body_margin = (
+            effects.positive(rows, number, "arm") for number in ("closing_time", "margin", "body_margin"))
         self._apart_m, self._from_body_m = 2.0 * radius + margin, radius + body_margin
-        self.collides = dict.fromkeys(links, False)
-
-    def forget(self) -> None:
-        """The joints were put elsewhere."""
-        self.load.forget()
-        self.collides = dict.fromkeys(self._links, False)
-
-    def felt(self) -> Felt | None:
-        """The `Felt` since the last call, or None if no tick has passed."""
-        found = self.load.mean()
-        return None if found is None else Felt(self.load.position, *found)
 
     def between(self, field: avoidance.Field, side: str, frames: Sequence[Mapping[str, tuple[np.ndarray, np.ndarray]]],
                 rates: np.ndarray) -> avoidance.Field:
@@ -80,6 +68,30 @@ class Safety:
                 near.update(name for name, rest in zip(self._blocks.links, left, strict=True)
                             if rest < avoidance.FIELD_M)
         return field._replace(slowing=slowing, body=tuple(sorted(near)))
+
+
+class Safety(Distances):
+    """numbers, links, radius: as for `Distances`; load: `external_load.ExternalLoad`. Raises HardwareError.
+
+    Attributes: `hold_s` [s] for which an arm stands that has collided; `collides`: {side: whether it did at the last
+    look}.
+    """
+
+    def __init__(self, numbers: Mapping[str, Mapping[str, Mapping[str, float]]], load: ExternalLoad,
+                 links: Mapping[str, Sequence[str]], radius: float) -> None:
+        super().__init__(numbers, links, radius)
+        self.load, self.hold_s = load, effects.positive(numbers["safety"], "hold", "arm")
+        self.collides = dict.fromkeys(links, False)
+
+    def forget(self) -> None:
+        """The joints were put elsewhere."""
+        self.load.forget()
+        self.collides = dict.fromkeys(self._links, False)
+
+    def felt(self) -> Felt | None:
+        """The `Felt` since the last call, or None if no tick has passed."""
+        found = self.load.mean()
+        return None if found is None else Felt(self.load.position, *found)
 
 
 def blocks_of(rows: Mapping[str, Mapping[str, float]]) -> avoidance.Blocks:
