@@ -189,8 +189,8 @@ def start_of(sensed: Array, period_s: float, commanded: Array | None = None) -> 
     curve = np.polynomial.polynomial.polyfit(time_s[:_AHEAD_ROWS], sensed[:_AHEAD_ROWS], 2)
     moves = np.abs(curve[1]) > MOVING
     position, velocity = np.where(moves, curve[0], sensed[0]), np.where(moves, curve[1], 0.0)
-    for joint in range(sensed.shape[1] if commanded is not None else 0):
-        told = np.abs(commanded[:, joint] - commanded[0, joint]) > COUNT_RAD
+    for joint, wanted in enumerate(() if commanded is None else commanded.T):
+        told = np.abs(wanted - wanted[0]) > COUNT_RAD
         rows = slice(min(int(np.argmax(told)) if told.any() else len(told), 1 + round(_REST_S / period_s)))
         if rows.stop > _AHEAD_ROWS:
             line = np.polynomial.polynomial.polyfit(time_s[rows], sensed[rows, joint], 1)
