@@ -78,7 +78,8 @@ def _add_link(robot: ElementTree.Element, name: str, body: Link) -> None:
     link = ElementTree.SubElement(robot, "link", name=name)
     masses = [part.mass_kg for part in body.parts]
     total = sum(masses)
-    centre = sum(mass * np.array(part.place) for mass, part in zip(masses, body.parts, strict=True)) / total
+    centre = sum((mass * np.array(part.place) for mass, part in zip(masses, body.parts, strict=True)),
+                 np.zeros(3)) / total
     inertia = np.zeros((3, 3))
     for mass, part in zip(masses, body.parts, strict=True):
         off = np.array(part.place) - centre
@@ -86,7 +87,7 @@ def _add_link(robot: ElementTree.Element, name: str, body: Link) -> None:
     element = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(element, "origin", xyz=_text(centre))
     ElementTree.SubElement(element, "mass", value=repr(float(total)))
-    ElementTree.SubElement(element, "inertia", **{
+    ElementTree.SubElement(element, "inertia", {
         "i" + "xyz"[a] + "xyz"[b]: repr(float(inertia[a, b])) for a in range(3) for b in range(a, 3)})
     for number, part in enumerate(body.parts):
         for tag in ("visual", "collision"):

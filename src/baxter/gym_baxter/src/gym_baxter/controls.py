@@ -10,10 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baxter_lab import Arm, Mode
+from baxter_lab import Mode
 from baxter_sim_hardware.arms.endpoint import SINGULARITY_DAMPING
 from command_line.options import counted
 
+from .stage import StageArm
 from .twist import after
 
 #: What 1 means of joint_delta [rad], and of osc_pose [m], [rad] about an axis of `base`: as robosuite's controllers.
@@ -27,9 +28,9 @@ CONTROLS = {"joint_delta": 7, "joint_pos": 7, "osc_pose": 6}
 
 
 class ArmControl:
-    """One arm: `arm`, by `control`, one of CONTROLS. Without a gripper the last number of its actions does nothing."""
+    """One arm, `arm`, by `control`, one of CONTROLS. Without a gripper the last number of its actions does nothing."""
 
-    def __init__(self, arm: Arm, control: str, has_gripper: bool = True) -> None:
+    def __init__(self, arm: StageArm, control: str, has_gripper: bool = True) -> None:
         self._arm, self._control, self._has_gripper = arm, control, has_gripper
         self.reset()
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import gymnasium
+import gymnasium  # pyright: ignore[reportMissingImports]  (an extra)
 import numpy as np
-from gymnasium import spaces
-from gymnasium.utils import EzPickle
+from gymnasium import spaces  # pyright: ignore[reportMissingImports]
+from gymnasium.utils import EzPickle  # pyright: ignore[reportMissingImports]
 
 from .core import Choices, Core
 from .tasks import TASKS

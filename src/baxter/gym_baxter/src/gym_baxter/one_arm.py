@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
+from baxter_lab import Lab
+
 from .bodies import STEEL, WOOD, Link, Part, Slide, urdf
 from .names import places, poses
+from .stage import Stage
 from .task import TABLE_TOP_M, Task, near, posed
 
 
-class Reach(Task):
+class Reach(Task[Stage]):
     """The left hand goes to a point in the air."""
 
     NAME, STEPS = "Reach", 100
@@ -35,7 +38,7 @@ class Reach(Task):
         return self._distance() < self.WITHIN_M
 
 
-class PickPlace(Task):
+class PickPlace(Task[Stage]):
     """The left hand puts a block onto a mark on the table."""
 
     NAME, STEPS = "PickPlace", 400
@@ -72,7 +75,7 @@ class PickPlace(Task):
                     and not self.lab.robot.left.gripper.holds)
 
 
-class Drawer(Task):
+class Drawer(Task[Lab]):
     """The left hand pulls a drawer open by its handle."""
 
     NAME, STEPS = "Drawer", 300

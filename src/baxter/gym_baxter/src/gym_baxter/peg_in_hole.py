@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baxter_lab import Tool
+from baxter_lab import Lab, Tool
 from urdf_model.transforms import quaternion_from_matrix
 
 from .bodies import RED, WOOD, Link, Part, urdf
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from baxter_lab import Options
 
 
-class TwoArmPegInHole(Task):
+class TwoArmPegInHole(Task[Lab]):
     """A plate with a hole is fixed to the left hand, a peg to the right one; there are no grippers."""
 
     NAME, POSE, STEPS = "TwoArmPegInHole", None, 1000

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import Generic, TypeVar
 
 import numpy as np
 
-from baxter_lab import Lab, Options, Thing
+from baxter_lab import Options
 from baxter_model import BASE_HEIGHT_M, MIRROR_SIGNS
 
 from .names import Named
+from .stage import Stage, StageThing
 
 #: Where arms begin in robosuite's tasks, right arm, s0 s1 e0 e1 w0 w1 w2 [rad]; the left one mirrors it.
 ROBOSUITE_RIGHT = (0.403, -0.636, 0.114, 1.432, 0.735, 1.205, -0.269)
 TABLE_TOP_M = 0.8 - BASE_HEIGHT_M  # in `base`: robosuite's tables are 0.8 m high
 _TABLE_COLOUR = (0.76, 0.70, 0.60, 1.0)
+
+#: What a task needs: a `Stage`, or all of `baxter_lab.Lab`.
+LabT = TypeVar("LabT", bound=Stage)
 
 
 def robosuite_start() -> dict[str, np.ndarray]:
@@ -23,8 +28,8 @@ def robosuite_start() -> dict[str, np.ndarray]:
     return {"left": right * list(MIRROR_SIGNS.values()), "right": right}
 
 
-class Task:
-    """Base of all tasks. `lab`: the `Lab` that `build` furnishes once; `begin` starts an episode by `random`."""
+class Task(Generic[LabT]):
+    """Base of all tasks. `lab`: the lab that `build` furnishes once; `begin` starts an episode by `random`."""
 
     NAME = ""
     SENTENCE = ""  # the task in words
@@ -37,7 +42,7 @@ class Task:
         """The robot that the task needs, made of the one that was asked for."""
         return options
 
-    def __init__(self, lab: Lab) -> None:
+    def __init__(self, lab: LabT) -> None:
         self.lab = lab
         self.build()
 
@@ -67,7 +72,7 @@ class Task:
         self.lab.add_box(name, (*size, 0.05), (*place, TABLE_TOP_M - 0.025), colour=_TABLE_COLOUR)
 
 
-def posed(thing: Thing) -> list[float]:
+def posed(thing: StageThing) -> list[float]:
     """Its place [m] and quaternion x y z w."""
     pose = thing.model.base_pose()
     return [*pose.position, *pose.quaternion]

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from baxter_lab import Thing
+from baxter_lab import Lab, Thing
 from baxter_model import SIDES
 
 from .bodies import RED, STEEL, WOOD, Link, Part, urdf
@@ -16,7 +16,7 @@ from .names import places, poses
 from .task import TABLE_TOP_M, Task, posed
 
 
-class TwoArmTransport(Task):
+class TwoArmTransport(Task[Lab]):
     """Two tables: the right hand opens the bin and gives the hammer, the left one empties the other bin."""
 
     NAME, POSE, STEPS = "TwoArmTransport", None, 1000

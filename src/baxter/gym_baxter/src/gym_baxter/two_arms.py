@@ -11,10 +11,11 @@ from baxter_model import SIDES
 
 from .bodies import STEEL, Link, Part, urdf
 from .names import places, poses
+from .stage import Stage
 from .task import TABLE_TOP_M, Task, near, posed
 
 
-class TwoArmLift(Task):
+class TwoArmLift(Task[Stage]):
     """Both hands lift a pot by its handles."""
 
     NAME, POSE, STEPS = "TwoArmLift", None, 1000
@@ -86,7 +87,7 @@ class TwoArmLift(Task):
         return self._lift() > self.LIFTED_M
 
 
-class TwoArmHandover(Task):
+class TwoArmHandover(Task[Stage]):
     """The right hand takes a hammer from the table and gives it to the left one."""
 
     NAME, POSE, STEPS = "TwoArmHandover", None, 1000
