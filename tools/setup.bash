@@ -198,8 +198,10 @@ step_pip() {
     start_configuring
     # Wheels exist for all; without one, compiling takes minutes to hours. Other processors have no wheel of pybullet.
     if [[ $(uname -m) == x86_64 ]]; then wheels_only=(--only-binary :all:); fi
-    run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" -r requirements.txt
-    run "$VENV/bin/python3" -m pip install --progress-bar off "${wheels_only[@]}" --no-deps -r requirements-nodeps.txt
+    # Half of pip's time would be byte code: the step of the inner loops makes it, on the core that it leaves idle.
+    run "$VENV/bin/python3" -m pip install --no-compile --progress-bar off "${wheels_only[@]}" -r requirements.txt
+    run "$VENV/bin/python3" -m pip install --no-compile --progress-bar off "${wheels_only[@]}" --no-deps \
+        -r requirements-nodeps.txt
     link_xacro
     stamp "$key"
 }
@@ -336,6 +338,8 @@ step_kernels() {
         write "$STATE/pictures.key" "$pictures_key"
         groups+=("$PREPARE_PICTURES && mv $(printf '%q ' "$STATE"/pictures.{key,stamp})")
     fi
+    # Some packages have files that are no Python of this version.
+    groups+=("python3 -m compileall -q $(printf '%q' "$VENV")/lib/python3*/site-packages >/dev/null || true")
     # On all cores. What fails, perhaps for lack of memory, is repeated alone and told: numba does not compile again what
     # is in the cache.
     run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\0" "$@" |
