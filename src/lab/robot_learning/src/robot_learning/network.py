@@ -19,7 +19,7 @@ def _fast_product() -> Callable[..., np.ndarray] | None:
     before = os.environ.get(_THREADS)
     os.environ.setdefault(_THREADS, "1")
     try:
-        from scipy.linalg.blas import sgemm
+        from scipy.linalg.blas import sgemm  # pyright: ignore[reportAttributeAccessIssue]  (compiled)
     except ImportError:
         return None
     finally:

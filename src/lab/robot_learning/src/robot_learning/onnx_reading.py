@@ -34,7 +34,7 @@ def load(path: Path) -> OnnxPolicy:
     path = Path(path)
     if importlib.util.find_spec("onnxruntime") is None:
         raise PolicyError("%s needs onnxruntime, which is not installed: pip install onnxruntime" % path)
-    import onnxruntime
+    import onnxruntime  # pyright: ignore[reportMissingImports]  (an extra)
 
     if not path.is_file():
         raise PolicyError("there is no policy file %s" % path)

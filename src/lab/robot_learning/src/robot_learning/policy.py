@@ -172,9 +172,11 @@ class Acting(Protocol):
     @property
     def contract(self) -> Contract:
         """Its inputs and outputs."""
+        ...
 
     def chunks(self, observations: np.ndarray) -> np.ndarray:
         """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""
+        ...
 
 
 def load(path: Path) -> Acting:

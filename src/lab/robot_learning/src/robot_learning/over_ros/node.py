@@ -20,7 +20,7 @@ from gazebo_ros.gazebo_interface import GazeboInterfaceError, call
 from gym_baxter.controls import ArmControl
 from gym_baxter.core import Core
 from gym_baxter.names import action_names, robot_names
-from gym_baxter.tasks import TASKS, robosuite_start
+from gym_baxter.tasks import STAGE_TASKS, robosuite_start
 from rospy_nodes.start import limit_ports
 
 from ..driving import ACTING, FAILED, STOPPED, SUCCEEDED, WAITING, DrivingLimits, Situation, limited, reason_to_wait
@@ -54,8 +54,9 @@ class PolicyNode:
         self._policy, self._limits, self._lock_step = policy, limits, lock_step
         contract = policy.contract
         self.sides = SIDES[::-1] if contract.robosuite_order else SIDES
-        if contract.task not in TASKS:
-            raise PolicyError("the policy is for %s; there are %s" % (contract.task, ", ".join(TASKS)))
+        if contract.task not in STAGE_TASKS:
+            raise PolicyError("the policy is for %s; on a ROS master there are %s"
+                              % (contract.task, ", ".join(STAGE_TASKS)))
         if _STREAM_HZ % contract.rate_hz:
             raise PolicyError("the policy's rate, %d Hz, does not divide %d" % (contract.rate_hz, _STREAM_HZ))
         self._held, self._always = float("-inf"), lock_step and without_switch
@@ -63,7 +64,7 @@ class PolicyNode:
         self._marks = rospy.Publisher("/steering/mark", String, queue_size=10)
         self._kept = rospy.Subscriber("~hold", Bool, self._on_hold, queue_size=1)
         self.lab = RosLab(RosRobot())
-        self.task = TASKS[contract.task](self.lab)
+        self.task = STAGE_TASKS[contract.task](self.lab)
         named = (*robot_names(self.sides), *self.task.OBSERVED)
         contract.require(observation=[name for name, _ in named], units=[unit for _, unit in named],
                          action=[name for name, _ in action_names(contract.control, self.sides)])

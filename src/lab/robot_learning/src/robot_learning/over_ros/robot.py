@@ -23,7 +23,8 @@ class RosGripper:
 
     def __init__(self, side: str):
         name = "/robot/end_effector/%s_gripper/" % side
-        self._id, self._sequence, self.seen = 0, 0, None
+        self._id, self._sequence = 0, 0
+        self.seen: float | None = None
         self.position, self.holds = 0.0, False
         self._commands = rospy.Publisher(name + "command", EndEffectorCommand, queue_size=10)
         self._kept = rospy.Subscriber(name + "state", EndEffectorState, self._on_state, queue_size=1, tcp_nodelay=True)
@@ -56,7 +57,7 @@ class RosArm:
         """(4, 4) of the gripper's frame."""
         return self.chain.fk(self.angles)
 
-    def command(self, mode: int, values: Sequence[float]) -> None:
+    def command(self, mode: int, values: Sequence[float] | np.ndarray) -> None:
         """One message of joint_command for all joints."""
         self._commands.publish(JointCommand(mode=int(mode), command=[float(value) for value in values],
                                             names=self.joint_names))
@@ -103,4 +104,5 @@ class RosRobot:
     def age_s(self) -> float:
         """Age of the oldest of what is observed [s], infinite before the first."""
         seen = [self.seen, *(arm.gripper.seen for arm in self.arms.values())]
-        return float("inf") if None in seen else rospy.get_time() - min(seen)
+        known = [time_s for time_s in seen if time_s is not None]
+        return float("inf") if len(known) < len(seen) else rospy.get_time() - min(known)

@@ -24,7 +24,8 @@ _GAZEBO = "/gazebo"
 def box_urdf(name: str, size: tuple[float, ...], mass_kg: float | None, friction: float | None) -> str:
     """A box as URDF; without a mass it is fixed to the world."""
     robot = ElementTree.Element("robot", name=name)
-    link = ElementTree.SubElement(robot, "link", name="link" if mass_kg is not None else "world")
+    link_name = "link" if mass_kg is not None else "world"
+    link = ElementTree.SubElement(robot, "link", name=link_name)
     for tag in ("visual", "collision"):
         geometry = ElementTree.SubElement(ElementTree.SubElement(link, tag), "geometry")
         ElementTree.SubElement(geometry, "box", size="%r %r %r" % tuple(map(float, size)))
@@ -35,7 +36,7 @@ def box_urdf(name: str, size: tuple[float, ...], mass_kg: float | None, friction
         ElementTree.SubElement(inertial, "inertia", ixx=repr(mass_kg * (y + z) / 12), iyy=repr(mass_kg * (x + z) / 12),
                                izz=repr(mass_kg * (x + y) / 12), ixy="0", ixz="0", iyz="0")
     if friction is not None:
-        surface = ElementTree.SubElement(robot, "gazebo", reference=link.get("name"))
+        surface = ElementTree.SubElement(robot, "gazebo", reference=link_name)
         for name_of in ("mu1", "mu2"):
             ElementTree.SubElement(surface, name_of).text = repr(float(friction))
     return ElementTree.tostring(robot, encoding="unicode")
