@@ -47,6 +47,7 @@ class Student(Protocol):
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         """(action,) for an observation."""
+        ...
 
 
 def core_of(task: str, control: str = CONTROL, cameras: tuple[str, ...] = (), size: int = 84, **choices: Any) -> Core:
@@ -168,7 +169,7 @@ def replay(core: Core, episode: Episode) -> dict[str, float]:
     if episode.seed is None:
         raise DemonstrationError("the episode has no seed, so its start is not known")
     core.reset(np.random.default_rng(episode.seed))
-    off = dict.fromkeys((STATE, ENVIRONMENT), 0.0)
+    off: dict[str, float] = dict.fromkeys((STATE, ENVIRONMENT), 0.0)
     for row, action in enumerate(episode.columns[ACTION]):
         for key, value in ((STATE, core.agent_pos()), (ENVIRONMENT, core.task.observed())):
             difference = np.abs(value.astype(np.float32) - episode.columns[key][row])

@@ -7,7 +7,7 @@ disturbances, and what it does can be learned from observations. Hands are steer
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from baxter_lab import Arm
 from baxter_model import SIDES
 from gym_baxter.controls import OSC_POSITION_M, OSC_ROTATION_RAD
 from gym_baxter.core import Core
-from gym_baxter.tasks import TABLE_TOP_M
+from gym_baxter.one_arm import PickPlace, Reach
+from gym_baxter.tasks import TABLE_TOP_M, Task
+from gym_baxter.two_arms import TwoArmHandover, TwoArmLift
 
 #: The control that experts steer by.
 CONTROL = "osc_pose"
@@ -37,6 +39,9 @@ _ABOVE_M, _BESIDE_M, _SLOPE = 0.10, 0.012, 2.0
 _FREE_M = (0.01, 0.06)
 #: Direction from the meeting of two hands to the robot.
 _AWAY = np.array((-1.0, 0.0, 0.0))
+
+
+TaskT = TypeVar("TaskT", bound=Task[Any])
 
 
 class Hand(NamedTuple):
@@ -111,15 +116,17 @@ def _yaw(pose):
     return math.atan2(pose[1, 0], pose[0, 0])
 
 
-class Expert:
-    """Base of all experts. core: of the task, by CONTROL. `act` returns the action for the present state."""
+class Expert(Generic[TaskT]):
+    """Base of all experts. core: of the task KIND, by CONTROL. `act` returns the action for the present state."""
 
-    TASK = ""
+    KIND: type[TaskT]
     MOVED: tuple[str, ...] = SIDES  # arms that have something to do; the others get no action, and no disturbance
 
     def __init__(self, core: Core):
         if core.choices.control != CONTROL:
             raise ValueError("experts steer by control %r; found %r" % (CONTROL, core.choices.control))
+        if not isinstance(core.task, self.KIND):
+            raise ValueError("%s does %s; found %r" % (type(self).__name__, self.KIND.NAME, core.task.NAME))
         self.core, self.task, self.arms = core, core.task, core.lab.robot.arms
 
     def begin(self) -> None:
@@ -166,20 +173,20 @@ class Expert:
         return _STILL_NEAR if any(self.arms[side].gripper.position < _BEGUN for side in sides) else 1.0
 
 
-class ReachExpert(Expert):
+class ReachExpert(Expert[Reach]):
     """The hand goes to the point."""
 
-    TASK, MOVED = "Reach", ("left",)
+    KIND, MOVED = Reach, ("left",)
 
     def hands(self):
         """The left hand at the goal."""
         return {"left": Hand(self.task.goal, self._rest["left"][:3, :3], OPEN)}
 
 
-class PickPlaceExpert(Expert):
+class PickPlaceExpert(Expert[PickPlace]):
     """Down onto the block, and over the mark."""
 
-    TASK, MOVED = "PickPlace", ("left",)
+    KIND, MOVED = PickPlace, ("left",)
     #: It lets go of the block this high above the mark [m].
     _LOW_M = 0.015
 
@@ -203,11 +210,11 @@ class PickPlaceExpert(Expert):
         return {"left": Hand(to, rotation, CLOSED, _eased(height) / _SPEED_M)}
 
 
-class TwoArmLiftExpert(Expert):
+class TwoArmLiftExpert(Expert[TwoArmLift]):
     """Both hands come down at their handles and close together, then both go up. One that closed before the other would
     pull the pot about."""
 
-    TASK = "TwoArmLift"
+    KIND = TwoArmLift
     _HIGH_M = 0.16
 
     def hands(self):
@@ -225,7 +232,7 @@ class TwoArmLiftExpert(Expert):
                 for side, place in handles.items()}
 
 
-class TwoArmHandoverExpert(Expert):
+class TwoArmHandoverExpert(Expert[TwoArmHandover]):
     """The right hand brings the hammer in front of the robot, and the left one, which goes where its end will be, takes
     it there.
 
@@ -234,7 +241,7 @@ class TwoArmHandoverExpert(Expert):
     thick.
     """
 
-    TASK = "TwoArmHandover"
+    KIND = TwoArmHandover
     #: Along the hammer: where the right hand takes it, and the left one [m].
     _RIGHT_M, _LEFT_M = 0.05, -0.07
     #: Where the right hand holds it for the left one, and how far hands lean outwards then.
@@ -304,5 +311,5 @@ class TwoArmHandoverExpert(Expert):
         return np.column_stack([axis, np.cross(pointing, axis), pointing])
 
 
-EXPERTS: dict[str, type[Expert]] = {expert.TASK: expert for expert in (
+EXPERTS: dict[str, type[Expert[Any]]] = {expert.KIND.NAME: expert for expert in (
     ReachExpert, PickPlaceExpert, TwoArmLiftExpert, TwoArmHandoverExpert)}

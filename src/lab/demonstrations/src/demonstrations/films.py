@@ -30,7 +30,9 @@ class Film:
         self._stream.codec_context.time_base = Fraction(1, rate_hz)
 
     def add(self, pixels: np.ndarray) -> None:
-        """Append a picture (height, width, 3) uint8."""
+        """Append a picture (height, width, 3) uint8. Raises ValueError after `close`."""
+        if self._container is None:
+            raise ValueError("%s is finished; it takes no more pictures" % self.path)
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
         frame.pts, frame.time_base = self._count, self._stream.codec_context.time_base
         self._count += 1

@@ -109,7 +109,7 @@ def schema_of(folder: Path) -> tuple[Schema, dict[str, Any]]:
                                  _texts(units.get(key)))
                     for key, value in info["features"].items() if key not in INDICES}
         rate_hz, robot = info["fps"], info.get("robot_type") or ""
-        if isinstance(rate_hz, float) and rate_hz.is_integer():
+        if _is_whole(rate_hz):
             rate_hz = int(rate_hz)
         try:
             schema = Schema(rate_hz, features, robot, own.get("about", {}))
@@ -122,6 +122,10 @@ def schema_of(folder: Path) -> tuple[Schema, dict[str, Any]]:
         raise DemonstrationError("%s is not as in format %s: %s %s" % (
             folder / INFO, VERSION, type(error).__name__, error)) from error
     return schema, info
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, float) and value.is_integer()
 
 
 def is_count(value: Any) -> bool:

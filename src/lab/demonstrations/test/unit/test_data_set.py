@@ -13,7 +13,7 @@ import pytest
 from demonstrations import layout, robomimic, statistics
 from demonstrations.card import card
 from demonstrations.editing import listed
-from demonstrations.films import frames_of
+from demonstrations.films import Film, frames_of
 from demonstrations.frames import (
     ACTION,
     ENVIRONMENT,
@@ -271,6 +271,15 @@ def test_a_cut_off_film_is_named(tmp_path):
     film.write_bytes(film.read_bytes()[:film.stat().st_size // 2])
     with pytest.raises(DemonstrationError, match="no readable film"):
         list(frames_of(film))
+
+
+def test_a_finished_film_takes_no_more_pictures(tmp_path):
+    film = Film(tmp_path / "film.mp4", 10, (32, 48))
+    film.add(grey(50))
+    film.close()
+    with pytest.raises(ValueError, match="film.mp4 is finished"):
+        film.add(grey(60))
+    assert len(list(frames_of(film.path))) == 1
 
 
 RECORD = """

@@ -30,6 +30,13 @@ def test_an_expert_does_its_task_and_the_record_is_replayed_to_the_last_bit(task
     core.close()
 
 
+def test_an_expert_does_no_other_task():
+    core = core_of("Reach")
+    with pytest.raises(ValueError, match="PickPlaceExpert does PickPlace; found 'Reach'"):
+        EXPERTS["PickPlace"](core)
+    core.close()
+
+
 @pytest.mark.parametrize("seed", [100000, 100004])
 def test_hands_close_on_a_pot_together(seed):
     """One that closes first pulls the pot away from the other: these seeds failed."""

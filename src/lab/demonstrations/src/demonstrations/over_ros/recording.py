@@ -55,7 +55,8 @@ def of_bag(path: Path, heard: Mapping[str, Heard]) -> Feed:
     """The messages of a file in the order of their recording. Raises DemonstrationError."""
     try:
         with rosbag.Bag(str(path)) as bag:
-            for topic, message, _ in bag.read_messages(topics=list(heard)):
+            for entry in bag.read_messages(topics=list(heard)):
+                topic, message = entry.topic, entry.message
                 if message._type != heard[topic].kind._type:
                     raise ValueError("%s has %s, expected %s" % (topic, message._type, heard[topic].kind._type))
                 yield topic, message
