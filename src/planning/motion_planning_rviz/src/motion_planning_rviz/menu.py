@@ -2,6 +2,7 @@
 """The menu behind a right click, as data."""
 from __future__ import annotations
 
+from collections.abc import Hashable
 from typing import Any, NamedTuple
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0)
@@ -9,8 +10,8 @@ BOX_SIZES_M = (0.05, 0.1, 0.2)
 
 
 class Entry(NamedTuple):
-    """number: from 1 on; parent: number of the entry it is below, 0 at the top; command: (what, value ...), empty for
-    entries that only hold others."""
+    """number: from 1 on, the same in every menu of a panel; parent: number of the entry it is below, 0 at the top;
+    command: (what, value ...), empty for entries that only hold others."""
 
     number: int
     parent: int
@@ -34,9 +35,13 @@ class MenuState(NamedTuple):
     attached: tuple[str, ...] = ()
 
 
-def build(state: MenuState) -> list[Entry]:
-    """Return the Entries for a MenuState."""
-    menu = _Menu()
+def build(state: MenuState, numbers: dict[tuple[int, Hashable], int]) -> list[Entry]:
+    """Return the Entries for a MenuState.
+
+    numbers: {(parent, command or title): number} of all menus before, to which new entries are added: rviz answers with
+    a number alone, and a click on a menu that has changed meanwhile must mean what was read there.
+    """
+    menu = _Menu(numbers)
     for title, command in (("Plan", "plan"), ("Execute", "execute"), ("Plan and execute", "plan_and_execute"),
                            ("Stop", "stop")):
         menu.add(0, title, command)
@@ -82,12 +87,14 @@ def build(state: MenuState) -> list[Entry]:
 
 
 class _Menu:
-    def __init__(self) -> None:
+    def __init__(self, numbers: dict[tuple[int, Hashable], int]) -> None:
         self.entries: list[Entry] = []
+        self._numbers = numbers
 
-    def add(self, parent: int, title: str, *command: object) -> int:
-        self.entries.append(Entry(len(self.entries) + 1, parent, title, command))
-        return len(self.entries)
+    def add(self, parent: int, title: str, *command: Hashable) -> int:
+        number = self._numbers.setdefault((parent, command or title), len(self._numbers) + 1)
+        self.entries.append(Entry(number, parent, title, command))
+        return number
 
-    def choice(self, parent: int, title: str, chosen: bool, *command: object) -> int:
+    def choice(self, parent: int, title: str, chosen: bool, *command: Hashable) -> int:
         return self.add(parent, ("[x] " if chosen else "[  ] ") + title, *command)

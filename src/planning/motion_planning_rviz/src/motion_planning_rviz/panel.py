@@ -50,6 +50,7 @@ class Panel:
         self.trajectory = None
         self._snapshot = Snapshot({}, [], [], {})
         self._planners = {}
+        self._menu_numbers = {}
         self._path_shown = True
         self._lines = {"goal": "", "start": "", "motion": ""}
         self._busy, self._generation = "", 0
@@ -137,7 +138,7 @@ class Panel:
             planners=self._planners_of(query.group), planner=(query.pipeline, query.planner), speed=query.speed,
             avoid=query.avoid, own_start=query.start is not None, path=self._path_shown,
             objects=tuple(one.id for one in seen.objects) if seen else (),
-            attached=tuple(one.object.id for one in seen.attached) if seen else ())))
+            attached=tuple(one.object.id for one in seen.attached) if seen else ()), self._menu_numbers))
 
     def _planners_of(self, group: str) -> tuple[tuple[str, str], ...]:
         if group not in self._planners:

@@ -103,12 +103,12 @@ class View:
         self._handles.place(which, {handle.link: pose for handle, pose in poses.items()})
 
     def menu(self, entries: Iterable[Entry]) -> None:
-        """Show menu.Entries behind a right click."""
+        """Show menu.Entries behind a right click. Those of earlier menus stay known: a click may be on its way."""
+        self._entries.update({entry.number: entry.command for entry in entries})
         self._handles.set_menu(entries)
-        self._entries = {entry.number: entry.command for entry in entries}
 
     def command(self, number: int) -> tuple[Any, ...]:
-        """The command of a menu entry, empty for an unknown one."""
+        """The command of an entry of any menu so far, empty for an unknown one."""
         return self._entries.get(number, ())
 
     def _show_contacts(self) -> None:

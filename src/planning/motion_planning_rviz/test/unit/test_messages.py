@@ -106,8 +106,20 @@ def test_markers_have_the_panels_names_and_six_axes():
             np.testing.assert_allclose(np.abs(axis), np.eye(3)["xyz".index(control.name[-1])], atol=1e-12)
 
 
+@pytest.mark.parametrize("later", [menu.MenuState(objects=("box",)), menu.MenuState(attached=("can",), own_start=True),
+                                   menu.MenuState(states=("home", "up"), objects=("can", "box")), menu.MenuState()])
+def test_a_number_means_the_same_in_every_menu(later):
+    """A click on a menu that changes at that moment does what was read there."""
+    numbers = {}
+    before = {entry.number: (entry.parent, entry.command) for entry in
+              menu.build(menu.MenuState(states=("home",), attached=("box",)), numbers)}
+    after = {entry.number: (entry.parent, entry.command) for entry in menu.build(later, numbers)}
+    assert all(after[number] == before[number] for number in after.keys() & before.keys())
+    assert {("plan",), ("stop",)} <= {command for number in after.keys() & before.keys() for _, command in [after[number]]}
+
+
 def test_menu_entries_come_back_by_number():
-    entries = menu.build(menu.MenuState(states=("home",)))
+    entries = menu.build(menu.MenuState(states=("home",)), {})
     found = handles.menu_entries(entries)
     assert [entry.id for entry in found] == [entry.number for entry in entries]
     assert {entry.command_type for entry in found} == {MenuEntry.FEEDBACK}
