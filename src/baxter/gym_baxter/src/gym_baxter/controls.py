@@ -12,6 +12,7 @@ import numpy as np
 
 from baxter_lab import Mode
 from baxter_sim_hardware.arms.endpoint import SINGULARITY_DAMPING
+from baxter_sim_hardware.errors import ArmStands
 from command_line.options import counted
 
 from .stage import StageArm
@@ -49,8 +50,12 @@ class ArmControl:
             self._closes = closes
 
     def send(self, share: float, begin: np.ndarray) -> None:
-        """Send a set-point: `share` of the way from `begin` (7,) to the target."""
-        self._arm.command(Mode.RAW_POSITION, begin + share * (self.target - begin))
+        """Send a set-point: `share` of the way from `begin` (7,) to the target. An arm that stands after a collision
+        takes none, as on the robot; it goes on from where it is."""
+        try:
+            self._arm.command(Mode.RAW_POSITION, begin + share * (self.target - begin))
+        except ArmStands:
+            self.target = self._arm.angles.copy()
 
     def _wanted(self, action: np.ndarray) -> np.ndarray:
         arm = self._arm

@@ -133,6 +133,27 @@ def test_the_grippers_of_the_physical_robots_profile_move():
     core.close()
 
 
+def test_an_arm_that_has_collided_stands_and_goes_on_from_where_it_is():
+    """The environment ended with an error of the robot, in the middle of an episode."""
+    core = Core("Reach", Choices("osc_pose", options=Options(which=Which(profile="robot"), with_meshes=False)))
+    core.reset(np.random.default_rng(1))
+    core.lab.add_box("wall", (0.1, 0.6, 0.6), tuple(core.lab.robot.left.pose[:3, 3] + (0.2, 0.0, 0.0)))
+    arm, action = core.lab.robot.left, np.zeros(core.action_size)
+    action[0], actions = 0.4, 0
+    while not core.lab.robot.simulated.baxter.halted("left"):
+        core.step(action)
+        actions += 1
+        assert actions < 60
+    places = []
+    for _ in range(70):  # it stands for 2 s, pushed on
+        action[0] = -0.1 if len(places) > 50 else 0.4 if len(places) < 30 else 0.0
+        core.step(action)
+        places.append(arm.pose[0, 3])
+    assert max(places[:50]) - min(places[:50]) < 0.03
+    assert max(-np.diff(places)) < 0.02 and places[50] - places[-1] > 0.03
+    core.close()
+
+
 @pytest.mark.parametrize(("task", "choices", "named"), [
     ("Juggle", Choices(), "PickPlace"), ("Reach", Choices(control="torque"), "osc_pose"),
     ("Reach", Choices(control_freq=30), "control_freq is 30"),

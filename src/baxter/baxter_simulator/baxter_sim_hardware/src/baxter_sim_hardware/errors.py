@@ -8,3 +8,7 @@ class HardwareError(Exception):
 
 class CommandRefused(HardwareError):
     """A command is refused as a whole; no part of it was applied."""
+
+
+class ArmStands(CommandRefused):
+    """The arm has collided, and takes no commands for a while."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from .arms.actuators import Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
-from .errors import CommandRefused, HardwareError
+from .errors import ArmStands, HardwareError
 from .robot_state import RobotState
 
 if TYPE_CHECKING:
@@ -92,12 +92,12 @@ class Baxter:
             self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
     def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
-        """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled, and while the
-        limb stands after a collision."""
+        """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled, and ArmStands
+        after a collision."""
         self.state.require_enabled()
         if self.halted(side):
-            raise CommandRefused("the arm has collided and stands; it takes commands again in %.2f s"
-                                 % (self._halted_until[side] - self.measured.time_s))
+            raise ArmStands("the arm has collided and stands; it takes commands again in %.2f s"
+                            % (self._halted_until[side] - self.measured.time_s))
         return self.arms.command(side, mode, names, values)
 
     def halt(self, side: str, seconds: float) -> None:
