@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from . import layout
-from .frames import EXPERT_ACTION
+from .frames import CONDITIONS, EXPERT_ACTION
 from .reading import DataSet
 
 NAME = "README.md"
@@ -34,6 +34,8 @@ def card(data: DataSet) -> str:
         ("where", "on a robot of ROS" if about.get("control") == "positions" else
          "in the environment %s of gym_baxter, simulated" % about.get("task", "?")),
         ("actions", str(about.get("control", "?"))),
+        *((key, "; ".join("%s %s" % item for item in value.items()) if isinstance(value, dict) else str(value))
+          for key in CONDITIONS if (value := about.get(key))),
         ("episodes", "%d, of which %d are successes" % (len(episodes), sum(one.success for one in episodes))),
         ("frames", "%d at %d Hz; an episode has %d to %d, the median is %g" % (
             lengths.sum(), schema.rate_hz, lengths.min(), lengths.max(), np.median(lengths))),

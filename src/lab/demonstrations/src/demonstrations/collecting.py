@@ -12,7 +12,7 @@ from lab_batch import Job, Spec
 from lab_batch.processes import Limits, map_seeds
 
 from .card import write_card
-from .environment import core_of, expert_of, record, schema_of
+from .environment import Conditions, core_of, expert_of, record, schema_of
 from .frames import DemonstrationError, Episode
 from .writing import SetWriter
 
@@ -23,14 +23,17 @@ _EPISODE_S = 300.0
 
 
 class Demonstrate(Job):
-    """An episode of the expert of a task, for lab_batch. noise: as for `record`."""
+    """An episode of the expert of a task, for lab_batch. noise: as for `record`; profile, randomised: as for
+    `Conditions`."""
 
-    def __init__(self, task: str = "Reach", noise: float = 0.0, control_freq: int = RATE_HZ):
+    def __init__(self, task: str = "Reach", noise: float = 0.0, control_freq: int = RATE_HZ, profile: str = "sim",
+                 randomised: dict[str, float] | None = None):
         self._task, self._noise, self._rate = task, noise, control_freq
+        self._conditions = Conditions(profile, randomised or {})
 
     def start(self) -> None:
         """Make the world."""
-        self._core = core_of(self._task, control_freq=self._rate)
+        self._core = core_of(self._task, control_freq=self._rate, **self._conditions.choices)
         self._expert = expert_of(self._core)
 
     def run(self, seed: int) -> dict:
@@ -56,15 +59,18 @@ class Collected(NamedTuple):
 
 
 def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1,
-            say: Callable[[str], None] = lambda text: None, spec: Spec | None = None) -> Collected:
+            say: Callable[[str], None] = lambda text: None, spec: Spec | None = None,
+            conditions: Conditions = Conditions()) -> Collected:  # noqa: B008 (a tuple)
     """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
-    with the parameters and results of `Demonstrate`, and with the expert's own actions. Raises DemonstrationError,
-    JobError, the first where the set has no episode then."""
+    with the parameters and results of `Demonstrate`, and with the expert's own actions; it gets the conditions as well.
+    Raises DemonstrationError, JobError, the first where the set has no episode then."""
     seeds = list(seeds)
     with_expert = noise > 0.0 or spec is not None
     spec = spec or Spec("%s:%s" % (__name__, Demonstrate.__name__),
                         {"task": task, "noise": noise, "control_freq": RATE_HZ})
-    core = core_of(task, control_freq=spec.parameters["control_freq"])
+    spec = Spec(spec.name, {**spec.parameters, "profile": conditions.profile,
+                            "randomised": dict(conditions.randomised)})
+    core = core_of(task, control_freq=spec.parameters["control_freq"], **conditions.choices)
     try:
         expert_of(core)
         schema = schema_of(core, with_expert)
@@ -96,10 +102,11 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
 
 
 def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...], size: int, noise: float = 0.0,
-         say: Callable[[str], None] = lambda text: None) -> Collected:
+         say: Callable[[str], None] = lambda text: None,
+         conditions: Conditions = Conditions()) -> Collected:  # noqa: B008 (a tuple)
     """As `collect`, in this process, with pictures (size, size) of cameras of gym_baxter. Raises DemonstrationError."""
     seeds = list(seeds)
-    core = core_of(task, cameras=cameras, size=size, control_freq=RATE_HZ)
+    core = core_of(task, cameras=cameras, size=size, control_freq=RATE_HZ, **conditions.choices)
     kept = frames = 0
     try:
         expert = expert_of(core)

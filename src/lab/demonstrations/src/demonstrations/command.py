@@ -15,7 +15,7 @@ from lab_batch import JobError
 from . import robomimic
 from .card import write_card
 from .collecting import collect, film
-from .environment import core_for, replay
+from .environment import Conditions, core_for, replay
 from .experts import EXPERTS
 from .frames import DemonstrationError
 from .reading import DataSet, repair, survey
@@ -33,6 +33,10 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     one.add_argument("--first", type=number(int, 0, MAX_SEED), default=0, metavar="SEED", help="of the first episode")
     one.add_argument("--noise", type=number(float, 0.0, 1.0), default=0.0, metavar="SHARE",
                      help="disturb the actions; expert.action then has what the expert wanted (default: 0)")
+    one.add_argument("--profile", choices=("sim", "robot"), default="sim",
+                     help="of the robot: robot has the physical one's lag and noise (default: %(default)s)")
+    one.add_argument("--randomised", action="store_true",
+                     help="things have other weights and frictions in each episode")
     one.add_argument("--cameras", nargs="+", choices=CAMERAS, metavar="CAMERA",
                      help="with pictures, in one process: %s" % ", ".join(CAMERAS))
     one.add_argument("--size", type=number(int, 2, 1024), default=84, metavar="N",
@@ -55,15 +59,17 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def _record(options):
     seeds = range(options.first, options.first + options.episodes)
+    conditions = Conditions.named(options.profile, options.randomised)
 
     def say(text: str) -> None:
         print(text, file=sys.stderr)
 
     if options.cameras:
         found = film(options.task, options.folder, seeds, tuple(dict.fromkeys(options.cameras)), options.size,
-                     options.noise, say=say)
+                     options.noise, say=say, conditions=conditions)
     else:
-        found = collect(options.task, options.folder, seeds, options.noise, options.workers, say=say)
+        found = collect(options.task, options.folder, seeds, options.noise, options.workers, say=say,
+                        conditions=conditions)
     print("%s of %s are in %s; the expert failed %s" % (
         counted(found.kept, "demonstration"), options.task, options.folder, counted(found.failed, "time")))
     return 0

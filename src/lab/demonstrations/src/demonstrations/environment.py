@@ -2,12 +2,16 @@
 """Demonstrations in the environments of gym_baxter: recorded of an expert, and replayed. In lock-step, bit for bit."""
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from baxter_lab import Options, Which
 from gym_baxter.core import CAMERAS, Choices, Core
 from gym_baxter.names import action_names, robot_names
+from gym_baxter.randomised import Randomised
 from gym_baxter.tasks import TASKS
 
 from .experts import CONTROL, EXPERTS, Expert
@@ -37,6 +41,8 @@ MAX_STEPS = 300
 #: A student acts for so many actions of an episode at most; then the expert ends it.
 STUDENT_STEPS = 160
 _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
+#: How much differs with --randomised.
+RANDOMISED = {"mass": 0.5, "friction": 0.5}
 
 
 class Student(Protocol):
@@ -48,6 +54,39 @@ class Student(Protocol):
     def act(self, observation: np.ndarray) -> np.ndarray:
         """(action,) for an observation."""
         ...
+
+
+class Conditions(NamedTuple):
+    """profile: of the robot, sim or robot; randomised: what differs from episode to episode, by the names of
+    `gym_baxter.randomised.Randomised`."""
+
+    profile: str = "sim"
+    randomised: Mapping[str, float] = MappingProxyType({})
+
+    @classmethod
+    def named(cls, profile: str, randomised: bool) -> Conditions:
+        """As command lines name them."""
+        return cls(profile, RANDOMISED if randomised else {})
+
+    @classmethod
+    def of(cls, about: Mapping[str, Any]) -> Conditions:
+        """Those of a set, from its `Schema.about`."""
+        return cls(about.get("profile", cls().profile), about.get("randomised", {}))
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What `Schema.about` says of them: nothing of usual ones."""
+        return {name: value for name, value in (("profile", self.profile), ("randomised", dict(self.randomised)))
+                if value != getattr(Conditions(), name)}
+
+    @property
+    def choices(self) -> dict[str, Any]:
+        """Of `Core`."""
+        return {"options": Options(which=Which(profile=self.profile)), "randomised": Randomised(**self.randomised)}
+
+    def __str__(self) -> str:
+        return "profile %s%s" % (self.profile, ", " + ", ".join(
+            "%s %g" % item for item in self.randomised.items()) if self.randomised else "")
 
 
 def core_of(task: str, control: str = CONTROL, cameras: tuple[str, ...] = (), size: int = 84, **choices: Any) -> Core:
@@ -72,7 +111,9 @@ def schema_of(core: Core, with_expert: bool = False) -> Schema:
     if choices.obs_type != "state":
         features |= {PICTURES + camera: picture(choices.size, choices.size) for camera in choices.cameras}
     features |= {key: Feature(dtype, (1,)) for key, dtype in _ONE.items()}
-    about = {"task": task.NAME, "control": choices.control, "robosuite_order": choices.robosuite_order}
+    randomised = {name: value for name, value in choices.randomised._asdict().items() if value}
+    about = {"task": task.NAME, "control": choices.control, "robosuite_order": choices.robosuite_order,
+             **Conditions(choices.options.which.profile, randomised).about}
     return Schema(choices.control_freq, features, about=about)
 
 
@@ -160,7 +201,7 @@ def core_for(schema: Schema) -> Core:
         raise DemonstrationError("the set was not recorded in an environment of gym_baxter, but of %s"
                                  % (about.get("task") or "a task without a name"))
     return core_of(about["task"], about["control"], control_freq=schema.rate_hz,
-                   robosuite_order=bool(about.get("robosuite_order")))
+                   robosuite_order=bool(about.get("robosuite_order")), **Conditions.of(about).choices)
 
 
 def replay(core: Core, episode: Episode) -> dict[str, float]:

@@ -52,6 +52,10 @@ def picture(height: int, width: int) -> Feature:
     return Feature("video", (height, width, 3), PICTURE_NAMES)
 
 
+#: Keys of `Schema.about` that are equal in all episodes of a set, beside the task: the conditions in the environment.
+CONDITIONS = ("profile", "randomised")
+
+
 @dataclass(frozen=True)
 class Schema:
     """rate_hz: frames a second, whole; features: {key: Feature}; robot: its type; about: what else describes the set,

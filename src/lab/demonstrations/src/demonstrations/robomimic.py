@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .frames import ACTION, DONE, ENVIRONMENT, PICTURES, REWARD, STATE, DemonstrationError
+from .frames import ACTION, CONDITIONS, DONE, ENVIRONMENT, PICTURES, REWARD, STATE, DemonstrationError
 from .layout import write_whole
 from .reading import DataSet
 
@@ -35,7 +35,8 @@ def write(data: DataSet, path: Path) -> int:
 def _write(h5py, data, path):
     about = data.schema.about
     environment = {"env_name": "gym_baxter/%s-v0" % about.get("task"), "type": _GYM,
-                   "env_kwargs": {"control": about.get("control"), "control_freq": data.schema.rate_hz}}
+                   "env_kwargs": {"control": about.get("control"), "control_freq": data.schema.rate_hz},
+                   **{key: about[key] for key in CONDITIONS if key in about}}
     total = 0
     with h5py.File(path, "w") as file:
         group = file.create_group("data")

@@ -19,7 +19,7 @@ import numpy as np
 
 from . import layout
 from .films import Film
-from .frames import DemonstrationError, Episode, Feature, Schema
+from .frames import CONDITIONS, DemonstrationError, Episode, Feature, Schema
 from .needed import need
 from .statistics import NAMES, PictureStatistics, Statistics, as_lists, from_lists, joined, of_numbers
 
@@ -72,6 +72,12 @@ class SetWriter:
         if found.about.get("task") != self.schema.about.get("task"):
             raise DemonstrationError("%s is of the task %s; new episodes are of %s" % (
                 self.folder, found.about.get("task"), self.schema.about.get("task")))
+        differs = [key for key in CONDITIONS if found.about.get(key) != self.schema.about.get(key)]
+        if differs:
+            raise DemonstrationError("%s was recorded in other conditions: %s; record into another folder" % (
+                self.folder, ", ".join("%s is %s, that of new episodes is %s" % (
+                    key, found.about.get(key, "the usual one"), self.schema.about.get(key, "the usual one"))
+                    for key in differs)))
         from .reading import read_tasks, statistics_of
 
         self.episodes, self._frames = info["total_episodes"], info["total_frames"]

@@ -5,12 +5,14 @@ import pytest
 
 from baxter_lab import Options
 from baxter_lab.robot import Gripper
+from demonstrations.card import card
 from demonstrations.collecting import collect, film
-from demonstrations.environment import core_of, expert_of, record, replay, schema_of
+from demonstrations.environment import RANDOMISED, Conditions, core_for, core_of, expert_of, record, replay, schema_of
 from demonstrations.experts import EXPERTS, down, rotation_vector
 from demonstrations.frames import ACTION, EXPERT_ACTION, STATE, DemonstrationError
 from demonstrations.reading import DataSet
 from demonstrations.writing import SetWriter
+from gym_baxter.randomised import Randomised
 
 PLAIN = Options(with_meshes=False)
 
@@ -75,6 +77,27 @@ def test_a_disturbed_handover_succeeds(seed):
     """The right gripper lost its grip for a moment, opened, and the hammer fell: these seeds failed."""
     core = core_of("TwoArmHandover")
     assert record(core, expert_of(core), seed, noise=1.0).success
+    core.close()
+
+
+def test_conditions_are_recorded_and_are_those_of_a_replay(tmp_path):
+    conditions = Conditions.named("robot", True)
+    assert collect("Reach", tmp_path, [5], conditions=conditions).kept == 1
+    data = DataSet(tmp_path)
+    assert Conditions.of(data.schema.about) == conditions and "| profile | robot |" in card(data)
+    core = core_for(data.schema)
+    assert core.choices.randomised == Randomised(**RANDOMISED) and "lag" in core.lab.robot.simulated.chosen
+    assert replay(core, data.episode(0)) == {STATE: 0.0, "observation.environment_state": 0.0}
+    core.close()
+    with pytest.raises(DemonstrationError, match="profile is robot, that of new episodes is the usual one"):
+        collect("Reach", tmp_path, [6])
+    assert len(DataSet(tmp_path)) == 1
+
+
+def test_usual_conditions_are_those_of_sets_that_name_none():
+    core = core_of("Reach", **Conditions().choices)
+    assert schema_of(core).about.keys() == {"task", "control", "robosuite_order"}
+    assert Conditions.of({}) == Conditions() == Conditions.named("sim", False)
     core.close()
 
 

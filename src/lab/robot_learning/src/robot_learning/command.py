@@ -15,11 +15,11 @@ import numpy as np
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
 from demonstrations.collecting import Collected, collect
+from demonstrations.environment import Conditions
 from demonstrations.experts import EXPERTS
 from demonstrations.frames import DemonstrationError
 from demonstrations.layout import INFO, write_json
 from demonstrations.reading import DataSet
-from gym_baxter.randomised import Randomised
 from lab_batch import JobError
 
 from . import onnx_writing
@@ -33,8 +33,6 @@ from .training import Curve, TrainingSettings, train
 FIRST_DEMONSTRATION, FIRST_CORRECTION, MAX_CORRECTIONS = 100_000, 10_000_000, 100_000
 DEMONSTRATIONS, ROUNDS, CORRECTIONS, EPISODES, NOISE = 100, 0, 50, 100, 1.0
 POLICY, CURVE, FILM, SCORE, SET = "policy.npz", "curve.png", "episodes.mp4", "score.json", "demonstrations"
-#: How much differs with --randomised.
-RANDOMISED = Randomised(mass=0.5, friction=0.5)
 #: Hidden seeds of the judge lie between these; a policy passes with this share of its episodes.
 HIDDEN, PASSING = (1_000_000_000, 2_000_000_000), 0.8
 #: The policy that is corrected.
@@ -53,7 +51,9 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--judge", type=Path, metavar="POLICY",
                         help="the exercise: measure this policy file, of TASK where that is given, by seeds that "
                              "nobody knows beforehand; %d %%%% must succeed" % round(100 * PASSING))
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="of the results (default: .baxter/learned/TASK)")
+    parser.add_argument("--out", type=Path, metavar="FOLDER",
+                        help="of the results (default: .baxter/learned/TASK; TASK-robot, TASK-randomised for what is "
+                             "learned with --profile robot, --randomised)")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
     parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
                         help="of the expert (default %(default)s)")
@@ -72,10 +72,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count() or 1, metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
-                        help="of the robot in the evaluation: robot has the physical one's lag and noise "
-                             "(default: %(default)s)")
+                        help="of the robot, in the demonstrations that this run makes and in the evaluation: robot has "
+                             "the physical one's lag and noise (default: %(default)s)")
     parser.add_argument("--randomised", action="store_true",
-                        help="in the evaluation, things have other weights and frictions in each episode")
+                        help="in these demonstrations and in the evaluation, things have other weights and frictions "
+                             "in each episode")
     parser.add_argument("--no-film", action="store_true", help="do not film good and bad episodes")
     options = parser.parse_args(argv)
     if options.judge and (options.evaluate or not options.episodes):
@@ -108,11 +109,19 @@ def _tried(source: Path, first: int, end: int) -> int:
     return max((seed + 1 - first for seed in seeds if seed is not None and first <= seed < end), default=0)
 
 
+def _conditions(options: argparse.Namespace) -> Conditions:
+    return Conditions.named(options.profile, options.randomised)
+
+
 def _demonstrate(options: argparse.Namespace, source: Path) -> None:
+    if (source / INFO).exists() and (found := Conditions.of(DataSet(source).schema.about)) != _conditions(options):
+        raise DemonstrationError("%s has demonstrations with %s, not with %s; choose another --out" % (
+            source, found, _conditions(options)))
     have = _tried(source, FIRST_DEMONSTRATION, FIRST_CORRECTION)
     if have < options.demonstrations:
         seeds = range(FIRST_DEMONSTRATION + have, FIRST_DEMONSTRATION + options.demonstrations)
-        _told(collect(options.task, source, seeds, NOISE, options.workers, say=_say), "demonstrations", options.task)
+        _told(collect(options.task, source, seeds, NOISE, options.workers, _say, conditions=_conditions(options)),
+              "demonstrations", options.task)
 
 
 def _told(found: Collected, what: str, task: str) -> None:
@@ -125,7 +134,7 @@ def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) ->
     data = DataSet(source)
     settings = TrainingSettings(chunk=options.chunk, steps=steps, seed=options.seed)
     made = {"date": datetime.date.today().isoformat(), "demonstrations": len(data), "steps": settings.steps,
-            "seed": settings.seed, "versions": _versions()}
+            "seed": settings.seed, "conditions": str(Conditions.of(data.schema.about)), "versions": _versions()}
     policy, curve = train(data, settings, made, lambda step, training, validation: _say(
         "step %d of %d: loss %.4f, %.4f of episodes that only judge" % (step, settings.steps, training, validation)))
     _say("%d steps in %.0f s: loss %.4f, %.4f of episodes that only judge" % (
@@ -146,7 +155,8 @@ def learn(options: argparse.Namespace, folder: Path) -> Path:
             if not _tried(source, first, first + MAX_CORRECTIONS):
                 _train(options, source, folder / STUDENT, max(options.steps // 2, 1))
                 seeds = range(first, first + options.corrections)
-                _told(correct(folder / STUDENT, source, seeds, options.workers, _say), "corrections", options.task)
+                _told(correct(folder / STUDENT, source, seeds, options.workers, _say, _conditions(options)),
+                      "corrections", options.task)
     curve, task = _train(options, source, path, options.steps), load(path).contract.task
     draw_curve(curve, "%s: %d demonstrations" % (task, len(DataSet(source))), folder / CURVE)
     print("policy in %s, learning curve in %s" % (path, folder / CURVE))
@@ -159,7 +169,7 @@ def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
     first = low + secrets.randbelow(high - low) if options.judge else 0
     score = evaluate(path, range(first, first + options.episodes), options.workers, lambda done, good: _say(
         "%d of %d episodes, %d succeeded" % (done, options.episodes, good)), profile=options.profile,
-        randomised=RANDOMISED._asdict() if options.randomised else {})
+        randomised=dict(_conditions(options).randomised))
     _say("", sys.stderr.isatty())
     print("%s: %s" % (load(path).contract.task, score))
     for seed, error in score.errors.items():
@@ -180,6 +190,8 @@ def run(options: argparse.Namespace) -> int:
     """The exit status. Raises DemonstrationError, PolicyError, JobError, OSError."""
     root = Path(os.environ.get("LAB_ROOT", Path.cwd()))
     name = options.task or (load(options.evaluate).contract.task if options.evaluate else "")
+    if options.evaluate is None:
+        name += "-robot" * (options.profile == "robot") + "-randomised" * options.randomised
     folder = options.out or root / ".baxter" / "learned" / name
     folder.mkdir(parents=True, exist_ok=True)
     path = options.evaluate or learn(options, folder)

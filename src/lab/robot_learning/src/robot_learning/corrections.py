@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from demonstrations.collecting import RATE_HZ, Collected, Demonstrate, collect
-from demonstrations.environment import record
+from demonstrations.environment import Conditions, record
 from demonstrations.frames import Episode
 from lab_batch import Spec
 
@@ -15,10 +15,12 @@ from .policy import Runner, load
 
 
 class Correct(Demonstrate):
-    """An episode that a policy begins and the expert ends, for lab_batch. policy: its file."""
+    """An episode that a policy begins and the expert ends, for lab_batch. policy: its file; the others: of
+    `Demonstrate`."""
 
-    def __init__(self, task: str = "Reach", policy: str = "policy.npz", control_freq: int = RATE_HZ):
-        super().__init__(task, control_freq=control_freq)
+    def __init__(self, task: str = "Reach", policy: str = "policy.npz", control_freq: int = RATE_HZ,
+                 profile: str = "sim", randomised: dict[str, float] | None = None):
+        super().__init__(task, control_freq=control_freq, profile=profile, randomised=randomised)
         self._path = policy
 
     def start(self) -> None:
@@ -31,10 +33,11 @@ class Correct(Demonstrate):
 
 
 def correct(path: Path, folder: Path, seeds: Iterable[int], workers: int = 1,
-            say: Callable[[str], None] = lambda text: None) -> Collected:
+            say: Callable[[str], None] = lambda text: None,
+            conditions: Conditions = Conditions()) -> Collected:  # noqa: B008 (a tuple)
     """Append corrected episodes of all seeds to a set that has the expert's own actions. path: of the policy. Raises
     PolicyError, DemonstrationError, JobError."""
     contract = load(path).contract
     spec = Spec("%s:%s" % (__name__, Correct.__name__), {
         "task": contract.task, "policy": str(Path(path).resolve()), "control_freq": contract.rate_hz})
-    return collect(contract.task, folder, seeds, workers=workers, say=say, spec=spec)
+    return collect(contract.task, folder, seeds, workers=workers, say=say, spec=spec, conditions=conditions)

@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from baxter_lab import Options, Which
-from demonstrations.environment import core_of
+from demonstrations.environment import Conditions, core_of
 from gym_baxter.core import Core
 from gym_baxter.names import action_names, robot_names
-from gym_baxter.randomised import Randomised
 from lab_batch import Job, Spec
 from lab_batch.processes import Limits, map_seeds
 
@@ -66,12 +64,12 @@ def play(core: Core, policy: Acting, seed: int, each: Callable[[Core], None] = l
 
 
 class Evaluate(Job):
-    """An episode of a policy, for lab_batch. policy: its file; profile: of the robot, sim or robot; randomised: numbers
-    of `gym_baxter.randomised.Randomised` by name."""
+    """An episode of a policy, for lab_batch. policy: its file; profile, randomised: as for
+    `demonstrations.environment.Conditions`."""
 
     def __init__(self, policy: str = "policy.npz", profile: str = "sim", randomised: dict[str, float] | None = None):
         self._path = policy
-        self._choices = {"options": Options(which=Which(profile=profile)), "randomised": Randomised(**randomised or {})}
+        self._choices = Conditions(profile, randomised or {}).choices
 
     def start(self) -> None:
         """Read the policy and make its world."""

@@ -3,13 +3,15 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from baxter_lab import Options
 from demonstrations.collecting import Collected
-from demonstrations.environment import STUDENT_STEPS, core_of, expert_of, record
-from demonstrations.frames import ACTION, EXPERT_ACTION, Episode, Schema, numbers
+from demonstrations.environment import STUDENT_STEPS, Conditions, core_of, expert_of, record
+from demonstrations.frames import ACTION, EXPERT_ACTION, DemonstrationError, Episode, Schema, numbers
 from demonstrations.writing import SetWriter
 from robot_learning import command
+from robot_learning.evaluation import Score
 
 
 class Idle:
@@ -49,11 +51,13 @@ def test_what_an_earlier_run_did_is_not_done_again(tmp_path, monkeypatch):
                 writer.add(Episode("Reach.", {ACTION: np.zeros((2, 1), np.float32)}, True, seed))
         return Collected(len(seeds) - 1, 1, 2)
 
-    def collected(task, folder, seeds, *_, **__):
+    def collected(task, folder, seeds, *_, conditions, **__):
         done.append(("demonstrations", len(seeds)))
+        assert conditions == Conditions()
         return add(folder, seeds)
 
-    def corrected(path, folder, seeds, *_):
+    def corrected(path, folder, seeds, workers, say, conditions):
+        assert conditions == Conditions()
         done.append(("corrections", len(seeds)))
         return add(folder, seeds)
 
@@ -69,3 +73,32 @@ def test_what_an_earlier_run_did_is_not_done_again(tmp_path, monkeypatch):
     options.rounds = 2
     command.learn(options, tmp_path)
     assert done == [("demonstrations", 1), ("training", 5), ("corrections", 3), ("training", 10)]
+    options.profile = "robot"
+    with pytest.raises(DemonstrationError, match="with profile sim, not with profile robot; choose another --out"):
+        command.learn(options, tmp_path)
+
+
+def test_what_is_measured_is_what_was_shown(tmp_path, monkeypatch):
+    """Demonstrations, corrections and evaluation have the command line's conditions, and a folder of their own."""
+    seen = []
+
+    def collected(task, folder, seeds, *_, conditions, **__):
+        seen.append(conditions)
+        return Collected(1, 0, 1)
+
+    monkeypatch.setattr(command, "collect", collected)
+    monkeypatch.setattr(command, "correct", lambda *arguments: seen.append(arguments[-1]) or Collected(1, 0, 1))
+    monkeypatch.setattr(command, "_train", lambda *_: None)
+    monkeypatch.setattr(command, "DataSet", lambda path: [])
+    monkeypatch.setattr(command, "load", lambda path: SimpleNamespace(contract=SimpleNamespace(task="Reach")))
+    monkeypatch.setattr(command, "draw_curve", lambda *_: None)
+
+    def evaluated(path, seeds, workers, progress, profile, randomised):
+        seen.append(Conditions(profile, randomised))
+        return Score({0: {"success": True, "steps": 1}}, {})
+
+    monkeypatch.setattr(command, "evaluate", evaluated)
+    monkeypatch.setenv("LAB_ROOT", str(tmp_path))
+    assert command.main(["Reach", "--profile", "robot", "--randomised", "--rounds", "1", "--no-film"]) == 0
+    assert seen == 3 * [Conditions("robot", {"mass": 0.5, "friction": 0.5})]
+    assert (tmp_path / ".baxter/learned/Reach-robot-randomised" / command.SCORE).is_file()
