@@ -36,8 +36,6 @@ from .frames import (
 #: is left in the next; for so many actions they come or stay away; how much of the rest they come or go in one action,
 #: for drives do not follow what comes at once.
 _NOISE, _TURN_NOISE, _LASTING, _STRETCH, _COMING = 0.08, 0.02, 0.9, 10, 0.3
-#: Experts need much less; more is a try that failed.
-MAX_STEPS = 300
 #: A student acts for so many actions of an episode at most; then the expert ends it.
 STUDENT_STEPS = 160
 _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
@@ -158,10 +156,10 @@ def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any 
     expert.begin()
     if student is not None:
         student.begin()
-    disturbance = Disturbance(core, expert.MOVED, seed, noise)
+    disturbance = Disturbance(core, expert.MOVED, seed, noise * expert.pace.noise)
     rows: dict[str, list] = {}
     stepped = None
-    for count in range(min(core.steps, MAX_STEPS)):
+    for count in range(min(core.steps, expert.pace.steps)):
         wanted = np.clip(expert.act(), -1.0, 1.0)
         frame = observed(core)
         if student is not None and count < STUDENT_STEPS:

@@ -23,13 +23,9 @@ from gym_baxter.two_arms import TwoArmHandover, TwoArmLift
 CONTROL = "osc_pose"
 OPEN, CLOSED = -1.0, 1.0
 _STAYS = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, OPEN))
-#: Share of the remaining way of one action; drives follow with some lag, and more overshoots.
-_GAIN = 0.25
-#: Most of one action [m], [rad].
-_SPEED_M, _SPEED_RAD = 0.016, 0.06
-#: So far from where it begins, a hand has the full speed [m]; there it has the least [m]. Without this its shoulder,
-#: which gains 0.5 rad/s in an action, would fall behind and then overshoot, and what is observed does not say which.
-_EASY_M, _MIN_M = 0.06, 0.004
+#: So far from where it begins, a hand has the full speed [m]; there it has the least. Without this its shoulder, which
+#: gains 0.5 rad/s in an action, would fall behind and then overshoot, and what is observed does not say which.
+_EASY_M = 0.06
 #: A hand is at its place when it is so near [m], [rad]; fingers that have begun to close go on in so many times that,
 #: and have begun when they are not as far open as this [%].
 _NEAR_M, _NEAR_RAD, _STILL_NEAR, _BEGUN = 0.008, 0.06, 2.5, 90.0
@@ -42,6 +38,31 @@ _AWAY = np.array((-1.0, 0.0, 0.0))
 
 
 TaskT = TypeVar("TaskT", bound=Task[Any])
+
+
+class Pace(NamedTuple):
+    """gain: share of the remaining way of one action; drives follow with some lag, and more overshoots; speed_m,
+    speed_rad: most of one action [m], [rad]; least_m: the same where a hand begins [m]; steps: actions that are enough,
+    a try with more has failed; noise: share of the disturbance for learning that is corrected as far as the whole one
+    is with ideal drives."""
+
+    gain: float
+    speed_m: float
+    speed_rad: float
+    least_m: float
+    steps: int
+    noise: float
+
+    def eased(self, way: float) -> float:
+        """Most of one action [m] of a hand that is `way` [m] from where it began."""
+        return min(self.least_m + (self.speed_m - self.least_m) * max(way, 0.0) / _EASY_M, self.speed_m)
+
+
+#: With ideal drives.
+_PACE = Pace(0.25, 0.016, 0.06, 0.004, 300, 1.0)
+#: With the effect `lag`, shoulders are 0.2 s behind. At the gain above they swing, and a hand that comes down at that
+#: speed goes 6 cm on: it hits things, and the robot's collision detection stops the arm.
+_GENTLE = Pace(0.1, 0.008, 0.03, 0.002, 400, 0.4)
 
 
 class Hand(NamedTuple):
@@ -91,11 +112,6 @@ def _risen(height):
     return _share(height, *_FREE_M)
 
 
-def _eased(way):
-    """Most of one action [m] of a hand that is `way` [m] from where it began."""
-    return min(_MIN_M + (_SPEED_M - _MIN_M) * max(way, 0.0) / _EASY_M, _SPEED_M)
-
-
 def _share(value: float, low: float, high: float) -> float:
     """How far a value is from the first to the second of two others, 0 to 1; they may fall."""
     return min(max((value - low) / (high - low), 0.0), 1.0)
@@ -117,7 +133,8 @@ def _yaw(pose):
 
 
 class Expert(Generic[TaskT]):
-    """Base of all experts. core: of the task KIND, by CONTROL. `act` returns the action for the present state."""
+    """Base of all experts. core: of the task KIND, by CONTROL. `act` returns the action for the present state.
+    Attribute `pace`: how fast it moves."""
 
     KIND: type[TaskT]
     MOVED: tuple[str, ...] = SIDES  # arms that have something to do; the others get no action, and no disturbance
@@ -128,6 +145,7 @@ class Expert(Generic[TaskT]):
         if not isinstance(core.task, self.KIND):
             raise ValueError("%s does %s; found %r" % (type(self).__name__, self.KIND.NAME, core.task.NAME))
         self.core, self.task, self.arms = core, core.task, core.lab.robot.arms
+        self.pace = _GENTLE if "lag" in core.lab.robot.simulated.chosen else _PACE
 
     def begin(self) -> None:
         """An episode begins; `act` follows."""
@@ -145,9 +163,10 @@ class Expert(Generic[TaskT]):
 
     def _action(self, arm: Arm, hand: Hand):
         pose = arm.pose
-        most = _eased(float(np.linalg.norm(pose[:3, 3] - self._rest[arm.side][:3, 3])))
-        shift = _clipped(_GAIN * (hand.place - pose[:3, 3]), hand.speed * most)
-        turn = _clipped(_GAIN * rotation_vector(hand.rotation @ pose[:3, :3].T), hand.speed * _SPEED_RAD)
+        most = self.pace.eased(float(np.linalg.norm(pose[:3, 3] - self._rest[arm.side][:3, 3])))
+        gain = self.pace.gain
+        shift = _clipped(gain * (hand.place - pose[:3, 3]), hand.speed * most)
+        turn = _clipped(gain * rotation_vector(hand.rotation @ pose[:3, :3].T), hand.speed * self.pace.speed_rad)
         return np.array([*(shift / OSC_POSITION_M), *(turn / OSC_ROTATION_RAD), hand.grip])
 
     def _is_at(self, side, place, rotation, times=1.0):
@@ -207,7 +226,7 @@ class PickPlaceExpert(Expert[PickPlace]):
         to = hand + (goal - place) + (0.0, 0.0, wanted)
         if height < wanted:  # first up
             to[:2] = hand[:2] + _risen(height) * (to[:2] - hand[:2])
-        return {"left": Hand(to, rotation, CLOSED, _eased(height) / _SPEED_M)}
+        return {"left": Hand(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
 
 
 class TwoArmLiftExpert(Expert[TwoArmLift]):
@@ -270,7 +289,7 @@ class TwoArmHandoverExpert(Expert[TwoArmHandover]):
         right, risen = self.arms["right"].pose, _share(height, 0.02, self.task.LIFTED_M)
         rotation = self._leaning("right", _between(axis, _AWAY, risen), risen)
         to = right[:3, 3] + risen * (self._MEETING - right[:3, 3]) + (1.0 - risen) * np.array((0.0, 0.0, 0.1))
-        found = {"right": Hand(to, rotation, CLOSED, _eased(height) / _SPEED_M)}
+        found = {"right": Hand(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
         # Where the left hand will take it, and, as the right one arrives, where that is now.
         off = float(np.linalg.norm(self._MEETING - right[:3, 3])) + 0.1 * float(np.linalg.norm(
             rotation_vector(self._leaning("right", _AWAY) @ right[:3, :3].T)))

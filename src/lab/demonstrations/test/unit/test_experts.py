@@ -80,6 +80,14 @@ def test_a_disturbed_handover_succeeds(seed):
     core.close()
 
 
+def test_an_expert_is_gentle_with_arms_that_lag():
+    """At the speed for ideal drives the hand swung into the block, and the robot stopped the arm."""
+    core = core_of("PickPlace", **Conditions("robot").choices)
+    episode = record(core, expert_of(core), 0)
+    assert episode.success and not core.lab.robot.simulated.baxter.halted("left") and len(episode) < 300
+    core.close()
+
+
 def test_conditions_are_recorded_and_are_those_of_a_replay(tmp_path):
     conditions = Conditions.named("robot", True)
     assert collect("Reach", tmp_path, [5], conditions=conditions).kept == 1
