@@ -95,14 +95,15 @@ def described(urdf_xml: str, serial: int, rows: Mapping[str, Mapping[str, float]
         return urdf_xml
     root = _parsed(urdf_xml)
     for joint in root.findall("joint"):
-        kind = PLACED.get(joint.get("name"))
+        name = joint.get("name", "")
+        kind = PLACED.get(name)
         if kind is None:
             continue
         origin = joint.find("origin")
         if origin is None:
             origin = ElementTree.SubElement(joint, "origin")
         for attribute, number in (("xyz", "position"), ("rpy", "orientation")):
-            moved = difference(serial, joint.get("name"), rows, "%s_%s" % (kind, number))
+            moved = difference(serial, name, rows, "%s_%s" % (kind, number))
             values = [float(word) for word in origin.get(attribute, "0 0 0").split()]
             origin.set(attribute, " ".join("%.7g" % (value + moved[axis])
                                            for value, axis in zip(values, _AXES, strict=True)))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,8 @@ from .topics.status import StatusTopics
 from .warnings import Warnings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
 
     from gazebo_ros.model_plugin import PluginContext
@@ -124,26 +127,31 @@ class BaxterPlugin(ModelPlugin):
                 rate, 1.0 / self._dt))
         if "states" in self._simulated.chosen:
             rate = max(rate, effects.positive(self._simulated.numbers["states"], "least_rate", "joint_states"))
-        self._handling = Handling(self._warnings, None if self._delay is None else self._delay_of)
+        delay_of = None if self._delay is None else self._delays(self._delay)
+        self._handling = Handling(self._warnings, delay_of)
         self._publishing = Publishing(self._simulated.snapshot, context.survived, lambda: context.world.time_s)
-        if self._delay is not None:
-            self._publishing.delay((interface.JOINT_STATE_RATE,), lambda: self._delay_of(0))
+        if delay_of is not None:
+            self._publishing.delay((interface.JOINT_STATE_RATE,), partial(delay_of, 0))
         for row in sorted(interface.TOPICS, key=lambda row: row.key == "started"):
             message = roslib.message.get_message_class(row.type)
+            if message is None:
+                raise PluginError("there is no message %s: its package is missing, or not built" % row.type)
             function = MethodType(row.function, owners[row.key])
             for component, name in row.names():
-                if row.rate == interface.LATCHED:
-                    function(context.publisher(name, message, latch=True))
-                elif row.is_published:
-                    hz = rate if row.rate == interface.JOINT_STATE_RATE else row.rate
-                    self._publishing.add(row.rate, hz, function, component, context.publisher(name, message))
-                else:
+                if row.rate is None:
                     subscription = context.subscription(name, message, QUEUE_DEPTH)
                     self._handling.add(subscription, order.index(row.key), row.key, component, function,
                                        row.key in interface.DELAYED)
+                elif row.rate == interface.LATCHED:
+                    function(context.publisher(name, message, latch=True))
+                else:
+                    hz = rate if row.rate == interface.JOINT_STATE_RATE else row.rate
+                    self._publishing.add(row.rate, hz, function, component, context.publisher(name, message))
 
-    def _delay_of(self, stream: int) -> float:
-        return self._delay.of(stream, self.context.world.tick)
+    def _delays(self, delay: MessageDelay) -> Callable[[int], float]:
+        """The function (number of a stream) -> how long what comes now is on its way [s]."""
+        world = self.context.world
+        return lambda stream: delay.of(stream, world.tick)
 
     def _set_joint_state_rate(self, hz: float) -> None:
         self._publishing.set_rate(interface.JOINT_STATE_RATE, hz)

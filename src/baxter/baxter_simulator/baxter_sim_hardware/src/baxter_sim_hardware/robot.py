@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .arms.actuators import Wanted
+from .arms.actuators import Actuators, Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .errors import ArmStands, HardwareError
 from .robot_state import RobotState
@@ -33,7 +33,7 @@ class Behaviour(NamedTuple):
 
     profile: str = "sim"
     disabled: str = "hold"
-    actuators: object = None
+    actuators: Actuators | None = None
 
 
 class Baxter:
@@ -124,9 +124,9 @@ class Baxter:
                 self.actuators.forget()
             return self.arms.sink()
         drives = self.arms.update()
-        return drives if self.actuators is None else self._through_actuators(drives)
+        return drives if self.actuators is None else self._through(self.actuators, drives)
 
-    def _through_actuators(self, drives: Drives) -> Drives:
+    def _through(self, actuators: Actuators, drives: Drives) -> Drives:
         arms, measured, index = self.arms, self.measured, drives.position_driven
         driven, effort = np.zeros(len(measured.position), dtype=bool), np.zeros(len(measured.position))
         driven[index], effort[index] = True, drives.effort
@@ -136,10 +136,10 @@ class Baxter:
             self._links[2] = np.diagonal(measured.dynamics(measured.velocity)[0])
         self._inertia_due = (self._inertia_due + 1) % INERTIA_TICKS
         self._links[0], self._links[1] = measured.position, measured.velocity
-        torques = self.actuators.torques(wanted, self._links, self._dt)
+        torques = actuators.torques(wanted, self._links, self._dt)
         drives = drives._replace(position_driven=index[:0], effort_driven=index, exerted=torques[index])
         pushed = drives.velocity_driven
         if not len(pushed):
             return drives
-        push = self.actuators.bounded(np.copysign(drives.push_effort, drives.push_velocity), measured.position, pushed)
+        push = actuators.bounded(np.copysign(drives.push_effort, drives.push_velocity), measured.position, pushed)
         return drives._replace(push_velocity=np.copysign(drives.push_velocity, push), push_effort=np.abs(push))

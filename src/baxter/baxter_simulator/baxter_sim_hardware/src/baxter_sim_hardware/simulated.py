@@ -69,7 +69,7 @@ class SimulatedBaxter:
     calls `update`, then steps the world. Attributes: `baxter`, a `robot.Baxter`; `head`, a `head.PanDrive`; `hands`:
     {side: one of `grippers.hands`}; `guarding`, an `arms.guarding.Guarding`; `chains`: {side: Chain}; `limb_index`:
     {side: (7,) numbers of its joints in the model}; `arm_index`: (14,) of both; `chosen`: the set of effects,
-    `numbers`: what `effects.read` returns for them; `seed`: of their chance, or None; `hand_sensors`: of the effect
+    `numbers`: what `effects.read` returns for them; `seed`: of their chance, 0 without; `hand_sensors`: of the effect
     `noise`, or None; `before`: (position, velocity, effort) of all joints at the last `measure`, None where there was
     none since they were put where they are.
     """
@@ -87,7 +87,7 @@ class SimulatedBaxter:
         usual = effects.ALL if which.profile == "robot" else effects.NONE
         chosen = self.chosen = effects.chosen(usual if which.effects is None else which.effects)
         rows = self.numbers = effects.read(individual.numbers_of(which.serial)) if chosen else {}
-        self.seed = int(world.random.integers(2**32)) if chosen & {"noise", "delay"} else None
+        self.seed = int(world.random.integers(2**32)) if chosen & {"noise", "delay"} else 0
         serial = individual.checked(which.serial)
         self._sensors = JointSensors(rows["noise"], names, self.seed, serial) if "noise" in chosen else None
         self.hand_sensors = HandSensors(rows, serial, self.seed) if "noise" in chosen else None
@@ -103,9 +103,9 @@ class SimulatedBaxter:
         self.guarding = Guarding(world, model, self.baxter, self.chains, guards_of(robot), self.feel, is_squeezed)
         if "safety" in chosen:
             self._make_safe()
-        self.before = None
+        self.before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         # The joints that were driven to a position last, as the arms and as the model number them.
-        self._driven = self._driven_index = None
+        self._driven = self._driven_index = np.empty(0, np.int64)
         if before is not None:
             self.measure_now()
             self.baxter.take_over()
@@ -137,19 +137,21 @@ class SimulatedBaxter:
 
     def measure(self, time_s: float, missing_s: float | None) -> None:
         """Begin a tick at time_s [s]; missing_s: as in `Measured`."""
-        self.before = self.model.read_joints()
+        joints = self.before = self.model.read_joints()
         measured = self.baxter.measured
-        measured.time_s, measured.position, measured.velocity = time_s, self._felt(), self.before[1][self.arm_index]
+        measured.time_s, measured.position, measured.velocity = time_s, self._felt(), joints[1][self.arm_index]
         measured.missing_s = missing_s
 
     def update(self) -> None:
         """After all commands: the drives of this tick."""
-        baxter, model, arm = self.baxter, self.model, self.arm_index
+        baxter, model, arm, joints = self.baxter, self.model, self.arm_index, self.before
+        if joints is None:
+            raise RuntimeError("the joints have not been measured since they were put elsewhere: call measure() first")
         measured = baxter.measured
-        self.guarding.update(measured.time_s, baxter.state.enabled, self.before)
+        self.guarding.update(measured.time_s, baxter.state.enabled, joints)
         if baxter.moves_by_gravity:
-            efforts = model.gravity_efforts(self.before[0])
-            self._as_known(efforts, self.before[0])
+            efforts = model.gravity_efforts(joints[0])
+            self._as_known(efforts, joints[0])
             measured.gravity = efforts[arm]
         drives = baxter.update()
         if len(drives.position_driven):
@@ -165,7 +167,7 @@ class SimulatedBaxter:
             model.drive_effort(arm[drives.effort_driven], drives.exerted)
         self.head.update()
         for hand in self.hands.values():
-            hand.update(self.before)
+            hand.update(joints)
 
     # -- between two ticks
 
@@ -205,8 +207,7 @@ class SimulatedBaxter:
         """Send head and fingers where they were sent last: after a return to an earlier state of the world."""
         self.head.drive_again()
         for hand in self.hands.values():
-            if hasattr(hand, "drive_again"):
-                hand.drive_again()
+            hand.drive_again()
 
     def hold(self) -> None:
         """Keep the arms where they are, by the simplest means: something here has failed."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import roslib.message
 from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Bool, Empty, Float64, UInt16
 
@@ -78,6 +79,14 @@ def test_joint_state_rate_parameter_and_topic(make_lab, rate):
 def test_senseless_joint_state_rate_refuses_the_model(make_lab, rate):
     with pytest.raises(PluginError, match="joint_state_rate"):
         make_lab(parameters={"joint_state_rate": rate})
+
+
+def test_a_message_that_is_not_built_refuses_the_model_by_its_name(make_lab, monkeypatch):
+    find = roslib.message.get_message_class
+    monkeypatch.setattr(roslib.message, "get_message_class",
+                        lambda name: None if name == "sensor_msgs/PointCloud" else find(name))
+    with pytest.raises(PluginError, match="no message sensor_msgs/PointCloud"):
+        make_lab()
 
 
 @pytest.mark.parametrize("name, value", [("profile", "turbo"), ("disabled", "float")])

@@ -30,7 +30,8 @@ class ExternalLoad:
 
     def forget(self) -> None:
         """The joints were put elsewhere: begin again."""
-        self._ticks, self._begin = 0, None
+        self._ticks = 0
+        self._begin: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def note(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick has ended; joints: (position, velocity, effort) of the model, (n,) each."""
@@ -46,7 +47,7 @@ class ExternalLoad:
         """((n,) efforts that were exerted, (n,) those for the robot's own weight and motion) since the last call
         [Nm, N], or None if no tick has ended since. At the end of its way a joint is held from outside: nothing is told
         of it."""
-        if not self._ticks:
+        if self._begin is None or not self._ticks:
             return None
         (before, speed_before, _), (after, speed_after, _) = self._begin, self._end
         exerted = self._effort / self._ticks

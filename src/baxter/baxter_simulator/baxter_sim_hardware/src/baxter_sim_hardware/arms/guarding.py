@@ -54,11 +54,11 @@ class Guarding:
                  is_squeezed: Callable[[str], bool]) -> None:
         self._world, self._model, self._baxter, self._arms = world, model, baxter, baxter.arms
         self._chains, self._guards = chains, guards
-        self.fields = dict.fromkeys(SIDES, avoidance.FREE)
+        self.fields: dict[str, avoidance.Field] = dict.fromkeys(SIDES, avoidance.FREE)
         self._feel, self._is_squeezed = feel, is_squeezed
-        self.suppressions = {side: collision.Suppressions() for side in SIDES}
-        self._watches = {side: collision.Held() for side in SIDES}
-        self.held = dict.fromkeys(SIDES, ())
+        self.suppressions: dict[str, collision.Suppressions] = {side: collision.Suppressions() for side in SIDES}
+        self._watches: dict[str, collision.Held] = {side: collision.Held() for side in SIDES}
+        self.held: dict[str, tuple[str, ...]] = dict.fromkeys(SIDES, ())
         self._schedule = Schedule(CHECK_RATE_HZ)
         self.safety: safety.Safety | None = None
         self.warn: Callable[[float, Hashable, str], None] = lambda time_s, kind, text: None
@@ -97,10 +97,9 @@ class Guarding:
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats)
-        felt = self.safety.felt() if self.safety is not None else None
-        if felt is not None:
+        if self.safety is not None and (felt := self.safety.felt()) is not None:
             for side in self.suppressions:
-                self._stop_if_it_collides(side, time_s, felt, enabled)
+                self._stop_if_it_collides(self.safety, side, time_s, felt, enabled)
 
     def _find_frames(self) -> None:
         """Where the arms are, and with safety also where they are commanded to be: {side: frames of joints} each."""
@@ -110,13 +109,14 @@ class Guarding:
         self._frames = [{side: chain.joint_frames(posture[self._arms.joints_of(side)])
                          for side, chain in self._chains.items()} for posture in postures]
 
-    def _stop_if_it_collides(self, side: str, time_s: float, felt: safety.Felt, enabled: bool) -> None:
+    def _stop_if_it_collides(self, effect: safety.Safety, side: str, time_s: float, felt: safety.Felt,
+                             enabled: bool) -> None:
         why = safety.reason(*self._feel(side, felt), lambda kind: self.suppressions[side].active(kind, time_s))
-        self.safety.collides[side] = bool(why)
+        effect.collides[side] = bool(why)
         if why and enabled and not self._arms.floats(side) and not self._baxter.halted(side):
-            self._baxter.halt(side, self.safety.hold_s)
+            self._baxter.halt(side, effect.hold_s)
             self.warn(time_s, (side, "collision"), "%s limb stops, a collision: %s. It takes commands again in %g s" % (
-                side, why, self.safety.hold_s))
+                side, why, effect.hold_s))
 
     def _field(self, side: str, time_s: float) -> avoidance.Field:
         active, rates = self.suppressions[side].active, self._arms.wanted_rates(side)

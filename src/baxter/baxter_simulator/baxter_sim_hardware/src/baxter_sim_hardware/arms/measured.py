@@ -28,7 +28,8 @@ class Measured:
     def __init__(self, position: ArrayLike, dynamics: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> None:
         """At rest in ``position`` at time 0."""
         self.dynamics = dynamics
-        self.time_s = self.missing_s = 0.0
+        self.time_s = 0.0
+        self.missing_s: float | None = 0.0
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position)
         self.gravity = np.zeros_like(self.position)

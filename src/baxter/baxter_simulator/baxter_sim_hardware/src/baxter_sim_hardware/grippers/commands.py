@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeGuard
 
 from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.arms.hand_load import read_load
@@ -87,6 +87,6 @@ class CustomGripper(Gripper):
     COMMANDS = {"no_op": ("no_op", False), "set": ("configure", False), "configure": ("configure", False)}
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Whether a value from JSON is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -157,6 +157,9 @@ class CupHand:
         self._world.models[model].apply_wrench(link, force, position=pose.position)
         self._model.apply_wrench(self._frame, -force, position=pose.position)
 
+    def drive_again(self) -> None:
+        """A cup goes nowhere."""
+
     def stop(self) -> None:
         """The robot was disabled."""
         self.gripper.end_attempt()
@@ -185,6 +188,9 @@ class NoHand:
 
     def update(self, joints: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
         """One tick."""
+
+    def drive_again(self) -> None:
+        """Nothing here goes anywhere."""
 
     def stop(self) -> None:
         """The robot was disabled."""

@@ -62,18 +62,19 @@ class PictureNoise:
         self._noise = effects.positive(rows, "picture_noise", "camera")
         self._dark = effects.positive(rows, "vignetting", "camera")
         self._name, self._seed = name, seed
-        self._light = self._bank = None
+        #: The pinhole of the last picture, its share of the light, and the values that noise is cut out of.
+        self._last: tuple[Pinhole, np.ndarray, np.ndarray] | None = None
 
     def seen(self, picture: np.ndarray, pinhole: Pinhole, time_s: float) -> np.ndarray:
         """`picture`, (height, width, 3) uint8 of `pinhole`, as the sensor has it at time_s [s]; the same shape."""
         height, width = picture.shape[:2]
-        if self._light is None or self._light[0] != pinhole:
-            self._light = pinhole, self._vignette(pinhole)
-            self._bank = generator(self._seed, self._name, 0).standard_normal(
+        if self._last is None or self._last[0] != pinhole:
+            self._last = pinhole, self._vignette(pinhole), generator(self._seed, self._name, 0).standard_normal(
                 picture.size + _SPARE, dtype=np.float32) * np.float32(self._noise)
+        _, light, bank = self._last
         start = int(generator(self._seed, self._name, round(1e6 * time_s)).integers(1, _SPARE))
-        noise = self._bank[start:start + picture.size].reshape(height, width, 3)
-        return np.clip(picture * self._light[1] + noise, 0.0, 255.0).astype(np.uint8)
+        noise = bank[start:start + picture.size].reshape(height, width, 3)
+        return np.clip(picture * light + noise, 0.0, 255.0).astype(np.uint8)
 
     def _vignette(self, pinhole: Pinhole) -> np.ndarray:
         """(height, width, 1) share of the light, falling with the square of the sine of the angle to the axis."""

@@ -46,6 +46,12 @@ class JointStates:
 
 
 class _PreparedJointState(JointState):
+    count: bytes
+    prepared: bytes
+    position: np.ndarray
+    velocity: np.ndarray
+    effort: np.ndarray
+
     def serialize(self, buff: BytesIO) -> None:
         header = self.header
         parts = [_HEADER.pack(header.seq, header.stamp.secs, header.stamp.nsecs, 0), self.prepared]

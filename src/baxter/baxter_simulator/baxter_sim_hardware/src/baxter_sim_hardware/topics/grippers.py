@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from functools import partial
 from typing import TYPE_CHECKING
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
@@ -30,17 +31,15 @@ if TYPE_CHECKING:
 
     from .panel import PanelTopics
 
-_MANUFACTURER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
+_made = partial(EndEffectorProperties, manufacturer="Rethink Research Robot", product="SDK End Effector")
 _PROPERTIES = {
-    ElectricGripper: EndEffectorProperties(
+    ElectricGripper: _made(
         id=ELECTRIC.id, ui_type=ELECTRIC.ui_type, serial_number="3712199347", hardware_rev="2",
         firmware_rev="3.0.0 5.5", firmware_date="2014/7/24 18:30:00", has_calibration=True, controls_grip=True,
-        senses_grip=True, controls_force=True, senses_force=True, controls_position=True, senses_position=True,
-        **_MANUFACTURER),
-    SuctionGripper: EndEffectorProperties(
-        id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MANUFACTURER),
+        senses_grip=True, controls_force=True, senses_force=True, controls_position=True, senses_position=True),
+    SuctionGripper: _made(id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True),
     # A bare arm: the robot reports a passive tool there.
-    CustomGripper: EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type, **_MANUFACTURER),
+    CustomGripper: _made(id=CUSTOM.id, ui_type=CUSTOM.ui_type),
 }
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
@@ -108,9 +107,10 @@ class GripperTopics(Part):
             flags = {**_UNKNOWN, **gripper.flags}
             if gripper.flags:
                 flags.update(enabled=self._state.enabled, reverse=False)
-            message = EndEffectorState(
-                id=self._properties[side].id, position=position, force=force, state=gripper.details,
-                **{name: int(value) for name, value in flags.items()})
+            message = EndEffectorState(id=self._properties[side].id, position=position, force=force,
+                                       state=gripper.details)
+            for name, value in flags.items():
+                setattr(message, name, int(value))
         message.timestamp = stamp(time_s)
         message.command, message.command_sender = gripper.command, gripper.sender
         message.command_sequence = gripper.sequence

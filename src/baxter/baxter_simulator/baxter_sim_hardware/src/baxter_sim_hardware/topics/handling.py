@@ -22,9 +22,9 @@ class _Entry(NamedTuple):
 
     place: int
     key: str
-    component: object
-    handler: object
-    late: object
+    component: str | tuple[str, ...] | None
+    handler: Callable[[Any, Any, float], None]
+    late: Late | None
     number: int
 
 
@@ -35,15 +35,15 @@ class Handling:
         """warnings: `warnings.Warnings`, for messages that are refused; delay_of: function(number of a stream) -> how
         long what comes now is on its way [s], or None without delays."""
         self._warnings, self._delay_of = warnings, delay_of
-        self._topics = {}  # subscription -> _Entry
-        self._on_way = []  # subscriptions with messages on their way
+        self._topics: dict[Subscription, _Entry] = {}
+        self._on_way: list[Subscription] = []  # with messages on their way
 
     @property
     def waits(self) -> bool:
         """Whether messages are on their way, so that `handle` has to be called."""
         return bool(self._on_way)
 
-    def add(self, subscription: Subscription, place: int, key: str, component: object,
+    def add(self, subscription: Subscription, place: int, key: str, component: str | tuple[str, ...] | None,
             handler: Callable[[Any, Any, float], None], is_delayed: bool = False) -> None:
         """Register ``handler(component, message, time_s)``; within a tick, lower places come first."""
         late = Late() if is_delayed and self._delay_of is not None else None
@@ -53,7 +53,7 @@ class Handling:
         """Handle all messages of those subscriptions at time_s [s], and those that were on their way; a refusal is
         logged."""
         if self._delay_of is not None:
-            pending = self._after_delays(pending, time_s)
+            pending = self._after_delays(self._delay_of, pending, time_s)
         for subscription in sorted(pending, key=lambda subscription: self._topics[subscription].place):
             late = self._topics[subscription].late
             for message in subscription.drain() if late is None else late.arrived(time_s):
@@ -61,7 +61,8 @@ class Handling:
         if self._on_way:
             self._on_way = [subscription for subscription in self._on_way if self._topics[subscription].late]
 
-    def _after_delays(self, pending: Iterable[Subscription], time_s: float) -> list[Subscription]:
+    def _after_delays(self, delay_of: Callable[[int], float], pending: Iterable[Subscription],
+                      time_s: float) -> list[Subscription]:
         """Send off what has come in; the subscriptions that may have messages now, in their own order."""
         at_once = []
         for subscription in pending:
@@ -72,7 +73,7 @@ class Handling:
             if not entry.late:
                 self._on_way.append(subscription)
             for message in subscription.drain():
-                entry.late.send(time_s, self._delay_of(entry.number), message)
+                entry.late.send(time_s, delay_of(entry.number), message)
         return sorted(at_once + self._on_way, key=lambda subscription: self._topics[subscription].number)
 
     def drop(self, pending: Iterable[Subscription]) -> list[str]:
@@ -84,7 +85,9 @@ class Handling:
     def forget(self) -> None:
         """Drop what is on its way."""
         for subscription in self._on_way:
-            self._topics[subscription].late.drop()
+            late = self._topics[subscription].late
+            if late is not None:
+                late.drop()
         self._on_way = []
 
     def _call(self, subscription: Subscription, message: Any, time_s: float) -> None:

@@ -12,7 +12,7 @@ from baxter_sim_hardware.message_delay import Late
 from sim_time.pace import Schedule
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Collection, Iterable, Sequence
 
     from baxter_sim_hardware.snapshot import Snapshot
     from loop_ros.protocol import Publisher
@@ -26,9 +26,12 @@ class Publishing:
         """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception); now_s:
         function -> simulation time [s]."""
         self._take_snapshot, self._survived, self._now_s = take_snapshot, survived, now_s
-        self._groups = {}  # rate of the table's rows -> (Schedule, [(function, component, publisher)])
-        self._late, self._delay_of, self._delayed = Late(), None, ()
-        self._newest = {}  # publisher of a delayed group: the messages that were sent last
+        #: {rate of the table's rows: (its schedule, [(function, component, publisher)])}
+        self._groups: dict[float | str, tuple[Schedule, list[tuple[Callable, object, Publisher]]]] = {}
+        self._late = Late()
+        self._delayed: Collection[float | str] = ()
+        self._delay_of: Callable[[], float] = lambda: 0.0
+        self._newest: dict[Publisher, list[Any]] = {}  # of delayed groups: the messages that were sent last
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due
 
     def add(self, rate: float | str, hz: float, function: Callable, component: object, publisher: Publisher) -> None:
@@ -91,7 +94,7 @@ class Publishing:
         self._idle_until_s = min(schedule.next_s for schedule, _ in self._groups.values())
         return True
 
-    def _present(self, function: Callable, component: object, publisher: Publisher) -> tuple:
+    def _present(self, function: Callable, component: object, publisher: Publisher) -> Sequence[Any]:
         if any(publisher is to for ready in self._late.waiting() for to, _ in ready):
             # That comes after the pause, and must not be older.
             return self._newest.get(publisher, ())

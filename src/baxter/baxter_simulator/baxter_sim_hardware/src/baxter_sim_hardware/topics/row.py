@@ -7,13 +7,14 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import MethodType
+from typing import Final, Literal
 
 from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware.sensing.panel import ANALOG, DIGITAL, NAVIGATORS
 
 STATE_RATE_HZ = 100.0  # the physical robot's state topics
-LATCHED = "latched"  # in place of a rate: published once, and again to each later subscriber
-JOINT_STATE_RATE = "joint_state_rate"  # in place of a rate: the parameter of that name
+LATCHED: Final = "latched"  # in place of a rate: published once, and again to each later subscriber
+JOINT_STATE_RATE: Final = "joint_state_rate"  # in place of a rate: the parameter of that name
 ASSEMBLIES = (*SIDES, "head", "torso")
 COMPONENTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG), "navigator": NAVIGATORS,
               "assembly": ASSEMBLIES, "joint": JOINTS}
@@ -38,7 +39,7 @@ class Topic:
     key: str
     name: str
     type: str
-    rate: object
+    rate: float | Literal["latched", "joint_state_rate"] | None
     function: Callable
     meaning: str
 
@@ -59,7 +60,7 @@ class Topic:
 class Part:
     """A part of the robot that has topics. TOPICS: its rows; their functions are methods of this class."""
 
-    TOPICS = ()
+    TOPICS: tuple[Topic, ...] = ()
 
     @property
     def publishers(self) -> dict[str, MethodType]:

@@ -39,6 +39,12 @@ def accelerometer_frame(side: str) -> str:
     return "%s_hand_accelerometer" % side
 
 
+def _moving(chain: Chain, position: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((4, 4) pose, (3,) velocity [m/s]) of a chain's tip; position, velocity: (7,) of its joints [rad], [rad/s]."""
+    pose, jacobian = chain.fk_and_jacobian(position)
+    return pose, jacobian[:3] @ velocity
+
+
 class SensorTopics(Part):
     """context: the plugin's PluginContext; limb_index: {side: (7,) indices of its joints in the model's}; dt: length of
     a tick [s]; hands: `sensing.noise.HandSensors`, or None where sensors are exact.
@@ -115,12 +121,11 @@ class SensorTopics(Part):
         force = np.zeros(3)
         if side in self._chains:
             chain, index = self._chains[side], self._limb_index[side]
-            velocities = []
-            for position, velocity in (snapshot.before[:2], (snapshot.position, snapshot.velocity)):
-                pose, jacobian = chain.fk_and_jacobian(position[index])
-                velocities.append(jacobian[:3] @ velocity[index])
+            _, before = _moving(chain, snapshot.before[0][index], snapshot.before[1][index])
+            pose, after = _moving(chain, snapshot.position[index], snapshot.velocity[index])
             to_base = self._model.link_pose(BASE_FRAME).matrix()[:3, :3].T
-            force = sensors.specific_force(*velocities, to_base @ np.array(self._world.gravity), pose[:3, :3], self._dt)
+            force = sensors.specific_force(before, after, to_base @ np.array(self._world.gravity), pose[:3, :3],
+                                           self._dt)
             if self._hands is not None:
                 force = self._hands.acceleration(side, self._world.tick, force)
         return Imu(header=Header(stamp=stamp(time_s), frame_id=accelerometer_frame(side)),

@@ -31,11 +31,13 @@ class StatusTopics(Part):
     """baxter: `robot.Baxter`; limb_index: {side: (7,) indices of its joints in the model's}; links: names of the
     robot's; urdf_xml: its description; log: of the plugin's context."""
 
+    _urdf: Publisher  # from `_begin_urdf` on, before any message
+
     def __init__(self, baxter: Baxter, limb_index: Mapping[str, np.ndarray], links: Collection[str], urdf_xml: str,
                  log: Log) -> None:
         self._baxter, self._limb_index = baxter, limb_index
         self._links, self._urdf_xml, self._log = links, urdf_xml, log
-        self._urdf = self._fragment_time = None
+        self._fragment_time = None
 
     def _statuses(self, snapshot: Snapshot) -> list[DiagnosticStatus]:
         arms = self._baxter.arms
