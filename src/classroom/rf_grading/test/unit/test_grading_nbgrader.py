@@ -82,7 +82,7 @@ def test_points_are_in_the_gradebook_and_what_was_there_stays(results, tmp_path)
     for _ in range(2):  # a second time changes nothing
         done = run(python, SCRIPT, results, book)
         assert done.returncode == 1, done.stderr
-        assert done.stdout == ("not graded, and left as it was: chen, wave\n4 students are in %s\n" % book)
+        assert done.stdout == ("not graded, and left as it was: chen, wave\n4 students in %s\n" % book)
         exported = run(python, "-m", "nbgrader", "export", "--db=sqlite:///%s" % book, "--to=%s" % table)
         assert exported.returncode == 0, exported.stderr
         rows = {row["student_id"]: row for row in csv.DictReader(table.open(encoding="utf-8"))}
