@@ -4,7 +4,7 @@ be right."""
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rosgraph
@@ -69,8 +69,7 @@ def root_element(xml: str) -> str:
 def _parameters() -> dict[str, Any]:
     """The whole parameter tree, read from the master itself: rospy answers "/" from a cache which, once the node has
     logged a line, is nearly empty."""
-    # rosgraph has no types; the master's "/" is a tree in any case.
-    return cast("dict[str, Any]", rosgraph.Master(rospy.get_name()).getParam("/"))
+    return rosgraph.Master(rospy.get_name()).getParam("/")
 
 
 class GazeboServices:
