@@ -336,7 +336,8 @@ step_kernels() {
     local group groups=("${COMPILED[@]}")
     if pictures_missing; then
         write "$STATE/pictures.key" "$pictures_key"
-        groups+=("$PREPARE_PICTURES && mv $(printf '%q ' "$STATE"/pictures.{key,stamp})")
+        groups+=("$PREPARE_PICTURES && mv $(printf '%q ' "$STATE"/pictures.{key,stamp}) || true")
+        pictures_tried_in=$step_log
     fi
     # Some packages have files that are no Python of this version.
     groups+=("python3 -m compileall -q $(printf '%q' "$VENV")/lib/python3*/site-packages >/dev/null || true")
@@ -368,8 +369,8 @@ pictures_missing() {
     [[ ! -d $cache/results || ! -f $STATE/pictures.stamp || $(<"$STATE/pictures.stamp") != "$pictures_key" ]]
 }
 
-# Without this, the first pictures wait for the meshes' levels of detail: half a minute, on a busy machine some. What is
-# made already is only read.
+# Without this, the first pictures wait for the meshes' levels of detail: half a minute, on a busy machine some.
+pictures_tried_in=""
 step_pictures() {
     if ! pictures_missing; then
         note=${pictures_key:+up to date}
@@ -377,7 +378,9 @@ step_pictures() {
         return
     fi
     # A machine that cannot draw needs no pictures; one that can makes them at the first start.
-    if bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' prepare "$LAB_ROOT" "$PREPARE_PICTURES" \
+    if [[ -n $pictures_tried_in ]]; then
+        note="not made, see $pictures_tried_in; the first start makes them"
+    elif bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' prepare "$LAB_ROOT" "$PREPARE_PICTURES" \
         >>"$step_log" 2>&1 </dev/null; then
         stamp "$pictures_key"
     else
