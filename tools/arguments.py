@@ -52,13 +52,22 @@ class _Anything(type):
     def _itself(cls, *_: object, **__: object) -> _Anything:
         return cls
 
+    def __call__(cls, *_: object, **__: object) -> Any:
+        return cls
+
+    def __or__(cls, _: object) -> Any:
+        return cls
+
+    def __ror__(cls, _: object) -> Any:
+        return cls
+
     def __setitem__(cls, key: object, value: object) -> None:
         pass
 
     def __iter__(cls) -> Iterator[object]:
         return iter(())
 
-    __call__ = __getitem__ = __neg__ = __or__ = __ror__ = __add__ = __radd__ = __sub__ = __rsub__ = _itself
+    __getitem__ = __neg__ = __add__ = __radd__ = __sub__ = __rsub__ = _itself
     __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __pow__ = __matmul__ = _itself
 
 
@@ -110,15 +119,15 @@ def own_words(mode: str, words: list[str]) -> list[str]:
     return words
 
 
-def _refuse(_: argparse.ArgumentParser, status: int = 0, message: str | None = None) -> NoReturn:
+def _refuse(self: argparse.ArgumentParser, status: int = 0, message: str | None = None) -> NoReturn:
     if status == 0:
         sys.exit()
     raise WordsRefused((message or "").strip().removeprefix("check: "))
 
 
-def _error(parser: argparse.ArgumentParser, message: str) -> NoReturn:
+def _error(self: argparse.ArgumentParser, message: str) -> NoReturn:
     """The error of any parser also asks for what was meant."""
-    meant = importlib.import_module("command_line.options").Parser.meant(parser, message)
+    meant = importlib.import_module("command_line.options").Parser.meant(self, message)
     raise WordsRefused(message if message.endswith(meant) else message + meant)
 
 

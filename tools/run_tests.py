@@ -24,7 +24,7 @@ from lab_tests.results import Tally, summary
 
 ROOT = Path(__file__).resolve().parent.parent
 # The tests of --busy without names, one for each main flow: they must also pass on a fifth of a two-core machine.
-MAIN_FLOWS = (
+MAIN_FLOWS: tuple[str, ...] = (
     "enable_robot.test",
     "tools_world.test",  # enabling and moving in the simulator
     "lab2_nodes.test",  # Glasgow's lab: move_baxter and its other nodes

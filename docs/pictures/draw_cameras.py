@@ -23,7 +23,7 @@ from sensor_msgs.msg import Image
 
 from baxter_dataflow import wait_for
 from baxter_interface import Limb
-from baxter_interface.programs import EnabledRobot, run
+from baxter_interface.programs import EnabledRobot, ProgramFailed, run
 
 FOLDER = Path(__file__).resolve().parent
 TILE, QUALITY = (480, 300), 80
@@ -61,7 +61,10 @@ def moving(velocities: dict[str, float]) -> Iterator[None]:
 def settings(camera: str, **values: float) -> Iterator[None]:
     """The camera has these settings meanwhile."""
     client = Client(camera, timeout=TIMEOUT_S)
-    before = {name: client.get_configuration(TIMEOUT_S)[name] for name in values}
+    found = client.get_configuration(TIMEOUT_S)
+    if found is None:
+        raise ProgramFailed("the settings of %s have not come within %g s" % (camera, TIMEOUT_S))
+    before = {name: found[name] for name in values}
     client.update_configuration(values)
     try:
         yield
@@ -117,7 +120,8 @@ def by_depth(depth: np.ndarray) -> np.ndarray:
     """Near is light, nothing is dark blue."""
     share = np.clip((depth - DEPTH_M[0]) / (DEPTH_M[1] - DEPTH_M[0]), 0.0, 1.0)
     grey = np.nan_to_num(240.0 - 200.0 * share).astype(np.uint8)
-    return np.where(np.isfinite(depth)[..., None], np.dstack([grey] * 3), np.uint8([0, 0, 60])).astype(np.uint8)
+    blue = np.array([0, 0, 60], np.uint8)
+    return np.where(np.isfinite(depth)[..., None], np.dstack([grey] * 3), blue).astype(np.uint8)
 
 
 def save(name: str, tiles: Sequence[tuple[str, np.ndarray]]) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from urllib.parse import urlparse
 
 from lab_doctor import move_group_checks
-from lab_doctor.facts import Facts
+from lab_doctor.facts import Facts, Master
 from lab_doctor.findings import Finding, Level
 
 # tf refuses to look up transforms this far in the future or the past of its buffer; well before that, arms lag visibly.
@@ -181,14 +181,16 @@ def _master_fix(facts: Facts) -> str:
     return f"is {host} on, and does `ping {host}` answer? For the simulator on this machine: ./baxter.sh sim"
 
 
-def _master_answers(facts: Facts) -> bool:
-    return facts.master is not None and not facts.master.error
+def _answering(facts: Facts) -> Master | None:
+    """The master, None where it does not answer."""
+    return None if facts.master is None or facts.master.error else facts.master
 
 
 def check_clock(facts: Facts) -> Iterator[Finding]:
-    if not _master_answers(facts):
+    master = _answering(facts)
+    if master is None:
         return
-    offset = facts.master.clock_offset_s
+    offset = master.clock_offset_s
     if offset is not None and abs(offset) > MAX_CLOCK_OFFSET_S:
         ahead = "ahead of" if offset > 0 else "behind"
         what = f"the clock of {master_host(facts)} is {abs(offset):.1f} s {ahead} this one's: tf will refuse its data"
@@ -197,14 +199,14 @@ def check_clock(facts: Facts) -> Iterator[Finding]:
     topics = facts.topics
     if topics is None or topics.error:
         return
-    if facts.master.use_sim_time and not topics.clock_messages:
+    if master.use_sim_time and not topics.clock_messages:
         what = "use_sim_time is true and nothing arrives on /clock: every node that sleeps or waits hangs"
         fix = f"start the simulator ({START_LINE}), or without one: rosparam set use_sim_time false"
         yield Finding("clock", Level.WRONG, what, fix)
-    elif facts.master.use_sim_time and not topics.clock_advanced:
+    elif master.use_sim_time and not topics.clock_advanced:
         what = "simulation time stands still: the simulator is paused"
         yield Finding("clock", Level.WRONG, what, "rosservice call /gazebo/unpause_physics")
-    elif facts.master.use_sim_time:
+    elif master.use_sim_time:
         yield Finding("clock", Level.OK, "simulation time advances")
     elif topics.clock_messages:
         what = "a simulator publishes /clock, but use_sim_time is not set: nodes mix two kinds of time"
@@ -214,17 +216,18 @@ def check_clock(facts: Facts) -> Iterator[Finding]:
 
 
 def check_simulators(facts: Facts) -> Iterator[Finding]:
-    if not _master_answers(facts):
+    master = _answering(facts)
+    if master is None:
         return
     for topic in SIMULATOR_TOPICS:
-        nodes = facts.master.publishers.get(topic, [])
+        nodes = master.publishers.get(topic, [])
         if len(nodes) > 1:
             what = f"{len(nodes)} nodes publish {topic}: {', '.join(sorted(nodes))}"
             fix = f"keep one of them and stop the others: rosnode kill {sorted(nodes)[-1]}"
             yield Finding("simulator", Level.WRONG, what, fix)
-    for node in facts.master.slow_nodes:
+    for node in master.slow_nodes:
         yield _busy("simulator", f"{node} has not answered")
-    for node in facts.master.dead_nodes:
+    for node in master.dead_nodes:
         what = f"{node} is registered at the master and does not answer: it died without signing off"
         yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
 
@@ -248,7 +251,7 @@ def check_troubles(facts: Facts) -> Iterator[Finding]:
 
 
 def check_robot(facts: Facts) -> Iterator[Finding]:
-    if not _master_answers(facts):
+    if _answering(facts) is None:
         return
     if "topics" in facts.timed_out:
         yield _busy("robot", "the program that reads /clock and /robot/state has not started in time")

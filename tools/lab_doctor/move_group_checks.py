@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Problems that keep a running move_group from planning or moving. Pure, like the other checks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 from lab_doctor.facts import MoveGroup
 from lab_doctor.findings import Finding, Level
@@ -75,7 +75,7 @@ def _octomap(move_group: MoveGroup) -> Iterator[Finding]:
                           f"{_listed(sensor.publishers)}", f"rostopic hz {sensor.topic}; check the camera's node")
 
 
-def _listed(names: Sequence[str]) -> str:
+def _listed(names: Iterable[str]) -> str:
     names = list(names)
     more = len(names) - SHOWN
     return ", ".join(names[:SHOWN]) + (f" and {more} more" if more > 0 else "")

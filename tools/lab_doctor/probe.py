@@ -198,7 +198,7 @@ def ask_master(uri: str) -> Master:
         return Master(error=str(error) or type(error).__name__)
     by_topic = dict(publishers)
     simulators = {node for topic in SIMULATOR_TOPICS for node in by_topic.get(topic, [])}
-    host = urlparse(uri).hostname
+    host = urlparse(uri).hostname or ""
     states = {node: _node_state(master, node) for node in sorted(simulators)}
     return Master(
         use_sim_time=code == 1 and bool(use_sim_time),
@@ -257,7 +257,7 @@ def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
     first = None
     deadline = time.monotonic() + timeout_s
     while time.monotonic() < deadline:
-        connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=CALL_TIMEOUT_S)
+        connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=CALL_TIMEOUT_S)
         try:
             before = time.time()
             connection.request("GET", "/")

@@ -87,9 +87,12 @@ def load_hypothesis_profile(config: pytest.Config) -> None:
     # It parses every module that is not installed, for constants to try: those of 900 modules of generated messages and
     # of Debian's ROS are no hints, and took a worker of a fresh clone 14 of 36 seconds of processor time.
     from hypothesis.internal.conjecture import providers
+    from hypothesis.internal.constants_ast import is_local_module_file
 
-    own, is_local = str(config.rootpath / "src"), providers.is_local_module_file
-    providers.is_local_module_file = lambda path: path.startswith(own) and is_local(path)
+    own = str(config.rootpath / "src")
+    # Patched where it is used, in a module that has imported it.
+    providers.is_local_module_file = (  # pyright: ignore[reportPrivateImportUsage]
+        lambda path: path.startswith(own) and is_local_module_file(path))
     if not config.getoption("hypothesis_profile", None):
         hypothesis.settings.load_profile("deep" if config.option.long else "quick")
 

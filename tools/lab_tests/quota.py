@@ -32,8 +32,9 @@ class Quota:
             raise ValueError(f"the share is {percent:g} % of one core; it must be between 1 and {most} %")
         self._percent, self._mount, self._own = percent, mount, own
         self._groups = self._own_groups()
-        self._group: Path | None = None
-        self._before: Path | None = None
+        # Inside: the new group, and the one before.
+        self._group: Path
+        self._before: Path
 
     def __enter__(self):
         problems = []

@@ -107,7 +107,7 @@ def _run(
     }
     command = ["rostest"] if stretch == 1.0 else [sys.executable, str(STRETCHED_ROSTEST)]
     output = work_folder / "output.txt"
-    timed_out = False
+    code: int | None = None  # None: not finished in time
     with output.open("wb") as stream:
         child = None
         try:
@@ -120,9 +120,8 @@ def _run(
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
-            child.wait(time_limit_s)
+            code = child.wait(time_limit_s)
         except subprocess.TimeoutExpired:
-            timed_out = True
             _stop(child)
         except BaseException:  # Ctrl-C, perhaps while it starts: end the test's processes, too
             if child is not None:
@@ -132,12 +131,12 @@ def _run(
     tally = Tally()
     leftovers = processes.wait_until_gone(run_id, LEFTOVER_GRACE_S)
     processes.kill_all(run_id)
-    if timed_out:
+    if code is None:
         tally.add(failure(f"{path.name}: not finished after {time_limit_s:.0f} s"))
     else:
         tally.add(read_rostest_results(work_folder / "results"))
-        if child.returncode != 0 and tally.failed == 0:
-            tally.add(failure(f"{path.name}: rostest ended with exit code {child.returncode}"))
+        if code != 0 and tally.failed == 0:
+            tally.add(failure(f"{path.name}: rostest ended with exit code {code}"))
         if leftovers:
             listing = "\n".join(f"  {pid}: {command}" for pid, command in sorted(leftovers.items()))
             tally.add(failure(f"{path.name}: left processes behind (killed now):\n{listing}"))

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import rospy
-from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
+from baxter_maintenance_msgs.msg import UpdateSource, UpdateSources, UpdateStatus
 from std_msgs.msg import Empty, String
 
 from baxter_dataflow.ros_clock import RosClock
@@ -49,7 +49,9 @@ class Updater:
     """The robot's updater: the updates on the stick, and the progress of an update."""
 
     def __init__(self) -> None:
-        self.sources = self._status = None
+        self.sources: Sequence[UpdateSource] = ()
+        self._are_known = False  # the sources
+        self._status: UpdateStatus | None = None
         self._heard = False
         self._last_line = ""
         self._start = rospy.Publisher("/updater/start", String, queue_size=10)
@@ -58,7 +60,7 @@ class Updater:
             rospy.Subscriber("/usb/update_sources", UpdateSources, self._on_sources, queue_size=1),
             rospy.Subscriber("/updater/status", UpdateStatus, self._on_status, queue_size=10),
         ]
-        startup.wait_for_start([startup.message_arrives("/usb/update_sources", lambda: self.sources is not None)],
+        startup.wait_for_start([startup.message_arrives("/usb/update_sources", lambda: self._are_known)],
                                SILENCE_TIMEOUT_S)
 
     def run(self, uuid: str) -> None:
@@ -101,7 +103,7 @@ class Updater:
         return False
 
     def _on_sources(self, message):
-        self.sources = message.sources
+        self.sources, self._are_known = message.sources, True
 
     def _on_status(self, message):
         self._status, self._heard = message, True

@@ -42,7 +42,7 @@ class _RunClock:
         address = self._libc.mmap(None, mmap.PAGESIZE, mmap.PROT_READ, mmap.MAP_SHARED, descriptor, 0)
         if address == ctypes.c_void_p(-1).value:
             raise OSError(ctypes.get_errno(), "the clock's page cannot be read")
-        self._address = ctypes.c_void_p(address)
+        self._address: int = address
         self._pause = _Timespec(0, round(_LOOK_UP_S * 1e9))
         self._own = threading.local()
         *_, self._wall_ns, self._monotonic_ns = self._read()
@@ -51,7 +51,7 @@ class _RunClock:
         while True:
             words = _PAGE.unpack(ctypes.string_at(self._address, _PAGE.size))
             # Odd while it is written.
-            if words[0] % 2 == 0 and ctypes.c_uint.from_address(self._address.value).value == words[0]:
+            if words[0] % 2 == 0 and ctypes.c_uint.from_address(self._address).value == words[0]:
                 return words
             _real_sleep(0)
 
@@ -76,8 +76,8 @@ class _RunClock:
         # Sleeps shorter than a step add up to one.
         due = self._own.due = max(getattr(self._own, "due", 0.0), now_ns * 1e-9) + seconds
         while now_ns * 1e-9 + _STEP_S <= due:
-            self._libc.syscall(ctypes.c_long(self._futex), self._address, _FUTEX_WAIT, ctypes.c_uint(sequence),
-                               ctypes.byref(self._pause), None, 0)
+            self._libc.syscall(ctypes.c_long(self._futex), ctypes.c_void_p(self._address), _FUTEX_WAIT,
+                               ctypes.c_uint(sequence), ctypes.byref(self._pause), None, 0)
             sequence, _, now_ns, *_ = self._read()
 
 

@@ -8,7 +8,7 @@ import importlib
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 import rospy
@@ -255,7 +255,7 @@ class Limb:
             ticker.sleep()
         raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
 
-    def ik(self, pose: Any, seed: dict[str, float] | None = None, timeout: float = IK_TIMEOUT_S) -> Any:
+    def ik(self, pose: Any, seed: Mapping[str, float] | None = None, timeout: float = IK_TIMEOUT_S) -> Any:
         """Ask the robot for joint angles that put the end-point at `pose`; the arm does not move.
 
         Parameters:

@@ -99,7 +99,7 @@ def demo() -> None:
             arm = SeeingArm("left") if looks else SdkArm("left")
             for way in itertools.count(1):
                 target = next(spots)
-                if looks:
+                if isinstance(arm, SeeingArm):
                     source = locate(arm, MIDDLE_M, ABOUT_M)
                     rospy.loginfo("the block is seen %.1f mm from where it is", 1e3 * scene.distance(source))
                 pick_and_place(arm, source, replace(target, z=source.z))

@@ -32,7 +32,7 @@ def main():
         return float(np.linalg.norm(np.subtract((found.x, found.y, found.z), POINT)))
 
     distances = {(reference, tip): distance(reference, tip) for reference in REFERENCES for tip in TIPS}
-    reference, tip = min(distances, key=distances.get)
+    reference, tip = min(distances, key=distances.__getitem__)
     print("%s in %s is %.1f mm from the point asked for" % (tip, reference, 1000.0 * distances[reference, tip]))
     print("reference frame: %s" % reference)
     print("commanded frame: %s" % tip)
