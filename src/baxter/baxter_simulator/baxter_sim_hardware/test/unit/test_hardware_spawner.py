@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from baxter_model import SIDES, poses
 from gazebo_ros import gazebo_interface
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "spawn_baxter"
@@ -41,6 +42,17 @@ def test_lists_the_poses(spawner):
     spawner.parameters["robot_description"] = "<robot name='empty'><link name='base'/></robot>"
     with pytest.raises(SystemExit, match="unknown pose 'banana'; choices are start, neutral"):
         spawner.main(["banana", *WORDS])
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_joint_without_limits_starts_at_the_angle_of_the_pose(spawner, monkeypatch, side):
+    joint = side + "_w2"
+    spawner.parameters["robot_description"] = """<robot name="r"><link name="arm"/><link name="hand"/>
+        <joint name="%s" type="continuous"><parent link="arm"/><child link="hand"/></joint></robot>""" % joint
+    said = []
+    monkeypatch.setattr(spawner.spawn_model, "main", said.extend)
+    spawner.main(["neutral", *WORDS])
+    assert said[said.index(joint) + 1] == repr(poses().angles("neutral", side)[joint])
 
 
 def test_tells_where_the_arms_are_mounted(spawner, monkeypatch):
