@@ -58,9 +58,23 @@ class Collected(NamedTuple):
     frames: int
 
 
-def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, workers: int = 1,
-            say: Callable[[str], None] = lambda text: None, spec: Spec | None = None,
-            conditions: Conditions = Conditions()) -> Collected:  # noqa: B008 (a tuple)
+class Work(NamedTuple):
+    """Processes at a time, and a function of each line that tells how far they are."""
+
+    workers: int = 1
+    say: Callable[[str], None] = lambda text: None
+
+
+class Views(NamedTuple):
+    """Cameras of gym_baxter, and the side of their pictures in pixels."""
+
+    cameras: tuple[str, ...]
+    size: int
+
+
+def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0,
+            work: Work = Work(), spec: Spec | None = None,  # noqa: B008 (tuples)
+            conditions: Conditions = Conditions()) -> Collected:  # noqa: B008
     """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
     with the parameters and results of `Demonstrate`, and with the expert's own actions; it gets the conditions as well.
     Raises DemonstrationError, JobError, the first where the set has no episode then."""
@@ -78,13 +92,13 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
         core.close()
     kept = failed = frames = 0
     waiting: dict[int, dict | None] = {}
-    limits = Limits(min(workers, max(len(seeds), 1)), _EPISODE_S, None)
+    limits = Limits(min(work.workers, max(len(seeds), 1)), _EPISODE_S, None)
     with SetWriter(folder, schema) as writer:
         order = iter(seeds)
         following = next(order, None)
         for outcome in map_seeds(spec, seeds, limits):
             if outcome.error:
-                say("seed %d: %s" % (outcome.seed, outcome.error))
+                work.say("seed %d: %s" % (outcome.seed, outcome.error))
             waiting[outcome.seed] = outcome.result if outcome.is_done else None
             while following in waiting:
                 result = waiting.pop(following)
@@ -93,7 +107,7 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
                 else:
                     writer.add(_episode(result, schema, following))
                     kept, frames = kept + 1, frames + len(result["columns"]["action"])
-                say("%d of %d demonstrations of %s" % (kept + failed, len(seeds), task))
+                work.say("%d of %d demonstrations of %s" % (kept + failed, len(seeds), task))
                 following = next(order, None)
     if not writer.episodes:
         raise DemonstrationError("the expert did none of %d episodes of %s" % (len(seeds), task))
@@ -101,12 +115,12 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0, w
     return Collected(kept, failed, frames)
 
 
-def film(task: str, folder: Path, seeds: Iterable[int], cameras: tuple[str, ...], size: int, noise: float = 0.0,
+def film(task: str, folder: Path, seeds: Iterable[int], views: Views, noise: float = 0.0,
          say: Callable[[str], None] = lambda text: None,
          conditions: Conditions = Conditions()) -> Collected:  # noqa: B008 (a tuple)
-    """As `collect`, in this process, with pictures (size, size) of cameras of gym_baxter. Raises DemonstrationError."""
+    """As `collect`, in this process, with pictures. Raises DemonstrationError."""
     seeds = list(seeds)
-    core = core_of(task, cameras=cameras, size=size, control_freq=RATE_HZ, **conditions.choices)
+    core = core_of(task, cameras=views.cameras, size=views.size, control_freq=RATE_HZ, **conditions.choices)
     kept = frames = 0
     try:
         expert = expert_of(core)

@@ -14,7 +14,7 @@ from lab_batch import JobError
 
 from . import robomimic
 from .card import write_card
-from .collecting import collect, film
+from .collecting import Views, Work, collect, film
 from .environment import Conditions, core_for, replay
 from .experts import EXPERTS
 from .frames import DemonstrationError
@@ -65,10 +65,10 @@ def _record(options):
         print(text, file=sys.stderr)
 
     if options.cameras:
-        found = film(options.task, options.folder, seeds, tuple(dict.fromkeys(options.cameras)), options.size,
-                     options.noise, say=say, conditions=conditions)
+        found = film(options.task, options.folder, seeds, Views(tuple(dict.fromkeys(options.cameras)), options.size),
+                     options.noise, say, conditions)
     else:
-        found = collect(options.task, options.folder, seeds, options.noise, options.workers, say=say,
+        found = collect(options.task, options.folder, seeds, options.noise, Work(options.workers, say),
                         conditions=conditions)
     print("%s of %s are in %s; the expert failed %s" % (
         counted(found.kept, "demonstration"), options.task, options.folder, counted(found.failed, "time")))

@@ -73,7 +73,7 @@ class Conditions(NamedTuple):
 
     @property
     def about(self) -> dict[str, Any]:
-        """What `Schema.about` says of them: nothing of usual ones."""
+        """Their part of `Schema.about`: nothing of usual ones."""
         return {name: value for name, value in (("profile", self.profile), ("randomised", dict(self.randomised)))
                 if value != getattr(Conditions(), name)}
 

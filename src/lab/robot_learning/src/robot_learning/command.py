@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
-from demonstrations.collecting import Collected, collect
+from demonstrations.collecting import Collected, Work, collect
 from demonstrations.environment import Conditions
 from demonstrations.experts import EXPERTS
 from demonstrations.frames import DemonstrationError
@@ -120,7 +120,7 @@ def _demonstrate(options: argparse.Namespace, source: Path) -> None:
     have = _tried(source, FIRST_DEMONSTRATION, FIRST_CORRECTION)
     if have < options.demonstrations:
         seeds = range(FIRST_DEMONSTRATION + have, FIRST_DEMONSTRATION + options.demonstrations)
-        _told(collect(options.task, source, seeds, NOISE, options.workers, _say, conditions=_conditions(options)),
+        _told(collect(options.task, source, seeds, NOISE, Work(options.workers, _say), conditions=_conditions(options)),
               "demonstrations", options.task)
 
 
