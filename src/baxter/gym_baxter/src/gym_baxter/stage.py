@@ -120,5 +120,5 @@ class Stage(Protocol):
         ...
 
     def add_urdf(self, name: str, description: str, place: tuple[float, ...]) -> StageThing:
-        """What a URDF text describes, its root's frame at `place`."""
+        """The thing that a URDF text describes, its root's frame at `place`."""
         ...

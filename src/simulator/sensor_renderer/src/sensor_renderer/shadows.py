@@ -25,8 +25,8 @@ _STEP = 2.0 ** 0.25
 _MIN_HALF_M, _MAX_HALF_M = 1.0, 8.0
 # How far behind the furthest thing that casts shadows a camera sees any on the floor [m].
 _BEYOND_M = 1.5
-# A picture whose pixels see more than a texel of a map of everything, at this distance [m], is shaded by such a map: all
-# small pictures of a state share it, and it is exactly of that state.
+# A picture whose pixels see more than a texel of a map of everything, at this distance [m], is shaded by such a map:
+# all small pictures of a state share it, and it is exactly of that state.
 _SMALL_AT_M = 0.5
 # Texels along the map's border to which nothing is drawn: outside of the map is no shadow.
 _BORDER = 3
