@@ -84,13 +84,13 @@ export class Episodes {
     byId("episode-list").replaceChildren(...[...episodes].reverse().map(({number, frames, success}) => element("li", {},
       element("span", {className: success ? "good" : "bad", textContent: `${number}: ${text(success ? "steer_success" : "steer_failure")}`}),
       element("span", {className: "faint", textContent: rate ? `${(frames / rate).toFixed(1)} s` : ""}),
-      element("button", {className: "plain small", textContent: text("delete"), onclick: ({target}) => this.delete(number, target)}),
+      element("button", {className: "plain small", textContent: text("delete"), onclick: ({target}) => this.delete(number, version, target)}),
       ...camera ? [element("img", {alt: text("episode_strip", {number}), loading: "lazy",
         src: `episodes/${number}.jpg${this.query}&version=${version}`})] : [])));
   }
 
-  delete(number, button) {
-    if (button.dataset.sure) this.send({do: "delete", number});
+  delete(number, version, button) {
+    if (button.dataset.sure) this.send({do: "delete", number, version});
     else {
       button.dataset.sure = "yes";
       button.textContent = text("episode_sure");

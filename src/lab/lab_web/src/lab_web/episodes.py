@@ -79,7 +79,7 @@ class Episodes:
 
     def ask(self, client: int, operation: dict[str, Any]) -> None:
         """The operation "episodes" of a page: ``do``: start (with ``task``, ``camera``), stop, one of MARKS, or delete
-        (with ``number``). Raises RobotError."""
+        (with ``number``, and the ``version`` of the list that it is of: numbers move up). Raises RobotError."""
         do = operation.get("do")
         if do == "start":
             self._begin(*_checked(operation))
@@ -93,10 +93,11 @@ class Episodes:
                 raise RobotError("nothing is recorded now; press the record button first")
             self._mark(do)
         elif do == "delete":
-            number = operation.get("number")
-            if not isinstance(number, int) or self._recorder is not None:
-                raise RobotError("an episode is deleted by its number, while nothing is recorded")
-            self._tasks.add(client, self._delete, number)
+            number, version = operation.get("number"), operation.get("version")
+            if not isinstance(number, int) or not isinstance(version, int) or self._recorder is not None:
+                raise RobotError("an episode is deleted by its number and its list's version, "
+                                 "while nothing is recorded")
+            self._tasks.add(client, self._delete, number, version)
         else:
             raise RobotError("%r is nothing to do with episodes" % (do,))
 
@@ -147,8 +148,12 @@ class Episodes:
         self._look()
         self._share()
 
-    def _delete(self, number: int) -> None:
+    def _delete(self, number: int, version: int) -> None:
         try:
+            # Another page, or a program, may have deleted one meanwhile: then this number is another episode's.
+            self._look()
+            if version != self._version:
+                raise RobotError("the list of episodes has changed; nothing was deleted. Choose again")
             editing.delete(self.folder, number)
         except DemonstrationError as error:
             raise RobotError(str(error)) from error

@@ -40,6 +40,22 @@ def write(folder, count=2):
             writer.keep("Task.", True)
 
 
+def delete(made, number):
+    made.episodes.ask(1, {"do": "delete", "number": number, "version": made.episodes._version})
+    made.tasks.run(lambda: True)
+
+
+def test_a_second_click_deletes_no_other_episode(made):
+    """The numbers behind a deleted episode move up: a click of another page, or the second of two, was read before."""
+    write(made.episodes.folder, 4)
+    made.episodes._look()
+    version = made.episodes._version
+    for _ in range(2):
+        made.episodes.ask(1, {"do": "delete", "number": 1, "version": version})
+    made.tasks.run(lambda: True)
+    assert len(made.states[-1]["episodes"]) == 3 and "nothing was deleted" in made.told[0]
+
+
 def test_a_recording_begins_is_marked_and_ends(made):
     made.episodes.ask(1, {**START, "camera": "head"})
     assert made.started == [("Pick up the block.", "head")] and made.states[-1]["running"]
@@ -50,8 +66,7 @@ def test_a_recording_begins_is_marked_and_ends(made):
     assert made.marks == ["failure"] and state["said"] == "episode 1 is kept" and len(state["episodes"]) == 2
     made.episodes.ask(1, {"do": "stop"})
     assert not made.states[-1]["running"]
-    made.episodes.ask(1, {"do": "delete", "number": 0})
-    made.tasks.run(lambda: True)
+    delete(made, 0)
     assert len(made.states[-1]["episodes"]) == 1 and made.states[-1]["version"] > state["version"]
 
 
@@ -59,8 +74,7 @@ def test_the_first_episode_decides_on_the_camera(made, monkeypatch):
     write(made.episodes.folder)
     monkeypatch.setattr("lab_web.episodes.editing.listed", lambda folder: (
         [Listed(0, 4, True)], ("observation.images.left_hand",), 10))
-    made.episodes.ask(1, {"do": "delete", "number": 7})  # it looks again
-    made.tasks.run(lambda: True)
+    delete(made, 7)  # it looks again
     made.episodes.ask(1, {**START, "camera": "head"})
     assert made.started == [("Pick up the block.", "left_hand")]
 
@@ -68,7 +82,8 @@ def test_the_first_episode_decides_on_the_camera(made, monkeypatch):
 @pytest.mark.parametrize(("asked", "why"), [
     ({"do": "start", "task": " "}, "few words"), ({"do": "start", "task": 5}, "few words"),
     ({"do": "start", "task": "a\nb"}, "few words"), ({**START, "camera": "rear"}, "no camera 'rear'"),
-    ({"do": "success"}, "nothing is recorded"), ({"do": "delete", "number": "0"}, "by its number"),
+    ({"do": "success"}, "nothing is recorded"), ({"do": "delete", "number": "0", "version": 0}, "by its number"),
+    ({"do": "delete", "number": 0}, "its list's version"),
     ({"do": "dance"}, "'dance'"), ({}, "None"), ({"do": []}, r"\[\]")])
 def test_what_makes_no_sense_is_refused(made, asked, why):
     with pytest.raises(RobotError, match=why):
@@ -79,15 +94,15 @@ def test_what_makes_no_sense_is_refused(made, asked, why):
 def test_nothing_is_deleted_or_begun_twice_while_something_is_recorded(made):
     write(made.episodes.folder)
     made.episodes.ask(1, START)
-    for asked in (START, {"do": "delete", "number": 0}):
+    for asked in (START, {"do": "delete", "number": 0, "version": 1}):
         with pytest.raises(RobotError, match="recorded"):
             made.episodes.ask(1, asked)
 
 
 def test_an_episode_that_is_not_there_is_told_and_so_is_a_broken_set(made):
     write(made.episodes.folder)
-    made.episodes.ask(3, {"do": "delete", "number": 7})
-    made.tasks.run(lambda: True)
+    made.episodes._look()
+    delete(made, 7)
     assert "episodes 0 to 1, not 7" in made.told[0] and len(made.states[-1]["episodes"]) == 2
     (made.episodes.folder / "meta" / "info.json").write_text("{")
     made.episodes.ask(1, START)
