@@ -15,7 +15,7 @@ from lab_batch import JobError
 from . import robomimic
 from .card import write_card
 from .collecting import Views, Work, collect, film
-from .environment import Conditions, core_for, replay
+from .environment import PROFILES, Conditions, core_for, replay
 from .experts import EXPERTS
 from .frames import DemonstrationError
 from .reading import DataSet, repair, survey
@@ -33,7 +33,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     one.add_argument("--first", type=number(int, 0, MAX_SEED), default=0, metavar="SEED", help="of the first episode")
     one.add_argument("--noise", type=number(float, 0.0, 1.0), default=0.0, metavar="SHARE",
                      help="disturb the actions; expert.action then has what the expert wanted (default: 0)")
-    one.add_argument("--profile", choices=("sim", "robot"), default="sim",
+    one.add_argument("--profile", choices=PROFILES, default=PROFILES[0],
                      help="of the robot: robot has the physical one's lag and noise (default: %(default)s)")
     one.add_argument("--randomised", action="store_true",
                      help="things have other weights and frictions in each episode")

@@ -39,6 +39,8 @@ _NOISE, _TURN_NOISE, _LASTING, _STRETCH, _COMING = 0.08, 0.02, 0.9, 10, 0.3
 #: A student acts for so many actions of an episode at most; then the expert ends it.
 STUDENT_STEPS = 160
 _ONE = {REWARD: "float32", DONE: "bool", SUCCESS: "bool"}
+#: Of the robot, by which demonstrations are made.
+PROFILES = ("sim", "robot")
 #: How much differs with --randomised.
 RANDOMISED = {"mass": 0.5, "friction": 0.5}
 
@@ -68,8 +70,18 @@ class Conditions(NamedTuple):
 
     @classmethod
     def of(cls, about: Mapping[str, Any]) -> Conditions:
-        """Those of a set, from its `Schema.about`."""
-        return cls(about.get("profile", cls().profile), about.get("randomised", {}))
+        """Those of a set, from its `Schema.about`, which a file has. Raises DemonstrationError."""
+        profile, randomised = about.get("profile", cls().profile), about.get("randomised", {})
+        if profile not in PROFILES:
+            raise DemonstrationError("the set's profile is %r; it must be one of %s" % (profile, ", ".join(PROFILES)))
+        if not isinstance(randomised, dict) or not randomised.keys() <= set(Randomised._fields):
+            raise DemonstrationError("the set's randomised is %r; it must be a table of %s" % (
+                randomised, ", ".join(Randomised._fields)))
+        try:
+            Randomised(**randomised).require()
+        except (TypeError, ValueError) as error:
+            raise DemonstrationError("the set's conditions: %s" % error) from error
+        return cls(profile, randomised)
 
     @property
     def about(self) -> dict[str, Any]:

@@ -150,3 +150,12 @@ def test_unknown_tasks_and_cameras_are_named():
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 3.0, np.pi])
 def test_a_turn_is_its_axis_times_its_angle(angle):
     assert np.linalg.norm(rotation_vector(down(angle) @ down(0.0).T)) == pytest.approx(angle, abs=1e-7)
+
+
+@pytest.mark.parametrize("about", [
+    {"profile": "xyz"}, {"profile": 3}, {"profile": []}, {"randomised": "abc"}, {"randomised": None},
+    {"randomised": {"foo": 1}}, {"randomised": {"mass": "x"}}, {"randomised": {"mass": -3}},
+    {"randomised": {"mass": float("nan")}}])
+def test_conditions_of_a_broken_set_are_refused_with_what_was_found(about):
+    with pytest.raises(DemonstrationError, match=next(iter(about)) + "|mass|real number"):
+        Conditions.of(about)

@@ -15,7 +15,7 @@ import numpy as np
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
 from demonstrations.collecting import Collected, Work, collect
-from demonstrations.environment import Conditions
+from demonstrations.environment import PROFILES, Conditions
 from demonstrations.experts import EXPERTS
 from demonstrations.frames import DemonstrationError
 from demonstrations.layout import INFO, write_json
@@ -71,7 +71,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                         help="of the evaluation, seeds 0 to N - 1 (default %(default)s; 0: none)")
     parser.add_argument("--workers", type=number(int, 1, MAX_WORKERS), default=os.cpu_count() or 1, metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
-    parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
+    parser.add_argument("--profile", choices=PROFILES, default=PROFILES[0],
                         help="of the robot, in the demonstrations that this run makes and in the evaluation: robot has "
                              "the physical one's lag and noise (default: %(default)s)")
     parser.add_argument("--randomised", action="store_true",
