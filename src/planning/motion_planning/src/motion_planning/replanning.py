@@ -2,6 +2,7 @@
 """Another way for joints that move already, found and timed before they reach what has come into their way."""
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,9 +20,12 @@ if TYPE_CHECKING:
     from motion_planning.pipeline import PlanQuery, Tools
     from motion_planning.scene import Scene
 
-#: How far ahead of now the new trajectory begins [s], tried in this order: planning it, and its way to the controller,
-#: take most of that. Less where the obstacle is near.
-AHEAD_S = (0.12, 0.08, 0.05)
+# How far ahead of now the new trajectory begins [s]: planning it, and its way to the controller, take most of that.
+# The first that leaves room to brake before the obstacle.
+_AHEAD_S = (0.12, 0.08, 0.05)
+# The same for further searches, where an earlier one had too little time and the obstacle is at least _FAR times as far.
+_LATER_S, _FAR = (0.4, 1.0), 2.0
+_TOO_LITTLE_TIME = (Code.TIMED_OUT, Code.PREEMPTED, Code.PLANNING_FAILED)
 # What the way to the controller may take of that [s], and the share of the rest that the search may use.
 _SENDING_S, _SEARCHING = 0.02, 0.5
 # How far ahead of now joints that are to stop begin to brake [s], and the multiples of their limits of acceleration
@@ -34,11 +38,11 @@ _AT_GOAL = 1e-4
 
 
 class Running(NamedTuple):
-    """A trajectory under way. timed: of the group's joints; now [s]: on its time; blocked_from [s]: the first time at
-    which its joints would touch something."""
+    """A trajectory under way. timed: of the group's joints; now(): the time on it [s]; blocked_from [s]: the first
+    time at which its joints would touch something."""
 
     timed: Timed
-    now: float
+    now: Callable[[], float]
     blocked_from: float
 
 
@@ -69,7 +73,7 @@ def stopped(exact: ExactChecker, scene: Scene, group: Group, running: Running) -
     touches nothing. None if all of those that are tried touch something: whatever stops them at once has to."""
     limit = scene.model.acceleration[group.indices]
     for harder in _HARDER:
-        found = _at_rest(exact, scene, group, running, _BRAKING_AHEAD_S, harder * limit)
+        found = _at_rest(exact, scene, group, running, running.now() + _BRAKING_AHEAD_S, harder * limit)
         if found is not None:
             return Stop(led(found[1]), found[0], harder)
     return None
@@ -79,48 +83,68 @@ def redirected(query: PlanQuery, tools: Tools, running: Running) -> Redirection:
     """Return a Redirection for a :class:`Running` trajectory, in the scene of a PlanQuery.
 
     The joints of ``query.scene`` count for what the group does not move. The goal is where the running trajectory ends
-    if that is free, else the query's goals. Raises PlanningFailure if there is no other way, if it is not found in
-    time, or if the joints cannot come to rest before the obstacle; they have to be stopped then.
+    if that is free, else the query's goals. What is far is worth a longer search, if a short one finds nothing. Raises
+    PlanningFailure if there is no other way, if it is not found in time, or if the joints cannot come to rest before
+    the obstacle; they have to be stopped then.
     """
-    begin = tools.clock()
-    start, braking, ahead = _brake(query, tools, running)
-    end = begin + ahead - _SENDING_S
-    tools = replace(tools, stop=lambda stop=tools.stop: stop() or tools.clock() > end)
+    try:
+        return _redirected(query, tools, running, _AHEAD_S)
+    except PlanningFailure as error:
+        failure = error
+    for ahead in _LATER_S:
+        far = running.blocked_from - running.now() >= _FAR * ahead
+        if failure.code not in _TOO_LITTLE_TIME or not far or tools.stop():
+            break
+        try:
+            return _redirected(query, tools, running, (ahead,))
+        except PlanningFailure as error:
+            failure = error
+    raise failure
+
+
+def _redirected(query: PlanQuery, tools: Tools, running: Running, choices: Sequence[float]) -> Redirection:
+    """The same, of one search that begins at one of the times ahead of now [s]."""
+    begin = running.now()
+    start, braking = _brake(query, tools, running, choices)
+    # Both on the trajectory's time, which may run faster or slower than the clock.
+    end = start - _SENDING_S
+    searched = begin + _SEARCHING * (end - begin)
     group = query.scene.model.groups[query.group]
     scene = query.scene.with_state(query.scene.state.with_q(braking.positions[-1], group.indices))
     again = replace(query, scene=scene, goals=_goals(query, tools, running, scene), attempts=1,
-                    allowed_time=max(1e-3, _SEARCHING * (end - tools.clock())))
-    found = plan(again, tools)
+                    allowed_time=max(1e-3, searched - running.now()))
+    found = plan(again, replace(tools, stop=lambda: tools.stop() or running.now() > searched))
+    tools = replace(tools, stop=lambda stop=tools.stop: stop() or running.now() > end)
     velocity = np.maximum(scene.model.velocity[group.indices] * query.velocity_scaling,
                           np.abs(running.timed.sampled([start])[1][0]))
     for overlap, timed in joinings(braking, found.timed, velocity, scene.model.acceleration[group.indices]):
         flaw = checked(again, tools, timed, braking.duration + 1e-6)
-        if tools.clock() > end:
+        if running.now() > end:
             raise PlanningFailure(Code.TIMED_OUT, "another way was found too late, after %.3f s"
-                                  % (tools.clock() - begin))
+                                  % (running.now() - begin))
         if flaw is None:
             return Redirection(timed, start, found, overlap)
     raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot leave their way: %s" % flaw[0], flaw[1])
 
 
-def _brake(query: PlanQuery, tools: Tools, running: Running) -> tuple[float, Timed, float]:
-    """(time on the running trajectory, Timed that comes to rest from there without touching anything, time until then
-    [s])."""
+def _brake(query: PlanQuery, tools: Tools, running: Running, choices: Sequence[float]) -> tuple[float, Timed]:
+    """(time on the running trajectory, Timed that comes to rest from there without touching anything)."""
     group = query.scene.model.groups[query.group]
     acceleration = query.scene.model.acceleration[group.indices]
-    for ahead in AHEAD_S:
-        found = _at_rest(tools.exact, query.scene, group, running, ahead, acceleration)
+    now = running.now()
+    for ahead in choices:
+        found = _at_rest(tools.exact, query.scene, group, running, now + ahead, acceleration)
         if found is not None:
-            return *found, ahead
+            return found
     raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the joints cannot come to rest in time: something stands %.2f s "
-                          "ahead" % (running.blocked_from - running.now))
+                          "ahead" % (running.blocked_from - now))
 
 
-def _at_rest(exact: ExactChecker, scene: Scene, group: Group, running: Running, ahead: float,
+def _at_rest(exact: ExactChecker, scene: Scene, group: Group, running: Running, start: float,
              acceleration: np.ndarray) -> tuple[float, Timed] | None:
-    """(time on the running trajectory, ``ahead`` [s] of now, Timed that comes to rest from there within the limits
+    """(``start`` or the end of the running trajectory [s], Timed that comes to rest from there within the limits
     acceleration (k,) without touching anything), or None."""
-    start = min(running.now + ahead, running.timed.duration)
+    start = min(start, running.timed.duration)
     if start >= running.blocked_from:
         return None
     for found in brakings(running.timed, start, acceleration):

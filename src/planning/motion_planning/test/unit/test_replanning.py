@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Obstacles in the way of joints that move: another way without a stop, or the reason why they have to stop."""
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ class Lab:
     def __init__(self, model, exact, tick_s=1e-5):
         self.model, self.exact = model, exact
         ticks = itertools.count()
-        self.tools = Tools(exact, plan_path, sampler, lambda: tick_s * next(ticks))
+        self.clock = lambda: tick_s * next(ticks)
+        self.tools = Tools(exact, plan_path, sampler, self.clock)
         self.group = model.groups[GROUP]
         self.timed = time_path([FROM, TO], np.full(6, 0.8), np.full(6, 1.0), "ruckig")
         self.scene = Scene(model)
@@ -42,7 +44,7 @@ class Lab:
         times = self.timed.spaced(0.02)
         times = times[times >= NOW_S]
         first = self.exact.first_blocked(self.scene, self.timed.sampled(times)[0], GROUP)
-        self.running = Running(self.timed, NOW_S, float(times[first]))
+        self.running = Running(self.timed, lambda: NOW_S + self.clock(), float(times[first]))
         return self
 
     def redirected(self, **changes):
@@ -96,8 +98,29 @@ def test_a_goal_that_is_blocked_too_is_a_reason_to_stop(probot, exact):
 
 def test_a_way_that_is_found_too_late_is_not_taken(probot, exact):
     with pytest.raises(PlanningFailure) as failure:
-        Lab(probot, exact, tick_s=0.01).place_ahead(1.4).redirected()
+        Lab(probot, exact, tick_s=0.1).place_ahead(1.4).redirected()
     assert failure.value.code in (Code.TIMED_OUT, Code.PREEMPTED)
+
+
+def test_what_is_far_is_worth_a_longer_search_on_a_slow_machine(probot, exact):
+    lab = Lab(probot, exact, tick_s=0.0015).place_ahead(1.8)
+    found = lab.redirected()
+    assert found.begin > NOW_S + 0.3 and found.begin < lab.running.blocked_from
+    states = found.timed.sampled(found.timed.spaced(0.004))[0]
+    assert exact.first_blocked(lab.scene, states, GROUP) is None
+    # Too late for what is near.
+    with pytest.raises(PlanningFailure) as failure:
+        Lab(probot, exact, tick_s=0.0015).place_ahead(0.8, size=0.02).redirected()
+    assert failure.value.code in (Code.TIMED_OUT, Code.PREEMPTED)
+
+
+def test_who_stops_the_planning_stops_every_search(probot, exact):
+    lab = Lab(probot, exact).place_ahead(1.8)
+    asked = []
+    lab.tools = replace(lab.tools, stop=lambda: asked.append(True) or True)
+    with pytest.raises(PlanningFailure) as failure:
+        lab.redirected()
+    assert failure.value.code == Code.PREEMPTED and len(asked) < 10
 
 
 def test_joints_stop_as_gently_as_the_room_allows(probot, exact):

@@ -85,7 +85,7 @@ class RestOfTheWay:
         return reason if stop is None else self._new_way(scene, stop.timed, begin + stop.begin, reason)
 
     def _running(self, begin: float, blocked_from: float) -> Running:
-        return Running(self._timed, rospy.get_time() - begin, blocked_from)
+        return Running(self._timed, lambda: rospy.get_time() - begin, blocked_from)
 
     def _around(self, onward: Callable[[Scene, Running], Redirection], scene: Scene, begin: float,
                 blocked_from: float) -> str | NewWay:

@@ -81,9 +81,10 @@ def test_another_way_takes_the_place_at_a_time_ahead(model, scene, clock):
     asked = []
 
     def onward(_, running):
-        asked.append(running)
+        asked.append((running.now(), running.blocked_from))
+        begin = running.now() + 0.1
         clock.now += 0.04  # what it takes
-        return Redirection(other, running.now + 0.1, None, 0.0)
+        return Redirection(other, begin, None, 0.0)
 
     blocked = with_needle(scene, np.pi / 4)
     watch = look(model, scene, timed, [None, blocked, blocked], onward, lambda: clock.now - 0.3)
@@ -91,7 +92,8 @@ def test_another_way_takes_the_place_at_a_time_ahead(model, scene, clock):
     new = watch.hit()
     assert not new.stops
     # The controller's word counts: it began 0.3 s before.
-    assert asked[0].now == pytest.approx(0.3) and 0.3 < asked[0].blocked_from < timed.duration
+    (asked_at, blocked_from), = asked
+    assert asked_at == pytest.approx(0.3) and 0.3 < blocked_from < timed.duration
     assert new.begins == pytest.approx(clock.now + 0.06)
     message = new.trajectory.joint_trajectory
     assert message.header.stamp.to_sec() == pytest.approx(new.begins)
@@ -106,8 +108,9 @@ def test_without_another_way_in_time_the_sentence_says_why(model, scene, timed, 
     def onward(_, running):
         if not ahead_s:
             raise PlanningError("a wall")
+        begin = running.now() + ahead_s
         clock.now += 2.0 * ahead_s
-        return Redirection(timed, running.now + ahead_s, None, 0.0)
+        return Redirection(timed, begin, None, 0.0)
 
     watch = look(model, scene, timed, [with_needle(scene, np.pi / 4)], onward)
     assert sentence in why(watch.hit()) and watch.contacts[0].b == "needle"
