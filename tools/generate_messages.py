@@ -27,7 +27,7 @@ SKIP = 'case "$2" in */genmsg_check_deps.py) exit 0 ;; esac  # tools/generate_me
 
 
 @dataclass(frozen=True)
-class Command:
+class GeneratorCommand:
     """One generator's command line, its result, and the files that this is made of."""
 
     words: tuple[str, ...]
@@ -49,7 +49,7 @@ class Command:
             return True
 
 
-def commands_of(build: Path) -> list[Command]:
+def commands_of(build: Path) -> list[GeneratorCommand]:
     """All generators' commands in the makefiles of a build folder."""
     found = []
     for makefile in build.rglob("*_generate_messages_*.dir/build.make"):
@@ -61,12 +61,12 @@ def commands_of(build: Path) -> list[Command]:
                 rules.setdefault(result, []).append(rule[2])
             elif command := COMMAND.match(line):
                 words = tuple(shlex.split(command[1].replace("$$", "$")))
-                found.append(Command(words) if command[2] == CHECK
-                             else Command(words, result, tuple(rules.get(result, ()))))
+                found.append(GeneratorCommand(words) if command[2] == CHECK
+                             else GeneratorCommand(words, result, tuple(rules.get(result, ()))))
     return found
 
 
-def succeeds(command: Command) -> bool:
+def succeeds(command: GeneratorCommand) -> bool:
     """Run a generator's script in this process."""
     sys.argv = list(command.words)
     # It numbers the variables of the code that it makes, and expects one message a process.

@@ -19,7 +19,7 @@ import pytest
 
 from lab_tests import processes
 from lab_tests.discovery import WORKERS_BESIDE_CORES, Selection, SelectionError, changed_files, select, take_inventory
-from lab_tests.quota import Quota, QuotaError
+from lab_tests.quota import ProcessorQuota, QuotaError
 from lab_tests.results import Tally, summary
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -106,7 +106,7 @@ def pytest_words(selection: Selection, long: bool, stretch: float, workers: int)
 
 def run(selection: Selection, options: argparse.Namespace) -> int:
     """All rounds; the exit code. Raises ValueError, QuotaError."""
-    share = contextlib.nullcontext() if options.busy is None else Quota(options.busy)
+    share = contextlib.nullcontext() if options.busy is None else ProcessorQuota(options.busy)
     stretch = STRETCH if options.busy is None else STRETCH * max(1.0, WHOLE_MACHINE_PERCENT / options.busy)
     workers = 1 if options.busy is not None else len(os.sched_getaffinity(0)) + WORKERS_BESIDE_CORES
     words = pytest_words(selection, options.long, stretch, workers)

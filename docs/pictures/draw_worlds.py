@@ -43,7 +43,7 @@ BAXTER = ("baxter_description", "urdf/baxter.urdf.xacro")
 WITH_KINECT = ("cwru_baxter_sim", "cwru_baxter.urdf.xacro")
 
 
-class View(NamedTuple):
+class WorldView(NamedTuple):
     """``eye``, ``target`` [m]; ``field_rad``: the picture's width; ``arms``: of the left and the right, both as the
     left's [rad]; ``seconds``: how long the world has run; ``robot``: package and file of its description; ``camera``:
     the frame of the robot that looks, instead of ``eye``."""
@@ -59,21 +59,21 @@ class View(NamedTuple):
 
 
 VIEWS = {
-    "robot": View("baxter", (3.5, 0.55, 1.5), (0.1, 0.0, 0.98), 0.93),
-    "lab2": View("baxter", (3.0, 1.3, 1.75), (0.25, 0.05, 0.93), 0.97, (SHOWN, NEUTRAL)),
-    "hands": View("table", (1.95, 0.2, 1.42), (0.7, 0.0, 0.93), 0.8),
-    "kinect": View("table", (1.35, -0.35, 1.45), (0.12, 0.0, 1.68), 0.7, robot=WITH_KINECT),
-    "hand_camera": View("table", (), (), 1.2, camera="left_hand_camera"),
-    "lamp": View("cafe", (1.75, -0.85, 1.3), (0.85, 0.02, 0.86), 0.75),
-    "table": View("table", (2.75, 1.55, 1.9), (0.35, 0.05, 1.08), 0.98),
-    "shelf": View("shelf", (-0.15, -2.6, 1.75), (0.62, 0.0, 0.97), 1.02, (SHOWN, SHOWN)),
-    "conveyor": View("conveyor", (3.1, 1.7, 1.9), (0.45, 0.25, 0.9), 1.05, seconds=7.0),
-    "cafe": View("cafe", (-1.9, -2.9, 2.1), (2.0, 0.5, 0.75), 1.05),
-    "class_room": View("class_room", (5.3, -3.2, 2.2), (0.6, 0.6, 0.85), 1.05),
+    "robot": WorldView("baxter", (3.5, 0.55, 1.5), (0.1, 0.0, 0.98), 0.93),
+    "lab2": WorldView("baxter", (3.0, 1.3, 1.75), (0.25, 0.05, 0.93), 0.97, (SHOWN, NEUTRAL)),
+    "hands": WorldView("table", (1.95, 0.2, 1.42), (0.7, 0.0, 0.93), 0.8),
+    "kinect": WorldView("table", (1.35, -0.35, 1.45), (0.12, 0.0, 1.68), 0.7, robot=WITH_KINECT),
+    "hand_camera": WorldView("table", (), (), 1.2, camera="left_hand_camera"),
+    "lamp": WorldView("cafe", (1.75, -0.85, 1.3), (0.85, 0.02, 0.86), 0.75),
+    "table": WorldView("table", (2.75, 1.55, 1.9), (0.35, 0.05, 1.08), 0.98),
+    "shelf": WorldView("shelf", (-0.15, -2.6, 1.75), (0.62, 0.0, 0.97), 1.02, (SHOWN, SHOWN)),
+    "conveyor": WorldView("conveyor", (3.1, 1.7, 1.9), (0.45, 0.25, 0.9), 1.05, seconds=7.0),
+    "cafe": WorldView("cafe", (-1.9, -2.9, 2.1), (2.0, 0.5, 0.75), 1.05),
+    "class_room": WorldView("class_room", (5.3, -3.2, 2.2), (0.6, 0.6, 0.85), 1.05),
 }
 
 
-def robot_entry(view: View) -> tuple[dict[str, Any], list[float], dict[str, MergedFrame]]:
+def robot_entry(view: WorldView) -> tuple[dict[str, Any], list[float], dict[str, MergedFrame]]:
     """(entry of the scene, state, frames) of the robot."""
     package, file = view.robot
     path = "%s/%s" % (rospkg.RosPack().get_path(package), file)
@@ -111,7 +111,7 @@ def settled(description: SdfWorld, seconds: float) -> tuple[list[dict[str, Any]]
     return entries, states, WorldLights(description.lights, description.scene).listed()
 
 
-def draw(name: str, view: View) -> Path:
+def draw(name: str, view: WorldView) -> Path:
     """Draw one picture; return its path."""
     packages = rospkg.RosPack()
     folders = ModelFolders(model_folders(packages), model_sizes(packages))

@@ -24,7 +24,7 @@ def bare(spec, seeds, limits):
     yield from (run_episode(job, seed) for seed in seeds)
 engine, job, count = json.loads(sys.argv[1])
 run = {"bare": bare, "processes": processes.map_seeds}[engine]
-for one in run(Spec(*job), range(count), processes.Limits(1)):
+for one in run(Spec(*job), range(count), processes.BatchLimits(1)):
     print(json.dumps([time.monotonic(), one.seed, one.result, one.error]), flush=True)
 """
 

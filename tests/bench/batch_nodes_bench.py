@@ -24,9 +24,9 @@ ADDRESSES, CABLE = ("10.99.17.1", "10.99.17.2"), "cable"
 DRIVER = """
 import json, sys, time
 from lab_batch import Spec, ray_engine
-from lab_batch.processes import Limits
+from lab_batch.processes import BatchLimits
 job, count, workers, address = json.loads(sys.argv[1])
-for one in ray_engine.map_seeds(Spec(*job), range(count), Limits(workers), address=address):
+for one in ray_engine.map_seeds(Spec(*job), range(count), BatchLimits(workers), address=address):
     print(json.dumps([time.monotonic(), one.seed, one.result, one.error]), flush=True)
 """
 

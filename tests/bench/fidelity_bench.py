@@ -14,7 +14,7 @@ from pictures import curves
 from recording import JOINT_NAMES, Recording, delay_s, overshoots, rest, step_overshoot
 from replaying import Start, bare_robot, replay
 
-from baxter_sysid.replay import Motion
+from baxter_sysid.replay import ReplayedMotion
 from baxter_sysid.sheet import worst_seconds
 
 RECORDING = HERE / "recordings" / "baxter_tracking_100hz.csv"
@@ -58,7 +58,7 @@ def measure(report, quick, number):
     print("simulated against recorded; pairs: recorded, simulated", *lines, sep="\n", flush=True)
     motion, events = replayed["all"]
     print("the worst second of each joint", *worst_seconds(
-        recording.time_s, simulated["all"] - recording.sensed, Motion(*(values[judged] for values in motion)),
+        recording.time_s, simulated["all"] - recording.sensed, ReplayedMotion(*(values[judged] for values in motion)),
         list(JOINT_NAMES), events), sep="\n", flush=True)
     if number == 0:
         folder = HERE.parents[1] / ".baxter/bench"

@@ -8,7 +8,7 @@ import numpy as np
 
 from arm_kinematics import Chain
 from baxter_sim_examples import TABLE_TOP_M, TABLE_XY_M
-from baxter_sim_examples.looking import View
+from baxter_sim_examples.looking import CameraView
 from baxter_sim_examples.scene import TABLE_SIZE_M
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.sensing.cameras import CaptureSettings
@@ -49,7 +49,7 @@ class Eye:
         self._renderer.close()
 
     def view(self):
-        """The `View` of this moment: the picture as it is, its pose in `base` as the robot's joints say."""
+        """The `CameraView` of this moment: the picture as it is, its pose in `base` as the robot's joints say."""
         lab = self._lab
         true = dict(zip(lab.model.joint_names, lab.model.read_joints()[0], strict=True))
         base, block = lab.model.base_pose(), self._block.base_pose()
@@ -62,4 +62,4 @@ class Eye:
         said = dict(zip(lab.model.joint_names, lab.plugin.read_joints()[0], strict=True))
         pinhole = self._pinhole
         matrix = np.array([[pinhole.fx, 0.0, pinhole.cx], [0.0, pinhole.fy, pinhole.cy], [0.0, 0.0, 1.0]])
-        return View(picture, matrix, self._chain.fk(np.array([said[name] for name in self._chain.joint_names])))
+        return CameraView(picture, matrix, self._chain.fk(np.array([said[name] for name in self._chain.joint_names])))

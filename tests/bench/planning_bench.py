@@ -11,7 +11,7 @@ import time
 import numpy as np
 import planning_problems as problems
 
-from motion_planning.planners import NoPath, Search, plan_path, prepare
+from motion_planning.planners import NoPath, SearchOptions, plan_path, prepare
 
 # Time allowed for each problem [s], and for the peer.
 LIMIT_S, PEER_LIMIT_S = 1.0, 10.0
@@ -59,7 +59,7 @@ def solve(problem, patience_s=LIMIT_S, improve=False):
     begin = CLOCK()
     try:
         path = plan_path(problem.scene, problem.group, problem.start, [problem.goal],
-                         Search(problem.robot.exact, 1, patience_s, CLOCK, improve=improve))
+                         SearchOptions(problem.robot.exact, 1, patience_s, CLOCK, improve=improve))
     except NoPath as error:
         print("%s: %s" % (problem.name, error))
         path = None

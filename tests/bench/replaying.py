@@ -19,7 +19,7 @@ from robot_bench import load_lab
 import xacro
 from baxter_model import JOINTS, SIDES, is_part_of_arm
 from baxter_sysid.recording import start_of
-from baxter_sysid.replay import Motion
+from baxter_sysid.replay import ReplayedMotion
 from urdf_model import Robot, parse_urdf
 
 LEAD_S, SETTLED_S = 0.1, 0.5
@@ -30,7 +30,7 @@ class Replayed(NamedTuple):
     """motion: of the recording's rows, for its 14 joints; events: {joint: [(time [s], what)]}, what holds its arm, and
     what that touches."""
 
-    motion: Motion
+    motion: ReplayedMotion
     events: dict[str, list[tuple[float, str]]]
 
 
@@ -133,4 +133,4 @@ class _Watch:
 
     def replayed(self, lead: int) -> Replayed:
         position, bounded, effort = (np.array(each)[lead:] for each in zip(*self._rows, strict=True))
-        return Replayed(Motion(position, bounded.astype(float), effort), self._events)
+        return Replayed(ReplayedMotion(position, bounded.astype(float), effort), self._events)

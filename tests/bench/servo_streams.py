@@ -22,8 +22,7 @@ from baxter_model import BASE_HEIGHT_M, SIDES
 from bullet_sim import Pose, World
 from controller_manager.interfaces import POSITION
 from gazebo_ros_control.hardware import SimulatedHardware
-from joint_trajectory import Command as TrajectoryCommand
-from joint_trajectory import Follower
+from joint_trajectory import Follower, TrajectoryCommand
 from loop_ros.testing import FakeLog
 from model_files.resources import ResourceFinder
 from motion_planning.constraints.regions import rotation_vector
@@ -33,7 +32,7 @@ from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import Scene, WorldObject
 from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of
-from moveit_servo.servo import Command, Servo, Status, Step
+from moveit_servo.servo import Servo, ServoCommand, ServoStep, Status
 from moveit_servo.settings import ServoSettings
 from moveit_servo.surroundings import Surroundings
 from urdf_model import Box, Cylinder, Inertial, Link, Shape, Sphere, parse_urdf
@@ -351,7 +350,7 @@ class Steered:
         self.servo, self._probe = Servo(physics.model, settings), Servo(physics.model, settings)
         self.servo.surroundings = self._probe.surroundings = surroundings
         self.indices = [physics.model.index[name] for name in self.servo.joints]
-        self.steps: list[Step] = []
+        self.steps: list[ServoStep] = []
         self.ways = Straight(), Straight()
 
     def draw(self) -> None:
@@ -368,7 +367,7 @@ class Steered:
         for number in self.rng.permutation(12):
             probe.reset()
             here = q.copy()
-            command = Command(twist=(0.2, -0.2)[number % 2] * np.eye(6)[number // 2])
+            command = ServoCommand(twist=(0.2, -0.2)[number % 2] * np.eye(6)[number // 2])
             for _ in range(PROBE_STEPS):
                 here[self.indices] = probe.step(here, still, command, PERIOD_S).position
             if np.abs(here - q)[self.indices].max() > MOVED_RAD:
@@ -440,7 +439,7 @@ def _step(physics: Physics, arms: list[Steered], q: np.ndarray, velocity: np.nda
     together = 0.0
     for arm in arms:
         begin = time.thread_time()
-        made = arm.servo.step(q, velocity, Command(twist=arm.twist), PERIOD_S)
+        made = arm.servo.step(q, velocity, ServoCommand(twist=arm.twist), PERIOD_S)
         took = time.thread_time() - begin
         together += took
         found.cpu_s.append(took)

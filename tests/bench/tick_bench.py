@@ -16,12 +16,12 @@ from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from bullet_sim.solids import with_solids
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
-from gazebo_ros.publications import Publications
+from gazebo_ros.publications import SimulationPublications
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.request_queue import RequestQueue
-from loop_ros.subscription import Subscription
+from loop_ros.subscription import MessageQueue
 from model_files.resources import ResourceFinder
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
 from world_picture.snapshot import SnapshotWriter
@@ -45,7 +45,7 @@ class _Ros:
         return LoopPublisher(self.hub, topic, msg_class, latch=latch, greet=greet)
 
     def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
-        return self.subscriptions.setdefault(topic, Subscription(depth, notice))
+        return self.subscriptions.setdefault(topic, MessageQueue(depth, notice))
 
     def reads(self):
         self._reads += 1
@@ -96,7 +96,7 @@ class Loop(BareWorld):
         context = PluginContext(self.world, self.model, source, log, ros, parameters, host)
         self._subscriptions = ros.subscriptions
         self._simulation = Simulation(self.world, RequestQueue(), log, Faults(log), real_time_factor=0.0)
-        publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
+        publications = SimulationPublications(self._simulation, ros, writer, log, clock_rate=500.0)
         self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
         self._simulation.host(HostedPlugin(BaxterPlugin(context), context, self.model.name, "Baxter"))
         self._step, self._stepping_s = self.world.step, 0.0

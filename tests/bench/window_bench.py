@@ -11,7 +11,7 @@ from lab_testing.waiting import wait_until
 from sensor_renderer.best import best_renderer
 from urdf_model import merge_fixed, parse_urdf
 from world_picture.snapshot import SnapshotWriter
-from world_window.stage import Stage
+from world_window.stage import WindowStage
 from world_window.viewer import Viewer
 
 SECONDS = 10.0
@@ -28,7 +28,7 @@ def measure(report, quick, number):
     writer, drawn = SnapshotWriter(), []
     viewer = Viewer(lambda: str(writer.folder), lambda: best_renderer()[0],
                     lambda frame: frame.pixels is not None and drawn.append(1), lambda pull: None, print)
-    viewer.post(Stage.resize, *SIZE)
+    viewer.post(WindowStage.resize, *SIZE)
     try:
         writer.write_scene([{"name": "floor", "urdf": None, "joints": []},
                             {"name": "robot", "urdf": xml, "joints": [joint.name for joint in joints]}])

@@ -20,7 +20,7 @@ from bullet_sim import World
 from gazebo_ros import gazebo_services
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.simulation import Simulation
-from gazebo_ros.spawning import Library, Spawner
+from gazebo_ros.spawning import Spawner, SpawnLookups
 from gazebo_ros.world_lights import WorldLights
 from loop_ros.request_queue import RequestQueue
 from loop_ros.testing import FakeLog, FakeRos
@@ -63,7 +63,7 @@ class Gazebo:
         simulation = Simulation(self._world, self._requests, log, self.ros.faults)
         config = os.path.join(packages.get_path("gazebo_ros"), "config", "model_plugins.yaml")
         folders = ModelFolders(model_folders(packages))
-        spawner = Spawner(simulation, Library(PluginTable.from_yaml(config), ResourceFinder(packages), folders),
+        spawner = Spawner(simulation, SpawnLookups(PluginTable.from_yaml(config), ResourceFinder(packages), folders),
                           self.ros, log, on_change=lambda: None)
         gazebo_services._parameters = dict  # there is no master
         gazebo_services.GazeboServices(simulation, spawner, WorldLights([]), self.ros, log)

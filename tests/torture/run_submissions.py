@@ -43,7 +43,7 @@ def _read(name, data, exercises):
     else:
         one.files = {name: data}
     found = programs.assign(one.files, exercises)
-    entry = plan.Entry(one)
+    entry = plan.SubmissionEntry(one)
     for path, text in programs.with_notebooks_as_programs(one.files)[0].items():
         diagnosis.check_syntax(text, path)
         alike.fingerprints(decoded(text))

@@ -51,7 +51,7 @@ class Scenes:
         if not all_work:
             sphere_model._MAX_POINTS //= _LESS
             sphere_model._MAX_BOXES //= _LESS
-            covers.OF_OBJECTS = covers.Bound(*(most // _LESS for most in covers.OF_OBJECTS))
+            covers.OF_OBJECTS = covers.WorkBound(*(most // _LESS for most in covers.OF_OBJECTS))
         SphereChecker(self.spheres, self.group, Scene(self.model))
 
     def problems(self, number):

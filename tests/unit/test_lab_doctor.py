@@ -13,17 +13,17 @@ import pytest
 
 from lab_doctor.checks import Level, examine
 from lab_doctor.facts import (
-    Controller,
+    ControllerFacts,
     Facts,
-    Failure,
     Listener,
     Master,
-    MoveGroup,
+    MoveGroupFacts,
     OtherMaster,
     PythonFacts,
     Sensor,
     SetUp,
-    Topics,
+    SetupFailure,
+    TopicFacts,
 )
 from lab_doctor.probe import (
     answer_all,
@@ -45,7 +45,7 @@ HEALTHY_LAB = Facts(
     variables={"ROS_MASTER_URI": "http://localhost:11311", "ROS_HOSTNAME": "localhost", "ROS_IP": ""},
     addresses={"localhost": ("127.0.0.1", True)},
     master=Master(use_sim_time=True, publishers={"/clock": ["/gazebo"], "/robot/joint_states": ["/gazebo"]}),
-    topics=Topics(clock_messages=900, clock_advanced=True, robot_state=ENABLED),
+    topics=TopicFacts(clock_messages=900, clock_advanced=True, robot_state=ENABLED),
     is_built=True,
     is_fresh=True,
     python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "1.26.4"}, debian_numpy="1.24.2"),
@@ -57,13 +57,13 @@ ON_ROBOT = replace(
     variables={"ROS_MASTER_URI": "http://baxter.local:11311", "ROS_HOSTNAME": "", "ROS_IP": "10.0.0.7"},
     addresses={"baxter.local": ("10.0.0.2", False), "10.0.0.7": ("10.0.0.7", True)},
     master=Master(clock_offset_s=0.01, publishers={"/robot/joint_states": ["/realtime_loop"]}),
-    topics=Topics(robot_state=ENABLED),
+    topics=TopicFacts(robot_state=ENABLED),
 )
 
 
-PLANNING = MoveGroup(
+PLANNING = MoveGroupFacts(
     "/move_group", robot="baxter", groups={"left_arm": ["left_s0", "left_s1"], "all": ["left_s0", "left_s1"]},
-    controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], True)],
+    controllers=[ControllerFacts("left/follow_joint_trajectory", ["left_s0", "left_s1"], True)],
     joint_topic="/robot/joint_states", sensors=[Sensor("/points", ["/camera"], True)])
 
 
@@ -104,7 +104,7 @@ SICK = {
         replace(HEALTHY_LAB, is_fresh=False, set_up=SetUp("pip", is_running=False)), "build", "step 'pip'", "setup",
     ),
     "set-up failed": (
-        replace(HEALTHY_LAB, is_fresh=False, was_set_up=False, failure=Failure("pip", "the disk is full")),
+        replace(HEALTHY_LAB, is_fresh=False, was_set_up=False, failure=SetupFailure("pip", "the disk is full")),
         "build", "'pip': the disk is full", "setup",
     ),
     "set up in part": (
@@ -152,7 +152,8 @@ SICK = {
     ),
     "robot off": (replace(ON_ROBOT, master=None, topics=None), "master", "did not answer in time", "ping baxter.local"),
     "no clock": (
-        replace(HEALTHY_LAB, topics=Topics(robot_state=ENABLED)), "clock", "nothing arrives on /clock", "use_sim_time",
+        replace(HEALTHY_LAB, topics=TopicFacts(robot_state=ENABLED)), "clock", "nothing arrives on /clock",
+        "use_sim_time",
     ),
     "paused": (
         replace(HEALTHY_LAB, topics=replace(HEALTHY_LAB.topics, clock_advanced=False)), "clock", "paused", "unpause",
@@ -174,7 +175,7 @@ SICK = {
     "deaf node": (replace(HEALTHY_LAB, deaf_nodes=["/gazebo"]), "nodes", "/gazebo", "rosnode kill /gazebo"),
     "stopped": (with_state(stopped=True, enabled=False), "robot", "stopped", "-r"),
     "error": (with_state(error=True), "robot", "error", "-r"),
-    "silent robot": (replace(HEALTHY_LAB, topics=Topics(5, True)), "robot", "/robot/state", "roslaunch"),
+    "silent robot": (replace(HEALTHY_LAB, topics=TopicFacts(5, True)), "robot", "/robot/state", "roslaunch"),
     "move_group is hung": (
         planning(error="timeout"), "move_group", "does not answer: timeout", "rosnode ping /move_group",
     ),
@@ -183,8 +184,8 @@ SICK = {
         "controller_list of /move_group",
     ),
     "a controller that is not there": (
-        planning(controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], False,
-                                         "start its server: rosrun a b")]),
+        planning(controllers=[ControllerFacts("left/follow_joint_trajectory", ["left_s0", "left_s1"], False,
+                                              "start its server: rosrun a b")]),
         "move_group", "no controller serves left/follow_joint_trajectory", "rosrun a b",
     ),
     "joints without states": (
@@ -204,7 +205,7 @@ SICK = {
         "move_group", "nothing arrives on /points of /camera", "rostopic hz /points",
     ),
     "messages not built": (
-        replace(HEALTHY_LAB, topics=Topics(error="ImportError: baxter_core_msgs")),
+        replace(HEALTHY_LAB, topics=TopicFacts(error="ImportError: baxter_core_msgs")),
         "robot", "baxter_core_msgs", "setup",
     ),
 }
@@ -272,7 +273,7 @@ def test_a_simulator_that_does_not_answer_in_time_is_not_called_dead():
 
 
 def test_another_robot_needs_no_state_of_baxter():
-    facts = replace(planning(robot="probot_anno"), topics=Topics(900, True))
+    facts = replace(planning(robot="probot_anno"), topics=TopicFacts(900, True))
     assert [finding for finding in examine(facts) if finding.level is not Level.OK] == []
 
 
@@ -374,7 +375,7 @@ def test_a_set_up_that_runs_is_told_with_its_step_and_nothing_is_wrong():
 
 def test_what_needs_the_build_waits_for_the_set_up_that_makes_it():
     facts = replace(HEALTHY_LAB, set_up=SetUp("build", "", True, "6 of 9", 40),
-                    topics=Topics(error="ModuleNotFoundError: No module named 'rospy'"),
+                    topics=TopicFacts(error="ModuleNotFoundError: No module named 'rospy'"),
                     move_group=replace(PLANNING, error="ModuleNotFoundError: No module named 'rosgraph'"))
     found = {one.topic: one for one in examine(facts)}
     assert [one.topic for one in found.values() if one.level is Level.WRONG] == []

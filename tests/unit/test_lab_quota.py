@@ -12,7 +12,7 @@ import pytest
 import run_tests
 from lab_tests import quota
 from lab_tests.discovery import select, take_inventory
-from lab_tests.quota import Quota, QuotaError
+from lab_tests.quota import ProcessorQuota, QuotaError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -28,7 +28,7 @@ class FakeMount:
             (self.mount / name).write_text(text)
 
     def quota(self, percent):
-        return Quota(percent, self.mount, self.own)
+        return ProcessorQuota(percent, self.mount, self.own)
 
     def groups(self):
         return {str(path.parent.relative_to(self.mount)): {f.name: f.read_text() for f in path.parent.iterdir()}
@@ -69,7 +69,7 @@ def test_what_the_kernel_refuses_is_passed_on(tmp_path):
 @pytest.mark.parametrize("percent", [0, -5, float("nan"), 1e9])
 def test_impossible_shares_are_refused(percent):
     with pytest.raises(ValueError, match="between 1 and"):
-        Quota(percent)
+        ProcessorQuota(percent)
 
 
 def test_the_kernel_keeps_to_it():
@@ -77,9 +77,9 @@ def test_the_kernel_keeps_to_it():
     program = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-from lab_tests.quota import Quota, QuotaError
+from lab_tests.quota import ProcessorQuota, QuotaError
 try:
-    with Quota(20):
+    with ProcessorQuota(20):
         begin, used = time.monotonic(), time.process_time()
         while time.monotonic() - begin < 2.0:
             pass

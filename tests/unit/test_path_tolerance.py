@@ -13,14 +13,15 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import xacro
 from baxter_interface import parameter_tables
 from baxter_model import joint_names
-from joint_trajectory import Command, Outcome
-from joint_trajectory_action.arm_motion import ArmMotion, GoalDefaults, Mode
+from joint_trajectory import GoalOutcome, TrajectoryCommand
+from joint_trajectory_action.arm_motion import ArmMotion, CommandMode, GoalDefaults
 from urdf_model import parse_urdf
 
 HARDWARE = Path(rospkg.RosPack().get_path("baxter_sim_hardware"))
 NAMES = list(joint_names("left"))
 START = np.tile([0.0, -0.1, 0.0, 0.6, 0.0, 0.6, 0.0], 2)
-TABLES = {Mode.POSITION: parameter_tables.POSITION, Mode.POSITION_WITH_DYNAMICS: parameter_tables.POSITION_FF}
+TABLES = {CommandMode.POSITION: parameter_tables.POSITION,
+          CommandMode.POSITION_WITH_DYNAMICS: parameter_tables.POSITION_FF}
 PERIOD_S = 0.01
 
 
@@ -54,8 +55,8 @@ def follow(lab, mode, fastest, way=-0.9):
         points.append((float(time), position.tolist(), velocity.tolist(), []))
     lab.run(0.2)
     begin = lab.world.time_s
-    motion.begin(Command(NAMES, points, None), 0.0, lab.position[:7], "goal", settings)
-    raw = mode is Mode.POSITION_WITH_DYNAMICS
+    motion.begin(TrajectoryCommand(NAMES, points, None), 0.0, lab.position[:7], "goal", settings)
+    raw = mode is CommandMode.POSITION_WITH_DYNAMICS
     while motion.goal is not None:
         now = lab.world.time_s - begin
         assert now < duration + 3.0
@@ -72,12 +73,12 @@ def follow(lab, mode, fastest, way=-0.9):
 
 def test_position_mode_aborts_a_fast_shoulder(lab):
     """By the 0.2 rad that the vendor's server allows, as users of physical robots complain."""
-    verdict = follow(lab, Mode.POSITION, 1.1)
-    assert verdict.outcome is Outcome.PATH_TOLERANCE_VIOLATED and "left_s1" in verdict.text
+    verdict = follow(lab, CommandMode.POSITION, 1.1)
+    assert verdict.outcome is GoalOutcome.PATH_TOLERANCE_VIOLATED and "left_s1" in verdict.text
 
 
-@pytest.mark.parametrize("mode, fastest", [(Mode.POSITION, 0.35), (Mode.POSITION_WITH_DYNAMICS, 1.1)])
+@pytest.mark.parametrize("mode, fastest", [(CommandMode.POSITION, 0.35), (CommandMode.POSITION_WITH_DYNAMICS, 1.1)])
 def test_a_slow_shoulder_and_one_whose_velocities_are_fed_forward_arrive(lab, mode, fastest):
     verdict = follow(lab, mode, fastest)
-    assert verdict.outcome is Outcome.SUCCEEDED, verdict.text
+    assert verdict.outcome is GoalOutcome.SUCCEEDED, verdict.text
     assert abs(lab.position[1] - (START[1] - 0.9)) < 0.25

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""No module is imported for a side effect, no function has too many parameters, no docstring asks a question."""
+"""No module is imported for a side effect, no function has too many parameters, no docstring asks a question, no two
+classes have one name."""
 
 import ast
 import re
@@ -27,6 +28,29 @@ def test_no_module_is_imported_for_its_side_effects():
 def test_bounds_are_called_max_and_min():
     bounds = re.compile(r"(?<![A-Z])(?:MOST|LEAST)_[A-Z]")
     assert [name for name, text in product_code() if bounds.search(text)] == []
+
+
+def classes_by_name(files):
+    """{name: [folder, ...]} of the public classes at the top of files [(path, text)]."""
+    found = {}
+    for name, text in files:
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(Path(name).parent.name)
+    return found
+
+
+def test_public_classes_have_names_of_their_own():
+    rows = re.findall(r"^\| ((?:`[A-Z]\w+`(?:, )?)+) \| ((?:`\w+`(?:, )?)+) \|",
+                      (ROOT / "docs/architecture.md").read_text(encoding="utf-8"), re.MULTILINE)
+    listed = {one: sorted(re.findall(r"\w+", folders)) for names, folders in rows for one in re.findall(r"\w+", names)}
+    shared = {one: sorted(folders) for one, folders in classes_by_name(product_code()).items() if len(folders) > 1}
+    assert shared == listed
+
+
+def test_classes_of_one_name_are_noticed():
+    files = [("a/b.py", "class A: pass\nclass _B: pass"), ("c/d.py", "class A: pass")]
+    assert classes_by_name(files) == {"A": ["a", "c"]}
 
 
 def riddles(name, text):

@@ -14,8 +14,8 @@ from bullet_sim.mesh_loading import load_scene
 from model_files.resources import ResourceFinder
 from sensor_renderer import triangles
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.light import Light
-from sensor_renderer.mirror import Body, Mirror
+from sensor_renderer.light import SceneLight
+from sensor_renderer.mirror import DrawnModel, Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model import Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import inverse, pose_matrix
@@ -84,7 +84,7 @@ class Alone:
     """A world of the same bodies for ever, for the renderer."""
 
     bodies: dict
-    light: Light
+    light: SceneLight
     version: int = 0
 
 
@@ -172,7 +172,7 @@ def whole_robot(robot, number):
 
 def link_alone(robot, name, parts, full, number, only=None):
     """The result of `compared` for ``number`` views of a link, or ``only`` of those numbers."""
-    alone = Alone({"link": Body([(name, parts)], [])}, robot.mirror.light)
+    alone = Alone({"link": DrawnModel([(name, parts)], [])}, robot.mirror.light)
     low, high = full.min(axis=(0, 1)), full.max(axis=(0, 1))
     away = np.linalg.norm(high - low)
     poses = views(np.random.default_rng(2), number, (low + high) / 2.0, 1.1 * away, 1.6 * away)

@@ -35,7 +35,7 @@ def bring_up(path, model_folders, seconds):
     from bullet_sim import World
     from gazebo_ros.plugin_table import PluginTable
     from gazebo_ros.simulation import Simulation
-    from gazebo_ros.spawning import Library, Spawner
+    from gazebo_ros.spawning import Spawner, SpawnLookups
     from gazebo_ros.world_file import read_world
     from loop_ros.request_queue import RequestQueue
     from loop_ros.testing import FakeFaults, FakeLog, FakeRos
@@ -50,7 +50,7 @@ def bring_up(path, model_folders, seconds):
     finder = ResourceFinder(packages)
     world = World(time_step_s=read.time_step_s, gravity=read.gravity, find_mesh=finder, warn=log.warn, error=log.error)
     simulation = Simulation(world, RequestQueue(), log, faults)
-    spawner = Spawner(simulation, Library(table, finder, folders), FakeRos(), log, lambda: None)
+    spawner = Spawner(simulation, SpawnLookups(table, finder, folders), FakeRos(), log, lambda: None)
     spawner.spawn_world(read.models)
     check = CHECKS.get(path.name)
     seconds = seconds if check is None else check.seconds

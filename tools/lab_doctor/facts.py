@@ -19,7 +19,7 @@ class Master:
 
 
 @dataclass(frozen=True)
-class Topics:
+class TopicFacts:
     """Messages on the robot's topics while we listened."""
 
     clock_messages: int = 0
@@ -31,7 +31,7 @@ class Topics:
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControllerFacts:
     """An entry of move_group's controller_list: its action, its joints, whether the action has a server, and what would
     help where it has none."""
 
@@ -51,7 +51,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class MoveGroup:
+class MoveGroupFacts:
     """Facts from a running move_group and its parameters. error: why it did not answer, empty if it did."""
 
     node: str
@@ -59,7 +59,7 @@ class MoveGroup:
     robot: str = ""
     executes: bool = True  # ~allow_trajectory_execution
     groups: dict[str, list[str]] = field(default_factory=dict)  # joints that move, without those that mimic others
-    controllers: list[Controller] = field(default_factory=list)
+    controllers: list[ControllerFacts] = field(default_factory=list)
     joint_topic: str = ""
     silent_joints: list[str] = field(default_factory=list)  # the robot's joints that no message on joint_topic has
     joints_out_of_bounds: list[str] = field(default_factory=list)  # sentences
@@ -93,7 +93,7 @@ class SetUp:
 
 
 @dataclass(frozen=True)
-class Failure:
+class SetupFailure:
     """The error that ended the last set-up, and the step in which it did."""
 
     step: str
@@ -125,14 +125,14 @@ class Facts:
     # host name or address -> (resolved address or None, whether that address belongs to this machine)
     addresses: dict[str, tuple[str | None, bool]] = field(default_factory=dict)
     master: Master | None = None
-    topics: Topics | None = None
-    move_group: MoveGroup | None = None  # also None if no move_group runs
+    topics: TopicFacts | None = None
+    move_group: MoveGroupFacts | None = None  # also None if no move_group runs
     is_built: bool = False
     own_packages: list[str] = field(default_factory=list)  # sentences about their package.xml
     is_fresh: bool | None = None
     set_up: SetUp | None = None  # None: the last one ended, or there was none
     was_set_up: bool = True  # whether a set-up has been completed
-    failure: Failure | None = None
+    failure: SetupFailure | None = None
     python: PythonFacts | None = None
     # Path of `python3` outside the lab's environment, if it is not the system's.
     users_python: str = ""

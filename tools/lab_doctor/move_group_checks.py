@@ -3,7 +3,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from lab_doctor.facts import MoveGroup
+from lab_doctor.facts import MoveGroupFacts
 from lab_doctor.findings import Finding, Level
 
 TOPIC = "move_group"
@@ -11,7 +11,7 @@ TOPIC = "move_group"
 SHOWN = 6
 
 
-def examine(move_group: MoveGroup) -> list[Finding]:
+def examine(move_group: MoveGroupFacts) -> list[Finding]:
     if move_group.error:
         what = f"{move_group.node} does not answer: {move_group.error}"
         return [Finding(TOPIC, Level.WRONG, what, f"rosnode ping {move_group.node}; restart it if it does not answer")]
@@ -24,7 +24,7 @@ def examine(move_group: MoveGroup) -> list[Finding]:
     return [Finding(TOPIC, Level.OK, what)]
 
 
-def _controllers(move_group: MoveGroup) -> Iterator[Finding]:
+def _controllers(move_group: MoveGroupFacts) -> Iterator[Finding]:
     if not move_group.executes:
         yield Finding(TOPIC, Level.NOTE, f"{move_group.node} only plans: allow_trajectory_execution is false",
                       "roslaunch its move_group.launch with allow_trajectory_execution:=true")
@@ -45,7 +45,7 @@ def _controllers(move_group: MoveGroup) -> Iterator[Finding]:
                       f"enter the joints in controller_list of {move_group.node}")
 
 
-def _joint_states(move_group: MoveGroup) -> Iterator[Finding]:
+def _joint_states(move_group: MoveGroupFacts) -> Iterator[Finding]:
     silent = move_group.silent_joints
     if silent:
         what = f"no message on {move_group.joint_topic} has {_listed(silent)}: the robot's posture is unknown"
@@ -53,7 +53,7 @@ def _joint_states(move_group: MoveGroup) -> Iterator[Finding]:
         yield Finding(TOPIC, Level.WRONG, what, fix)
 
 
-def _start_state(move_group: MoveGroup) -> Iterator[Finding]:
+def _start_state(move_group: MoveGroupFacts) -> Iterator[Finding]:
     for sentence in move_group.joints_out_of_bounds:
         what = f"no plan can start here: {sentence}"
         yield Finding(TOPIC, Level.WRONG, what, "move the joint back by hand or by a program")
@@ -65,7 +65,7 @@ def _start_state(move_group: MoveGroup) -> Iterator[Finding]:
         yield Finding(TOPIC, Level.WRONG, what, fix)
 
 
-def _octomap(move_group: MoveGroup) -> Iterator[Finding]:
+def _octomap(move_group: MoveGroupFacts) -> Iterator[Finding]:
     for sensor in move_group.sensors:
         if not sensor.publishers:
             yield Finding(TOPIC, Level.WRONG, f"the octomap gets no data: no node publishes {sensor.topic}",

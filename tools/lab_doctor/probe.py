@@ -20,17 +20,17 @@ import master_calls
 import own_manifests
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import (
-    Controller,
+    ControllerFacts,
     Facts,
-    Failure,
     Listener,
     Master,
-    MoveGroup,
+    MoveGroupFacts,
     OtherMaster,
     PythonFacts,
     Sensor,
     SetUp,
-    Topics,
+    SetupFailure,
+    TopicFacts,
 )
 
 DEADLINE_S = 15.0
@@ -276,7 +276,7 @@ def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
     return None
 
 
-def listen(root: Path, uri: str) -> Topics:
+def listen(root: Path, uri: str) -> TopicFacts:
     """Messages on /clock and /robot/state within two seconds, received by a process with ROS.
 
     Raises OSError without a master: rospy would wait for one.
@@ -286,11 +286,11 @@ def listen(root: Path, uri: str) -> Topics:
     command = [shutil.which("python3") or "python3", str(script)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
     if done.returncode != 0:
-        return Topics(error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
-    return Topics(**json.loads(done.stdout.splitlines()[-1]))
+        return TopicFacts(error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
+    return TopicFacts(**json.loads(done.stdout.splitlines()[-1]))
 
 
-def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
+def ask_move_group(root: Path, uri: str) -> MoveGroupFacts | None:
     """Facts from a move_group, gathered by a process that has ROS; None if none runs. Raises TimeoutError, OSError."""
     services = dict(master_calls.proxy(uri, CALL_TIMEOUT_S).getSystemState(CALLER_ID)[2][2])
     name, nodes = next(((name, nodes) for name, nodes in sorted(services.items()) if name.endswith("/" + SCENE_SERVICE)
@@ -301,10 +301,10 @@ def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
     command = [shutil.which("python3") or "python3", str(script), nodes[0], name[:-len(SCENE_SERVICE)]]
     done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
     if done.returncode != 0:
-        return MoveGroup(nodes[0], error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
+        return MoveGroupFacts(nodes[0], error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
     answer = json.loads(done.stdout.splitlines()[-1])
-    return MoveGroup(**{**answer, "controllers": [Controller(**one) for one in answer["controllers"]],
-                        "sensors": [Sensor(**one) for one in answer["sensors"]]})
+    return MoveGroupFacts(**{**answer, "controllers": [ControllerFacts(**one) for one in answer["controllers"]],
+                             "sensors": [Sensor(**one) for one in answer["sensors"]]})
 
 
 def own_packages(root: Path) -> list[str]:
@@ -346,12 +346,12 @@ def _progress(file: Path) -> tuple[str, int, str]:
         return "", 0, ""
 
 
-def last_failure(root: Path) -> Failure | None:
+def last_failure(root: Path) -> SetupFailure | None:
     try:
         step, _, cause = (root / ".baxter" / "failure").read_text(errors="replace").strip().partition("\t")
     except OSError:
         return None
-    return Failure(step, cause)
+    return SetupFailure(step, cause)
 
 
 def _last_line(log: Path) -> str:

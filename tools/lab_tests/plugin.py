@@ -44,8 +44,8 @@ MIN_DURATION_S = 2.0
 MAX_NAMED = 20
 # Examples of a test by Hypothesis that names no number: everywhere, and with --long.
 QUICK_EXAMPLES, DEEP_EXAMPLES = 50, 500
-#: The Worker of a process that collects and runs tests.
-WORKER: pytest.StashKey[Worker] = pytest.StashKey()
+#: The RunWorker of a process that collects and runs tests.
+WORKER: pytest.StashKey[RunWorker] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -66,10 +66,10 @@ def work_folder(config: pytest.Config) -> Path:
 def pytest_configure(config: pytest.Config) -> None:
     is_worker = hasattr(config, "workerinput")
     if not is_worker:
-        config.pluginmanager.register(Controller(config), "lab controller")
+        config.pluginmanager.register(RunController(config), "lab controller")
     # A few files run in this process itself.
     if is_worker or not config.option.numprocesses:
-        worker = Worker(config)
+        worker = RunWorker(config)
         config.pluginmanager.register(worker, "lab worker")
         config.stash[WORKER] = worker
         if not worker.is_extra:
@@ -204,7 +204,7 @@ def _tell(config, name: str, value):
         config.pluginmanager.get_plugin("lab controller").take({name: value})
 
 
-class Worker:
+class RunWorker:
     """In each worker: the locale, the lock on the machine, and what each test took."""
 
     def __init__(self, config: pytest.Config) -> None:
@@ -273,7 +273,7 @@ def _processor_s() -> float:
     return sum(one.ru_utime + one.ru_stime for one in both)
 
 
-class Controller:
+class RunController:
     """In the process that the user started: which worker runs what, the counts, the last line."""
 
     def __init__(self, config: pytest.Config) -> None:

@@ -19,7 +19,7 @@ class QuotaError(Exception):
     """A control group with a quota cannot be made here; the text says why."""
 
 
-class Quota:
+class ProcessorQuota:
     """Context manager: inside, this process and its children get ``percent`` of one core together."""
 
     def __init__(self, percent: float, mount: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")):

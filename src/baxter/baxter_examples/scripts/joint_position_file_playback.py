@@ -17,7 +17,7 @@ RATE_HZ = 1000.0
 GRIPPER_STEP_PERCENT = 1.0
 
 
-class Player:
+class PositionPlayer:
     """Sends a recording's values to its arms and grippers."""
 
     def __init__(self, record: recording.Recording) -> None:
@@ -47,7 +47,7 @@ class Player:
 def play(path: str, loops: int) -> None:
     record = recording.read(path)
     with EnabledRobot() as robot:
-        player = Player(record)
+        player = PositionPlayer(record)
         done = 0
         while loops < 1 or done < loops:
             done += 1

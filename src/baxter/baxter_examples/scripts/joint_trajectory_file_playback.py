@@ -31,7 +31,7 @@ def lead_in_s(here: dict[str, float], row: dict[str, float]) -> float:
         for name in here))
 
 
-class Player:
+class TrajectoryPlayer:
     """One recording, on the arms and grippers that it has."""
 
     def __init__(self, record: recording.Recording) -> None:
@@ -80,7 +80,7 @@ class Player:
 def play(path: str, loops: int) -> None:
     record = recording.read(path)
     with EnabledRobot() as robot:
-        player = Player(record)
+        player = TrajectoryPlayer(record)
         done = 0
         while (loops == 0 or done < loops) and not rospy.is_shutdown():
             done += 1

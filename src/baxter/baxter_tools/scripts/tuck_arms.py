@@ -9,7 +9,7 @@ import rospy
 
 from baxter_interface import Head
 from baxter_interface.programs import EnabledRobot, ProgramFailed, run
-from baxter_tools.tucking import Arms, Tucking, own_collision_avoidance
+from baxter_tools.tucking import BothArms, Tucking, own_collision_avoidance
 
 HEAD_SPEED = 0.5
 
@@ -32,7 +32,7 @@ def look_ahead() -> None:
 
 
 def fold(pose: str) -> None:
-    arms = Arms()
+    arms = BothArms()
     tucking = Tucking(arms.names)
     with own_collision_avoidance() as too_near, EnabledRobot() as robot:
         look_ahead()

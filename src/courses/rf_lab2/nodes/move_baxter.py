@@ -14,7 +14,7 @@ from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import BASE_FRAME, SIDES
 from command_line.options import number
 from rf_lab2.poses import pose_difference, unit_quaternion
-from rf_lab2.programs import ProgramFailed, run
+from rf_lab2.programs import LabProgramFailed, run
 
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
@@ -43,17 +43,18 @@ def parse_arguments(argv):
 
 
 def move_to_neutral(limbs):
-    """Move all limbs at the same time. Raises ProgramFailed."""
+    """Move all limbs at the same time. Raises LabProgramFailed."""
     with ThreadPoolExecutor(len(limbs)) as pool:
         arrived = list(pool.map(Limb.move_to_neutral, limbs))
     if not all(arrived):
-        raise ProgramFailed("not every arm reached neutral; the lines above say why")
+        raise LabProgramFailed("not every arm reached neutral; the lines above say why")
 
 
 def solve_ik(arm, point, quaternion):
     """Ask the robot for joint angles (dict of name to rad) that put the gripper of `arm` at a pose in `base`.
 
-    Raises ProgramFailed if there are none, rospy.ServiceException or rospy.ROSException if the service does not answer.
+    Raises LabProgramFailed if there are none, rospy.ServiceException or rospy.ROSException if the service does not
+    answer.
     """
     name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % arm
     rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
@@ -61,8 +62,8 @@ def solve_ik(arm, point, quaternion):
                        pose=Pose(position=Point(*point), orientation=Quaternion(*quaternion)))
     response = rospy.ServiceProxy(name, SolvePositionIK)(SolvePositionIKRequest(pose_stamp=[pose]))
     if not response.isValid or not response.isValid[0]:
-        raise ProgramFailed("no joint angles put the %s gripper at %s, quaternion %s; rostopic echo -n 1 %s says why"
-                            % (arm, list(point), list(quaternion), name.replace("IKService", "IKReport")))
+        raise LabProgramFailed("no joint angles put the %s gripper at %s, quaternion %s; rostopic echo -n 1 %s says why"
+                               % (arm, list(point), list(quaternion), name.replace("IKService", "IKReport")))
     return dict(zip(response.joints[0].name, response.joints[0].position, strict=True))
 
 
@@ -77,7 +78,7 @@ def move_baxter(arm, point, quaternion):
     print(angles, flush=True)
     rospy.loginfo("moving the %s arm to the pose", arm)
     if not limbs[arm].move_to_joint_positions(angles):
-        raise ProgramFailed("the %s arm did not get to the pose; the line above says why" % arm)
+        raise LabProgramFailed("the %s arm did not get to the pose; the line above says why" % arm)
     reached = limbs[arm].endpoint_pose()
     rospy.loginfo("the %s gripper is %.1f mm and %.4f rad from the pose", arm,
                   *scaled_difference(reached, point, quaternion))

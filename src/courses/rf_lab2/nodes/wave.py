@@ -10,7 +10,7 @@ import rospy
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from baxter_model import SIDES
 from command_line.options import number
-from rf_lab2.programs import ProgramFailed, run
+from rf_lab2.programs import LabProgramFailed, run
 from rf_lab2.waving import Swing, hands_up, shifts
 
 POINTS = 24
@@ -47,7 +47,7 @@ def wave(arguments):
     with ThreadPoolExecutor(len(limbs)) as pool:
         arrived = list(pool.map(lambda limb: limb.move_to_joint_positions(hands_up(limb.name)), limbs))
     if not all(arrived):
-        raise ProgramFailed("not every arm got up; the lines above say why")
+        raise LabProgramFailed("not every arm got up; the lines above say why")
     plans = [plan(limb, arguments) for limb in limbs]
     rospy.loginfo("waving for %g s", arguments.seconds)
     rate, begin_s, elapsed_s = rospy.Rate(RATE_HZ, reset=True), rospy.get_time(), 0.0

@@ -109,7 +109,7 @@ class Topics(Protocol):
         """Close all of them."""
 
 
-class Faults(Protocol):
+class FaultCounter(Protocol):
     """Errors that the loop survives, counted by place."""
 
     def note(self, place: str, error: BaseException, consequence: str = "") -> None:
@@ -121,7 +121,7 @@ class LoopRos(Protocol):
     ``loop_ros.names.IllegalName``."""
 
     @property
-    def faults(self) -> Faults:
+    def faults(self) -> FaultCounter:
         """Errors that the loop survives."""
         ...
 

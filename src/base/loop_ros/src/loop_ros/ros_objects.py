@@ -20,8 +20,8 @@ from loop_ros.names import checked_name
 from loop_ros.protocol import Log
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.request_queue import LoopEnded, RequestQueue
-from loop_ros.subscriber import Connection, SubscriberHub
-from loop_ros.subscription import Subscription
+from loop_ros.subscriber import PublisherConnection, SubscriberHub
+from loop_ros.subscription import MessageQueue
 from rospy_fixes.ports.messages import largest_message_bytes
 
 
@@ -50,7 +50,7 @@ class RosObjects:
         #: Public: other parts count their errors here too.
         self.faults = faults
         self._jobs: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
-        self._subscriptions: dict[str, list[Subscription]] = {}
+        self._subscriptions: dict[str, list[MessageQueue]] = {}
         self._delivered_before: dict[str, int] = {}
         self._services: dict[str, _Service] = {}
         threading.Thread(target=self._work, name="ros_registrar", daemon=True).start()
@@ -81,10 +81,10 @@ class RosObjects:
         return publisher
 
     def subscription(self, topic: str, msg_class: type, depth: int = 1,
-                     notice: Callable[[], object] = lambda: None) -> Subscription:
-        """A :class:`Subscription` to ``topic``; ``notice()`` is called after each message, in any thread."""
+                     notice: Callable[[], object] = lambda: None) -> MessageQueue:
+        """A :class:`MessageQueue` to ``topic``; ``notice()`` is called after each message, in any thread."""
         topic = remapped(topic)
-        subscription = Subscription(depth, notice, self._counting(topic))
+        subscription = MessageQueue(depth, notice, self._counting(topic))
         self._subscriptions[topic] = [*self._subscriptions.get(topic, ()), subscription]
         registered = []
 
@@ -181,7 +181,7 @@ class RosObjects:
     def _counting(self, topic: str) -> Callable[[BaseException], None]:
         return lambda error: self.faults.note(topic, error, "the message is dropped")
 
-    def _forget(self, topic: str, subscription: Subscription) -> None:
+    def _forget(self, topic: str, subscription: MessageQueue) -> None:
         self._delivered_before[topic] = self._delivered_before.get(topic, 0) + subscription.delivered
         left = [other for other in self._subscriptions.get(topic, ()) if other is not subscription]
         if left:
@@ -262,7 +262,8 @@ def _receive(transport: Any, impl: Any, subscribers: SubscriberHub, log: Log, fa
 
     try:
         # The publisher may have sent its first, latched message together with the header.
-        connection = Connection(transport.socket, deliver, largest_message_bytes(), held=transport.read_buff.getvalue())
+        connection = PublisherConnection(transport.socket, deliver, largest_message_bytes(),
+                                         held=transport.read_buff.getvalue())
     except (AttributeError, OSError):  # it has been closed already
         transport.close()
         return

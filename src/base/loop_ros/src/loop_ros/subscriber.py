@@ -51,7 +51,7 @@ _poll.restype = ctypes.c_int
 _EMPTY = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 
 
-class Connection:
+class PublisherConnection:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
     def __init__(self, connected: socket.socket, deliver: Callable[[bytes], object], largest_bytes: int,
@@ -129,15 +129,15 @@ class SubscriberHub:
         """No connections yet. ``clock`` is replaceable for tests."""
         self.reads = 0
         self._clock = clock
-        self._new: collections.deque[Connection] = collections.deque()
+        self._new: collections.deque[PublisherConnection] = collections.deque()
         self._closed = False
-        self._connections: list[Connection] = []
+        self._connections: list[PublisherConnection] = []
         self._entries: Any = ()  # a ctypes array of _PollEntry, one for each connection
         self._looked_at = -LOOK_PERIOD_S
         self._buffer = (ctypes.c_char * LARGEST_PORTION_BYTES)()
 
-    def add(self, connection: Connection) -> None:
-        """Any thread: add a :class:`Connection`, to be read from the next turn on."""
+    def add(self, connection: PublisherConnection) -> None:
+        """Any thread: add a :class:`PublisherConnection`, to be read from the next turn on."""
         self._new.append(connection)
         if self._closed:
             connection.end()
@@ -180,13 +180,13 @@ class SubscriberHub:
                 connections = [*connections, connection]
         self._follow(connections)
 
-    def _follow(self, connections: list[Connection]) -> None:
+    def _follow(self, connections: list[PublisherConnection]) -> None:
         self._connections = connections
         self._entries = (_PollEntry * len(connections))(
             *(_PollEntry(connection.fileno(), select.POLLIN, 0) for connection in connections))
 
 
-def _survive(connection: Connection, function: Callable[..., Any], *arguments: Any) -> Any:
+def _survive(connection: PublisherConnection, function: Callable[..., Any], *arguments: Any) -> Any:
     """The result of ``function(*arguments)``. An error that nobody foresaw, such as no memory for a message, ends this
     connection: those behind it must be read."""
     try:

@@ -13,7 +13,7 @@ def _raise(error: BaseException) -> NoReturn:
     raise error
 
 
-class Subscription:
+class MessageQueue:
     """Unread messages of a topic: any thread puts them in, the loop takes them out.
 
     Keeps the newest ``depth`` messages.

@@ -13,7 +13,7 @@ from typing import Any
 from loop_ros.faults import Faults
 from loop_ros.names import checked_name
 from loop_ros.ros_objects import answering
-from loop_ros.subscription import Subscription
+from loop_ros.subscription import MessageQueue
 
 
 class FakeLog:
@@ -90,9 +90,9 @@ class FakeRos:
         return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
 
     def subscription(self, topic: str, msg_class: type, depth: int = 1,
-                     notice: Callable[[], object] = lambda: None) -> Subscription:
+                     notice: Callable[[], object] = lambda: None) -> MessageQueue:
         _check(topic)
-        subscription = Subscription(depth, notice, self._counting(topic))
+        subscription = MessageQueue(depth, notice, self._counting(topic))
         subscribed = self.subscriptions.setdefault(topic, FakeTopic(msg_class))
         subscribed.all.append(subscription)
 
@@ -241,7 +241,7 @@ class FakeTopic:
 
     def __init__(self, msg_class: type) -> None:
         self.msg_class = msg_class
-        self.all: list[Subscription] = []
+        self.all: list[MessageQueue] = []
 
     def put(self, message: Any) -> None:
         for subscription in list(self.all):

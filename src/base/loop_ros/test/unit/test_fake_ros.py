@@ -31,7 +31,7 @@ from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.reconfigure import Setting, SettingsServer
 from loop_ros.request_queue import RequestQueue
 from loop_ros.subscriber import SubscriberHub
-from loop_ros.subscription import Subscription
+from loop_ros.subscription import MessageQueue
 from loop_ros.testing import FakeFaults, FakeLog, FakePublisher, FakeRos
 
 TOPIC, SERVICE = "/topic", "/service"
@@ -184,14 +184,14 @@ def methods_of(owner):
 @pytest.mark.parametrize(("declared", "made"), [
     (protocol.LoopRos, ros_objects.RosObjects), (protocol.LoopRos, FakeRos), (protocol.Log, LoopLog),
     (protocol.Log, FakeLog), (protocol.Topics, NodeHandle), (protocol.Publisher, LoopPublisher),
-    (protocol.Publisher, FakePublisher), (protocol.Subscription, Subscription),
-    (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
+    (protocol.Publisher, FakePublisher), (protocol.Subscription, MessageQueue),
+    (protocol.FaultCounter, Faults), (protocol.FaultCounter, FakeFaults),
 ])
 def test_both_have_the_declared_methods(declared, made):
     assert methods_of(declared)
     for method in methods_of(declared):
         found, wanted = parameters_of(made, method), parameters_of(declared, method)
-        if declared is protocol.Faults:  # each has its own wording
+        if declared is protocol.FaultCounter:  # each has its own wording
             found, wanted = [name for name, _ in found], [name for name, _ in wanted]
         assert found == wanted, method
 

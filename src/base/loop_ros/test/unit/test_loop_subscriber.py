@@ -9,7 +9,7 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from loop_ros import subscriber as subscribing
-from loop_ros.subscriber import Connection, SubscriberHub
+from loop_ros.subscriber import PublisherConnection, SubscriberHub
 
 LARGEST_BYTES = 10_000_000
 
@@ -32,7 +32,7 @@ class Line:
             self.far = socket.create_connection(server.getsockname())
             self.near, _ = server.accept()
         self.got = []
-        self.connection = Connection(self.near, self.got.append, LARGEST_BYTES)
+        self.connection = PublisherConnection(self.near, self.got.append, LARGEST_BYTES)
         hub.add(self.connection)
 
     def close(self):
@@ -191,7 +191,7 @@ def test_an_error_that_nobody_foresaw_ends_its_connection_and_no_other(hub, line
         raise MemoryError("no room for %d bytes" % len(data))
 
     first, second = Line(hub), Line(hub)
-    evil = Connection(line.near, fail, LARGEST_BYTES, held)
+    evil = PublisherConnection(line.near, fail, LARGEST_BYTES, held)
     hub.add(evil)
     line.connection.end()
     line.far.sendall(framed(b"later"))

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import pytest
 
 from loop_ros.node_handle import NodeHandle
-from loop_ros.subscription import Subscription
+from loop_ros.subscription import MessageQueue
 
 
 def test_without_a_depth_only_the_newest_message_counts():
-    commands = Subscription()
+    commands = MessageQueue()
     assert commands.take() is None
     commands.put("first")
     commands.put("second")
@@ -19,7 +19,7 @@ def test_without_a_depth_only_the_newest_message_counts():
 
 
 def test_the_newest_messages_are_kept_in_order():
-    commands = Subscription(3)
+    commands = MessageQueue(3)
     for number in range(5):
         commands.put(number)
     assert commands.drain() == [2, 3, 4]
@@ -31,7 +31,7 @@ def test_the_newest_messages_are_kept_in_order():
 
 def test_an_owner_is_told_once_which_of_its_subscriptions_have_messages():
     handle = NodeHandle(SimpleNamespace(
-        subscription=lambda topic, msg_class, depth, notice: Subscription(depth, notice)), "/robot")
+        subscription=lambda topic, msg_class, depth, notice: MessageQueue(depth, notice)), "/robot")
     first, second = handle.subscription("first", None, 10), handle.subscription("second", None)
     assert not handle.pending()
     second.put("a")
@@ -48,14 +48,14 @@ def test_an_owner_is_told_once_which_of_its_subscriptions_have_messages():
 
 def test_what_counts_as_delivered_has_been_announced():
     seen = []
-    commands = Subscription(3, lambda: seen.append((commands.delivered, list(commands._unread))))
+    commands = MessageQueue(3, lambda: seen.append((commands.delivered, list(commands._unread))))
     commands.put("a")
     assert seen == [(0, ["a"])] and commands.delivered == 1
 
 
 @pytest.mark.parametrize("depth", [1, 3])
 def test_the_end_of_a_subscription_is_told_once_and_drops_what_is_unread(depth):
-    ends, got, commands = [], [], Subscription(depth)
+    ends, got, commands = [], [], MessageQueue(depth)
     commands.on_close = lambda: ends.append(depth)
     commands.put("a")
     commands.close()
@@ -66,7 +66,7 @@ def test_the_end_of_a_subscription_is_told_once_and_drops_what_is_unread(depth):
 
 def test_a_depth_of_nothing_is_refused():
     with pytest.raises(ValueError, match="at least 1"):
-        Subscription(0)
+        MessageQueue(0)
 
 
 def test_a_message_that_cannot_be_digested_is_dropped_and_the_next_one_counts():
@@ -79,14 +79,14 @@ def test_a_message_that_cannot_be_digested_is_dropped_and_the_next_one_counts():
             raise SystemExit(1)
         got.append(message)
 
-    commands = Subscription(5, on_fault=faults.append)
+    commands = MessageQueue(5, on_fault=faults.append)
     commands.handle(take)
     for message in ("first", "bad", "worse", "last"):
         commands.put(message)
     commands.handle(take)
     assert got == ["first", "last"] and [type(fault) for fault in faults] == [RecursionError, SystemExit]
     # Without on_fault they are raised.
-    commands = Subscription()
+    commands = MessageQueue()
     commands.put("bad")
     with pytest.raises(RecursionError):
         commands.handle(take)

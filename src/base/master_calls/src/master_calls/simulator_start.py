@@ -39,7 +39,7 @@ class StartWatch:
     def look(self) -> list[str]:
         """Return the names of starting processes and nodes; raises SimulatorDied if one of them has ended."""
         try:
-            graph = Graph(self._uri, self._caller)
+            graph = MasterGraph(self._uri, self._caller)
         except master_calls.NO_ANSWER as error:
             if self._is_known:
                 raise SimulatorDied("the simulator ended while it was waited for: the ROS master at %s is gone (%s). "
@@ -57,7 +57,7 @@ class StartWatch:
         return names
 
 
-def starting(graph: Graph) -> list[str]:
+def starting(graph: MasterGraph) -> list[str]:
     """The names of the processes and nodes that are starting, sorted."""
     names = {name for name in graph.processes() if name not in graph.nodes and _is_of_a_start(name)}
     if SIMULATOR in graph.nodes and not graph.published.get(CLOCK) and graph.is_alive(SIMULATOR):
@@ -70,7 +70,7 @@ def _is_of_a_start(process: str) -> bool:
     return process == SIMULATOR or "spawn" in process
 
 
-class Graph:
+class MasterGraph:
     """The state of the master at one moment. Attributes: `published` {topic: [node]}, `nodes` {node}."""
 
     def __init__(self, uri: str, caller: str) -> None:

@@ -3,7 +3,7 @@
 
 from .document import SdfError
 from .folders import ModelFolders, description_file
-from .lights import Light, Scene, parse_light
+from .lights import Light, SceneLook, parse_light
 from .model import SdfModel, parse_sdf_model
 from .urdf_joints import add_loops
 from .world import SdfWorld, parse_sdf_world
@@ -11,7 +11,7 @@ from .world import SdfWorld, parse_sdf_world
 __all__ = [
     "Light",
     "ModelFolders",
-    "Scene",
+    "SceneLook",
     "SdfError",
     "SdfModel",
     "SdfWorld",

@@ -34,7 +34,7 @@ class Light:
 
 
 @dataclass
-class Scene:
+class SceneLook:
     """Ambient light, background, sky and shadows of a world. Colours red, green, blue from 0 to 1; None: not given."""
 
     ambient: Triple | None = None
@@ -69,10 +69,10 @@ def read_light(document: Document, element: etree._Element, origin: np.ndarray) 
     )
 
 
-def read_scene(document: Document, element: etree._Element) -> Scene:
-    """Return the Scene of the ``<scene>`` element."""
+def read_scene(document: Document, element: etree._Element) -> SceneLook:
+    """Return the SceneLook of the ``<scene>`` element."""
     ambient, background = (colour(document, element, tag, None) for tag in ("ambient", "background"))
-    return Scene(
+    return SceneLook(
         None if ambient is None else ambient[:3],
         None if background is None else background[:3],
         document.flag(element, "shadows", True),

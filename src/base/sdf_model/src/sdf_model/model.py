@@ -22,7 +22,7 @@ from .gears import Gearbox
 from .lights import Light, read_light
 from .links import read_link
 from .materials import MaterialScripts
-from .tree import Dynamics, Parts, SdfJoint, build_robot, crosses
+from .tree import Dynamics, ModelParts, SdfJoint, build_robot, crosses
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -106,7 +106,8 @@ class ModelReader:
         name = document.text(element, "name", "") or inner.name(model)
         return self._finish(inner, name, parts, pose, static)
 
-    def _finish(self, document: Document, name: str, parts: Parts, pose: np.ndarray, static: bool | None) -> SdfModel:
+    def _finish(self, document: Document, name: str, parts: ModelParts, pose: np.ndarray,
+                static: bool | None) -> SdfModel:
         if static is not None:
             parts.static = static
         robot = build_robot(document, name, parts)
@@ -153,11 +154,12 @@ class ModelReader:
             inner.note(further, "<%s> behind the first, which alone counts" % further.tag)
         return inner, models[0] if models else None
 
-    def _parts(self, document: Document, element: etree._Element, prefix: str, origin: np.ndarray, depth: int) -> Parts:
-        """Return the Parts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
+    def _parts(self, document: Document, element: etree._Element, prefix: str, origin: np.ndarray,
+               depth: int) -> ModelParts:
+        """Return the ModelParts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
         if element.get("placement_frame"):
             document.note(element, "placement_frame of model '%s'" % element.get("name"))
-        parts = Parts()
+        parts = ModelParts()
         frames = Frames(document, element.get("name", "").strip())
         held = self._nested(document, element, parts, frames, depth)
         for link in element.iterchildren("link"):
@@ -200,7 +202,7 @@ class ModelReader:
         parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
         return _moved(parts, prefix, origin)
 
-    def _hold_kinematic(self, document: Document, element: etree._Element, parts: Parts) -> None:
+    def _hold_kinematic(self, document: Document, element: etree._Element, parts: ModelParts) -> None:
         """Make a model of kinematic links fixed: only services move it, no force does."""
         links = list(element.iterchildren("link"))
         kinematic = [link for link in links if document.flag(link, "kinematic")]
@@ -211,7 +213,7 @@ class ModelReader:
             document.note(link.find("kinematic"), "kinematic of link '%s', beside links that are not"
                           % document.name(link))
 
-    def _nested(self, document: Document, element: etree._Element, parts: Parts, frames: Frames,
+    def _nested(self, document: Document, element: etree._Element, parts: ModelParts, frames: Frames,
                 depth: int) -> list[str]:
         """Add the parts of models inside this one to ``parts`` and their frames to ``frames``.
 
@@ -261,7 +263,7 @@ def actor(document: Document, element: etree._Element, name: str = "", pose: np.
     return SdfModel(name, robot, document.pose(element) if pose is None else pose, True)
 
 
-def _say_static(parts: Parts, static: bool) -> None:
+def _say_static(parts: ModelParts, static: bool) -> None:
     if not parts.static_is_said:
         parts.static, parts.static_is_said = static, True
 
@@ -274,7 +276,7 @@ def unused(name: str, names: Collection[str]) -> str:
     return found
 
 
-def _moved(parts: Parts, prefix: str, origin: np.ndarray) -> Parts:
+def _moved(parts: ModelParts, prefix: str, origin: np.ndarray) -> ModelParts:
     """Return ``parts`` with names and frames of the enclosing scope."""
     if not prefix:
         return parts
@@ -293,7 +295,7 @@ def _moved(parts: Parts, prefix: str, origin: np.ndarray) -> Parts:
         else:
             said.set("scope", prefix + said.get("scope", ""))
     gearboxes = [gearbox.moved(prefix, origin[:3, :3]) for gearbox in parts.gearboxes]
-    return Parts(links, parts.joints, parts.gazebo, gearboxes, parts.static, parts.static_is_said)
+    return ModelParts(links, parts.joints, parts.gazebo, gearboxes, parts.static, parts.static_is_said)
 
 
 def _sensors_and_lights(document: Document, link: etree._Element, name: str) -> list[etree._Element]:

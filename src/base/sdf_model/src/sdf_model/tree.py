@@ -52,7 +52,7 @@ class SdfJoint:
 
 
 @dataclass
-class Parts:
+class ModelParts:
     """The links and joints of a model and of the models in it. Link frames are 4x4, in the model."""
 
     links: dict = field(default_factory=dict)  # name -> (Link, 4x4)
@@ -65,7 +65,8 @@ class Parts:
 
 def crosses(joints: Sequence[SdfJoint],
             links: Mapping[str, tuple[Link, np.ndarray]]) -> dict[str, tuple[Link, np.ndarray]]:
-    """Return the links between the ``joints`` of one <joint>, as Parts has them: so light that they change little."""
+    """Return the links between the ``joints`` of one <joint>, as ModelParts has them: so light that they change
+    little."""
     inertials = [links[end][0].inertial for end in (joints[0].parent, joints[-1].child) if end in links]
     masses = [inertial for inertial in inertials if inertial is not None]
     if not masses:
@@ -80,7 +81,7 @@ def crosses(joints: Sequence[SdfJoint],
     return found
 
 
-def build_robot(document: Document, name: str, parts: Parts) -> Robot:
+def build_robot(document: Document, name: str, parts: ModelParts) -> Robot:
     """Return the Robot of ``parts``.
 
     A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Joints that close a
@@ -146,7 +147,7 @@ def build_robot(document: Document, name: str, parts: Parts) -> Robot:
     )
 
 
-def _gears(document: Document, parts: Parts, joints: Mapping[str, Joint]) -> list[Gear]:
+def _gears(document: Document, parts: ModelParts, joints: Mapping[str, Joint]) -> list[Gear]:
     """The Gears between the ``joints`` (by name) of the tree."""
     found = [joint.follows for joint in parts.joints if joint.follows is not None]
     for gearbox in parts.gearboxes:
@@ -157,7 +158,7 @@ def _gears(document: Document, parts: Parts, joints: Mapping[str, Joint]) -> lis
     return [gear for gear in found if gear.joint in joints and gear.other in joints]
 
 
-def _without_welds(parts: Parts) -> tuple[list[SdfJoint], str | None]:
+def _without_welds(parts: ModelParts) -> tuple[list[SdfJoint], str | None]:
     """Return the joints without those that fix a link in the world, and that link, which then is a static root.
 
     Only where the world has no other joint, and all links hang on it; a hinge on the world needs the world as a link.

@@ -16,7 +16,7 @@ from urdf_model.transforms import pose_matrix
 from .document import Document, Notes, SdfError, Triple
 from .folders import ModelFolders
 from .frames import Frames
-from .lights import Light, Scene, read_light, read_scene
+from .lights import Light, SceneLook, read_light, read_scene
 from .model import ModelReader, SdfModel, actor, unused
 
 # Left out, with a note.
@@ -41,7 +41,7 @@ class SdfWorld:
     time_step_s: float = STEP_S
     models: list[SdfModel] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
-    scene: Scene = field(default_factory=Scene)
+    scene: SceneLook = field(default_factory=SceneLook)
     problems: list[str] = field(default_factory=list)
     warning: str = ""
 

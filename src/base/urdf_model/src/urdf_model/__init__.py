@@ -5,7 +5,7 @@ from .bounds import OutOfBounds, check_robot
 from .errors import UrdfError
 from .files import check_file, description_text, read_file, read_text
 from .gazebo_names import CollisionName, collision_names, gazebo_links
-from .merge import MergedFrame, MergedLink, MergedRobot, Patch, merge_fixed
+from .merge import MergedFrame, MergedLink, MergedRobot, SurfacePatch, merge_fixed
 from .model import (
     Box,
     Cylinder,
@@ -46,7 +46,7 @@ __all__ = [
     "Mesh",
     "Mimic",
     "OutOfBounds",
-    "Patch",
+    "SurfacePatch",
     "Plane",
     "Robot",
     "Shape",

@@ -15,7 +15,7 @@ _LEADING_NUMBER = re.compile(r"[-+]?(\d|\.\d|inf|nan)")
 NO_NUMBER = "not all of this text is numbers"
 
 
-class Row(NamedTuple):
+class ElementRow(NamedTuple):
     """An element: ``reason`` says why it has no effect, "" for one that is honoured.
 
     ``harmless``: the texts, with | between them, with which it has none in Gazebo either; None where its presence
@@ -50,20 +50,20 @@ class ElementTable:
                  numbers: Iterable[str] = ()):
         self.scopes = frozenset(scopes)
         self.numbers = frozenset(numbers)
-        self.rows: dict[str, Row] = {}
+        self.rows: dict[str, ElementRow] = {}
         for path, names in ((path, names) for mapping in known for path, names in mapping.items()):
             self._add_way(path)
-            self.rows.update(("%s/%s" % (path, name), Row()) for name in names.split())
+            self.rows.update(("%s/%s" % (path, name), ElementRow()) for name in names.split())
         for path, names, reason in without_effect:
             self._add_way(path)
-            self.rows.update(("%s/%s" % (path, name), Row(reason, harmless)) for name, harmless in names.items())
+            self.rows.update(("%s/%s" % (path, name), ElementRow(reason, harmless)) for name, harmless in names.items())
         #: Paths of which the table has children.
         self.parents = {path.rpartition("/")[0] for path in self.rows}
 
     def _add_way(self, path):
         words = path.split("/")
         for count in range(2, len(words) + 1):
-            self.rows.setdefault("/".join(words[:count]), Row())
+            self.rows.setdefault("/".join(words[:count]), ElementRow())
 
     def find(self, element: Any, path: str) -> Iterator[Idle]:
         """Yield what has no effect in ``element``, which is at ``path``. Elements of other name spaces are ignored."""

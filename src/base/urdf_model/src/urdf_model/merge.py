@@ -24,7 +24,7 @@ class MergedFrame(NamedTuple):
     offset: np.ndarray
 
 
-class Patch(NamedTuple):
+class SurfacePatch(NamedTuple):
     """Some of a body's collisions, with a surface of their own."""
 
     surface: Surface
@@ -50,7 +50,7 @@ class MergedLink:
     self_collide: bool = False
     decay: tuple[float, float] = (0.0, 0.0)
     weightless: Inertial | None = None
-    patches: list[Patch] = field(default_factory=list)
+    patches: list[SurfacePatch] = field(default_factory=list)
 
     def own_collisions(self) -> list[Shape]:
         """The collisions that have ``surface``."""
@@ -150,7 +150,7 @@ def _merge_group(robot, body, members, frames, wholes):
         if not _alike(surface, merged.surface or Surface()):
             same = next((patch for patch in merged.patches if _alike(patch.surface, surface)), None)
             if same is None:
-                merged.patches.append(Patch(surface, [shape]))
+                merged.patches.append(SurfacePatch(surface, [shape]))
             else:
                 same.collisions.append(shape)
     # What holds for a whole link of Gazebo's, of which a body can have several.

@@ -30,7 +30,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class ConformanceFinding:
     """One item. is_public: can programs that are not the vendor's use it? reason: why it is not MET."""
 
     group: str
@@ -41,7 +41,7 @@ class Finding:
 
 
 @dataclass
-class Seen:
+class SeenInterface:
     """The observed interface of a master and its nodes.
 
     published, listened: {topic: type, "" if unknown}. services: {name: type, None if the node does not answer}.
@@ -71,13 +71,14 @@ def may_be_silent(topic: str) -> bool:
     return any(fnmatchcase(topic, pattern) for pattern in MAY_BE_SILENT)
 
 
-def compare(robot: Interface, seen: Seen) -> list[Finding]:
-    """Return a Finding for each item of `robot` (baxter_model.interface.Interface); seen is a Seen."""
+def compare(robot: Interface, seen: SeenInterface) -> list[ConformanceFinding]:
+    """Return a ConformanceFinding for each item of `robot` (baxter_model.interface.Interface); seen is a
+    SeenInterface."""
     findings = []
 
     def add(group: str, name: str, kind: str | None, problem) -> None:
         verdict, reason = problem or (Verdict.MET, "")
-        findings.append(Finding(group, name, verdict, robot.is_public(kind), reason))
+        findings.append(ConformanceFinding(group, name, verdict, robot.is_public(kind), reason))
 
     for name, kind in robot.published.items():
         add(group_of(name), name, kind, _topic(name, kind, seen.published, "nobody publishes it")
@@ -103,7 +104,7 @@ def _topic(name: str, kind: str, topics: dict[str, str], nobody: str) -> Any:
     return None
 
 
-def _silence(name: str, seen: Seen) -> Any:
+def _silence(name: str, seen: SeenInterface) -> Any:
     if name not in seen.heard or may_be_silent(name):
         return None
     message = seen.heard[name]
@@ -130,7 +131,7 @@ def _parameter(name: str, kind: str, parameters: dict[str, Any]) -> tuple[Verdic
     return (Verdict.OTHER, wrong) if wrong else None
 
 
-def scores(findings: list[Finding]) -> Any:
+def scores(findings: list[ConformanceFinding]) -> Any:
     """Return {group: (met, all)} of the public items, in alphabetical order."""
     table = defaultdict(lambda: [0, 0])
     for one in findings:
@@ -140,13 +141,13 @@ def scores(findings: list[Finding]) -> Any:
     return {group: tuple(table[group]) for group in sorted(table)}
 
 
-def totals(findings: list[Finding], is_public: bool) -> tuple[int, int]:
+def totals(findings: list[ConformanceFinding], is_public: bool) -> tuple[int, int]:
     """Return (met, all) of the public items, or of the others."""
     chosen = [one.verdict is Verdict.MET for one in findings if one.is_public == is_public]
     return sum(chosen), len(chosen)
 
 
-def report(findings: list[Finding]) -> list[str]:
+def report(findings: list[ConformanceFinding]) -> list[str]:
     """The lines of the report: scores by group, missing and different items, the total score."""
     by_group = scores(findings)
     width = max(map(len, by_group))

@@ -14,7 +14,7 @@ import rospy
 import rosservice
 from tf2_msgs.msg import TFMessage
 
-from .comparison import Seen, alternatives, may_be_silent
+from .comparison import SeenInterface, alternatives, may_be_silent
 
 if TYPE_CHECKING:
     from baxter_model.interface import Interface
@@ -25,8 +25,9 @@ POLL_S = 0.02
 NO_ANSWER = (rosgraph.MasterException, rospy.ROSException, OSError, xmlrpc.client.Error, http.client.HTTPException)
 
 
-def read(robot: Interface, timeout_s: float) -> Seen:
-    """Return a Seen. robot: the Interface of which the topics are listened to. timeout_s: how long to wait for them.
+def read(robot: Interface, timeout_s: float) -> SeenInterface:
+    """Return a SeenInterface. robot: the Interface of which the topics are listened to. timeout_s: how long to wait for
+    them.
 
     Call after rospy.init_node(). Raises one of NO_ANSWER where the master does not answer.
     """
@@ -34,7 +35,7 @@ def read(robot: Interface, timeout_s: float) -> Seen:
     published, listened, services = _told(master.getSystemState())
     types = {name: kind for name, kind in _told(master.getTopicTypes()) if kind != "*"}
     own = rospy.get_name()
-    seen = Seen(published=_with_types(published, types, own), listened=_with_types(listened, types, own))
+    seen = SeenInterface(published=_with_types(published, types, own), listened=_with_types(listened, types, own))
     for name in {name for name, _ in services} & set(robot.services):
         seen.services[name] = _service_type(name)
     for name in robot.parameters:

@@ -8,7 +8,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from baxter_conformance import comparison, contents
-from baxter_conformance.comparison import Seen, Verdict, compare
+from baxter_conformance.comparison import SeenInterface, Verdict, compare
 from baxter_model import SIDES, joint_names
 from baxter_model.interface import Interface, physical_robot
 
@@ -19,9 +19,9 @@ def complete():
     texts = {"text": "1.2.0.57", "names": ["left", "right"]}
     parameters = {name: texts[kind] for name, kind in robot.parameters.items()}
     parameters.update({"/robot_config/%s_config/joint_names" % side: list(joint_names(side)) for side in SIDES})
-    return Seen(published=dict(robot.published), listened=dict(robot.listened),
-                services={name: kind or "vendor/Secret" for name, kind in robot.services.items()},
-                parameters=parameters, frames={*robot.frames, "head"}, links=("base", "head"))
+    return SeenInterface(published=dict(robot.published), listened=dict(robot.listened),
+                         services={name: kind or "vendor/Secret" for name, kind in robot.services.items()},
+                         parameters=parameters, frames={*robot.frames, "head"}, links=("base", "head"))
 
 
 def only_finding(seen):
@@ -181,4 +181,4 @@ def test_parameters(name, value, is_good):
 
 def test_an_interface_of_one_topic():
     robot = Interface({"/robot/state": "a/B"}, {}, {}, {}, (), ())
-    assert comparison.scores(compare(robot, Seen())) == {"/robot": (0, 1)}
+    assert comparison.scores(compare(robot, SeenInterface())) == {"/robot": (0, 1)}

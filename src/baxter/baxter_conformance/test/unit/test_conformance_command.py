@@ -9,7 +9,7 @@ import pytest
 import rosgraph
 import rospy
 
-from baxter_conformance.comparison import Seen
+from baxter_conformance.comparison import SeenInterface
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "conformance"
 
@@ -23,7 +23,7 @@ def conformance(monkeypatch):
     monkeypatch.setattr(rosgraph, "is_master_online", lambda: True)
     monkeypatch.setattr(rospy, "init_node", lambda *_, **__: None)
     monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
-    monkeypatch.setattr(module, "read", lambda robot, timeout_s: Seen())
+    monkeypatch.setattr(module, "read", lambda robot, timeout_s: SeenInterface())
 
     def main(*words):
         monkeypatch.setattr(sys, "argv", ["conformance", *words])

@@ -43,7 +43,7 @@ class Stick:
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControlLayout:
     """Controls by their names."""
 
     buttons: Mapping[str, Button | AxisButton]
@@ -67,17 +67,18 @@ def _pad(horizontal: int, vertical: int) -> dict[str, AxisButton]:
 
 CONTROLLERS = {
     # Triggers are axes that rest at 1.0 and go to -1.0.
-    "xbox": Controller({**_buttons(btnDown=0, btnRight=1, btnLeft=2, btnUp=3, leftBumper=4, rightBumper=5,
-                                   function1=6, function2=7),
-                        "leftTrigger": AxisButton(2, -0.5), "rightTrigger": AxisButton(5, -0.5), **_pad(6, 7)},
-                       _sticks(0, 1, 3, 4)),
-    "logitech": Controller({**_buttons(btnLeft=0, btnDown=1, btnRight=2, btnUp=3, leftBumper=4, rightBumper=5,
-                                       leftTrigger=6, rightTrigger=7, function1=8, function2=9), **_pad(4, 5)},
-                           _sticks(0, 1, 2, 3)),
-    "ps3": Controller(_buttons(function1=0, function2=3, dPadUp=4, dPadRight=5, dPadDown=6, dPadLeft=7, leftTrigger=8,
-                               rightTrigger=9, leftBumper=10, rightBumper=11, btnUp=12, btnRight=13, btnDown=14,
-                               btnLeft=15),
-                      _sticks(0, 1, 2, 3)),
+    "xbox": ControlLayout({**_buttons(btnDown=0, btnRight=1, btnLeft=2, btnUp=3, leftBumper=4, rightBumper=5,
+                                      function1=6, function2=7),
+                           "leftTrigger": AxisButton(2, -0.5), "rightTrigger": AxisButton(5, -0.5), **_pad(6, 7)},
+                          _sticks(0, 1, 3, 4)),
+    "logitech": ControlLayout({**_buttons(btnLeft=0, btnDown=1, btnRight=2, btnUp=3, leftBumper=4, rightBumper=5,
+                                          leftTrigger=6, rightTrigger=7, function1=8, function2=9), **_pad(4, 5)},
+                              _sticks(0, 1, 2, 3)),
+    "ps3": ControlLayout(_buttons(function1=0, function2=3, dPadUp=4, dPadRight=5, dPadDown=6, dPadLeft=7,
+                                  leftTrigger=8,
+                                  rightTrigger=9, leftBumper=10, rightBumper=11, btnUp=12, btnRight=13, btnDown=14,
+                                  btnLeft=15),
+                         _sticks(0, 1, 2, 3)),
 }
 
 

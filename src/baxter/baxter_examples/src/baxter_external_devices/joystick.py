@@ -10,7 +10,7 @@ from sensor_msgs.msg import Joy
 
 from command_line.options import counted
 
-from .controls import CONTROLLERS, ButtonEvents, Controller, StickEvents
+from .controls import CONTROLLERS, ButtonEvents, ControlLayout, StickEvents
 
 
 class Joystick:
@@ -22,7 +22,7 @@ class Joystick:
     rightStickVert; left and up are positive. Other names raise KeyError.
     """
 
-    CONTROLLER: Controller
+    CONTROLLER: ControlLayout
 
     def __init__(self, scale: float = 1.0, offset: float = 0.0, deadband: float = 0.1) -> None:
         if not hasattr(self, "CONTROLLER"):

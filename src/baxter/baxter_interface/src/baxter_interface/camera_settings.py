@@ -15,7 +15,7 @@ DEFAULT_FPS = 20.0
 
 
 @dataclass(frozen=True)
-class Control:
+class CameraControl:
     """A camera control: its number in messages, its largest value, and its default."""
 
     id: int
@@ -25,16 +25,16 @@ class Control:
 
 # The numbers are those of baxter_core_msgs/CameraControl.
 CONTROLS = {
-    "exposure": Control(100, 100, AUTO),
-    "gain": Control(101, 79, AUTO),
-    "white_balance_red": Control(102, 4095, AUTO),
-    "white_balance_green": Control(103, 4095, AUTO),
-    "white_balance_blue": Control(104, 4095, AUTO),
-    "window_x": Control(105, MODES[0][0], AUTO),
-    "window_y": Control(106, MODES[0][1], AUTO),
-    "flip": Control(107, 1, 0),
-    "mirror": Control(108, 1, 0),
-    "half_resolution": Control(109, 1, 0),
+    "exposure": CameraControl(100, 100, AUTO),
+    "gain": CameraControl(101, 79, AUTO),
+    "white_balance_red": CameraControl(102, 4095, AUTO),
+    "white_balance_green": CameraControl(103, 4095, AUTO),
+    "white_balance_blue": CameraControl(104, 4095, AUTO),
+    "window_x": CameraControl(105, MODES[0][0], AUTO),
+    "window_y": CameraControl(106, MODES[0][1], AUTO),
+    "flip": CameraControl(107, 1, 0),
+    "mirror": CameraControl(108, 1, 0),
+    "half_resolution": CameraControl(109, 1, 0),
 }
 
 

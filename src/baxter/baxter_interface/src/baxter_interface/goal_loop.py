@@ -30,7 +30,7 @@ SHORTEST_GOAL_S = 0.05
 _LOOK_UP_S = 0.5
 
 
-class Work(NamedTuple):
+class GoalWork(NamedTuple):
     """The work of one goal.
 
     `step()` does the next step and returns whether the goal is reached; `stop()` is called when it ends early and the
@@ -50,11 +50,12 @@ class GoalLoop:
     """Serves an action. Each goal ends exactly once; the newest goal preempts the one before.
 
     Parameters: `name` of the action and its class `action`; `robot`, a RobotEnable; `label`, for the log;
-    `begin(handle)`, called in the loop's thread, makes the Work for the goal of an actionlib handle.
+    `begin(handle)`, called in the loop's thread, makes the GoalWork for the goal of an actionlib handle.
     (actionlib's own SimpleActionServer refuses every goal for a while after a simulation was restarted.)
     """
 
-    def __init__(self, name: str, action: type, robot: RobotEnable, label: str, begin: Callable[[Any], Work]) -> None:
+    def __init__(self, name: str, action: type, robot: RobotEnable, label: str,
+                 begin: Callable[[Any], GoalWork]) -> None:
         self._robot = robot
         self._label = label
         self._begin = begin

@@ -119,7 +119,7 @@ def _duration_s(name: str, distance_rad: float) -> float:
 
 
 @dataclass(frozen=True)
-class Step:
+class MoveStep:
     """The next action: command these angles [rad] (None: command nothing), and how the move ended, if it did.
 
     halt: stop the joints at their present position; the known angles may be outdated.
@@ -159,7 +159,7 @@ class Move:
         self._disabled_since_s = None
 
     def step(self, elapsed_s: float, angles: dict[str, float], speeds: dict[str, float], refusal: str = "",
-             aborted: bool = False, interrupted: str = "", hindrance: Hindrance = NO_HINDRANCE) -> Step:
+             aborted: bool = False, interrupted: str = "", hindrance: Hindrance = NO_HINDRANCE) -> MoveStep:
         """Decide at `elapsed_s` after the start.
 
         Parameters: measured `angles` [rad] and `speeds` [rad/s] by joint name (more joints than the target's do no
@@ -168,23 +168,23 @@ class Move:
         """
         here = {name: angles[name] for name in self._target}
         if interrupted:
-            return Step(None, failure="%s; %s" % (interrupted, self._worst(here)), halt=True)
+            return MoveStep(None, failure="%s; %s" % (interrupted, self._worst(here)), halt=True)
         # A disabled robot ignores commands: it does not hold the target, even if it is there.
         if not refusal and self._is_there(elapsed_s, here, speeds):
-            return Step(dict(self._target), arrived=True)
+            return MoveStep(dict(self._target), arrived=True)
         if aborted:
-            return Step(here, failure="stopped by the test it was given; %s" % self._worst(here))
+            return MoveStep(here, failure="stopped by the test it was given; %s" % self._worst(here))
         if self._lost_power(elapsed_s, not refusal):
-            return Step(None, failure="%s; %s" % (refusal, self._worst(here)))
+            return MoveStep(None, failure="%s; %s" % (refusal, self._worst(here)))
         if hindrance.is_lasting and not self.is_hurried:
-            return Step(here, failure="%s; %s" % (hindrance.text, self._worst(here)))
+            return MoveStep(here, failure="%s; %s" % (hindrance.text, self._worst(here)))
         command = self._path.angles(elapsed_s)
         if self._timeout_s is None or elapsed_s < self._timeout_s:
-            return Step(command)
+            return MoveStep(command)
         text = "not there after %.1f s: %s" % (self._timeout_s, self._worst(here))
         if self.is_hurried:
             text += ". A gentle move takes %.1f s" % self._duration_s
-        return Step(command, failure=". ".join(filter(None, (text, hindrance.text))))
+        return MoveStep(command, failure=". ".join(filter(None, (text, hindrance.text))))
 
     def _is_there(self, elapsed_s: float, here: dict[str, float], speeds: dict[str, float]) -> bool:
         near = all(abs(self._target[name] - here[name]) < self._threshold_rad for name in here)

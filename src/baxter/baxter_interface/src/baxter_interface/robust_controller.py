@@ -11,7 +11,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker
 
 from . import startup
-from .robust_dialogue import Dialogue, Report, State
+from .robust_dialogue import Dialogue, DialogueState, ProcedureReport
 
 if TYPE_CHECKING:
     from genpy import Message
@@ -28,10 +28,10 @@ class RobustController:
     Raises rospy.ROSInitException before rospy.init_node.
     """
 
-    STATE_IDLE = int(State.IDLE)
-    STATE_STARTING = int(State.STARTING)
-    STATE_RUNNING = int(State.RUNNING)
-    STATE_STOPPING = int(State.STOPPING)
+    STATE_IDLE = int(DialogueState.IDLE)
+    STATE_STARTING = int(DialogueState.STARTING)
+    STATE_RUNNING = int(DialogueState.RUNNING)
+    STATE_STOPPING = int(DialogueState.STOPPING)
 
     def __init__(self, namespace: str, enable_msg: Message, disable_msg: Message, timeout: float = 60) -> None:
         self._namespace = namespace
@@ -46,7 +46,7 @@ class RobustController:
     @property
     def state(self) -> int:
         """One of the STATE_ constants."""
-        return int(self._dialogue.state if self._dialogue else State.IDLE)
+        return int(self._dialogue.state if self._dialogue else DialogueState.IDLE)
 
     def run(self) -> None:
         """Run the procedure and wait for its end.
@@ -63,7 +63,7 @@ class RobustController:
         watch, ticker = Stopwatch(clock.now()), Ticker(clock, RATE_HZ)
         self._dialogue = dialogue = Dialogue(self._timeout_s)
         try:
-            while dialogue.state is not State.IDLE:
+            while dialogue.state is not DialogueState.IDLE:
                 if rospy.is_shutdown():
                     dialogue.abort(watch.elapsed_s(clock.now()))
                     break
@@ -81,5 +81,5 @@ class RobustController:
             raise OSError(number, "%s: %s" % (self._namespace, text))
 
     def _on_status(self, message: Any) -> None:
-        self._report = Report(message.isEnabled, message.complete,
-                              tuple(code for code in (*message.errorCodes, *message.labels) if code))
+        self._report = ProcedureReport(message.isEnabled, message.complete,
+                                       tuple(code for code in (*message.errorCodes, *message.labels) if code))

@@ -16,7 +16,7 @@ REQUEST_EVERY_S = 0.5
 ANSWER_TIMEOUT_S = 10.0
 
 
-class State(enum.IntEnum):
+class DialogueState(enum.IntEnum):
     IDLE = 0
     STARTING = 1
     RUNNING = 2
@@ -32,7 +32,7 @@ class Completion(enum.IntEnum):
 
 
 @dataclass(frozen=True)
-class Report:
+class ProcedureReport:
     """The procedure's last report."""
 
     is_enabled: bool
@@ -44,63 +44,63 @@ class Dialogue:
     """One run of a procedure, stepped with its reports and the time since the run began.
 
     Attributes:
-        state: a State; IDLE again when the run is over.
+        state: a DialogueState; IDLE again when the run is over.
         failure: (errno, text) of the failure, None without one.
     """
 
     def __init__(self, timeout_s: float) -> None:
-        self.state = State.STARTING
+        self.state = DialogueState.STARTING
         self.failure: tuple[int, str] | None = None
         self._timeout_s = timeout_s
         self._stopping_since_s = 0.0
         self._next_request_s = 0.0
 
-    def step(self, elapsed_s: float, report: Report | None) -> bool | None:
-        """Take the latest Report (None as long as there is none) and return the request due now: True for "run",
-        False for "stop", None for none."""
-        if self.state is State.STARTING:
+    def step(self, elapsed_s: float, report: ProcedureReport | None) -> bool | None:
+        """Take the latest ProcedureReport (None as long as there is none) and return the request due now: True for
+        "run", False for "stop", None for none."""
+        if self.state is DialogueState.STARTING:
             self._start(elapsed_s, report)
-        elif self.state is State.RUNNING and report is not None:
+        elif self.state is DialogueState.RUNNING and report is not None:
             self._run(elapsed_s, report)
-        if self.state is State.STOPPING:
+        if self.state is DialogueState.STOPPING:
             self._stop(elapsed_s, report)
-        if self.state is State.IDLE or elapsed_s < self._next_request_s:
+        if self.state is DialogueState.IDLE or elapsed_s < self._next_request_s:
             return None
         self._next_request_s = elapsed_s + REQUEST_EVERY_S
-        return self.state is not State.STOPPING
+        return self.state is not DialogueState.STOPPING
 
     def abort(self, elapsed_s: float) -> None:
         """Abort the run: request the procedure to stop."""
         self._end(elapsed_s, (errno.ECONNABORTED, "broken off"))
 
-    def _start(self, elapsed_s: float, report: Report | None) -> None:
+    def _start(self, elapsed_s: float, report: ProcedureReport | None) -> None:
         if report is not None and report.is_enabled:
-            self.state = State.RUNNING
+            self.state = DialogueState.RUNNING
         elif elapsed_s >= min(ANSWER_TIMEOUT_S, self._timeout_s):
             self._end(elapsed_s, (errno.ETIMEDOUT, "it did not begin within %.0f s" % elapsed_s))
 
-    def _run(self, elapsed_s: float, report: Report) -> None:
+    def _run(self, elapsed_s: float, report: ProcedureReport) -> None:
         errors = ": " + ", ".join(report.errors) if report.errors else ""
         if report.complete == Completion.SUCCESS:
             self._end(elapsed_s, None)
         elif report.complete == Completion.FAILURE:
             self._end(elapsed_s, (errno.EIO, "the robot reports a failure" + errors))
         elif not report.is_enabled:
-            self.state = State.IDLE
+            self.state = DialogueState.IDLE
             self.failure = (errno.ENOMSG, "it ended without saying how" + errors)
         elif elapsed_s >= self._timeout_s:
             self._end(elapsed_s, (errno.ETIMEDOUT, "it was not complete after %.0f s" % elapsed_s))
 
     def _end(self, elapsed_s: float, failure: tuple[int, str] | None) -> None:
-        self.state = State.STOPPING
+        self.state = DialogueState.STOPPING
         self.failure = failure
         self._stopping_since_s = self._next_request_s = elapsed_s
 
-    def _stop(self, elapsed_s: float, report: Report | None) -> None:
+    def _stop(self, elapsed_s: float, report: ProcedureReport | None) -> None:
         if elapsed_s <= self._stopping_since_s:
             return  # send one stop request, whatever it reports
         if report is None or not report.is_enabled:
-            self.state = State.IDLE
+            self.state = DialogueState.IDLE
         elif elapsed_s - self._stopping_since_s >= ANSWER_TIMEOUT_S:
-            self.state = State.IDLE
+            self.state = DialogueState.IDLE
             self.failure = self.failure or (errno.ETIMEDOUT, "it is complete, but did not stop when requested")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
 from baxter_interface import CHECK_VERSION, Gripper, RobotEnable
-from baxter_interface.goal_loop import GoalLoop, Work
+from baxter_interface.goal_loop import GoalLoop, GoalWork
 from baxter_interface.gripper_types import OPEN, clip_percent
 from baxter_model import ELECTRIC, SUCTION
 from baxter_model.readiness import ENABLE
@@ -84,7 +84,7 @@ class GripperActionServer:
             action.push()
             return False
 
-        return Work(
+        return GoalWork(
             step, stop=lambda: self._gripper.stop(block=False),
             missed=lambda: "%s is at %.1f %%, its goal is %.1f %%" % (
                 self._gripper.name, self._gripper.position(), position),

@@ -9,7 +9,7 @@ import rospy
 from control_msgs.msg import SingleJointPositionAction, SingleJointPositionFeedback, SingleJointPositionResult
 
 from baxter_interface import Head, RobotEnable
-from baxter_interface.goal_loop import GoalLoop, Work
+from baxter_interface.goal_loop import GoalLoop, GoalWork
 from baxter_interface.joint_limits import read_joint_limits
 from baxter_model import HEAD_JOINT
 
@@ -56,7 +56,7 @@ class HeadActionServer:
             return False
 
         speed = goal.max_velocity if 0.0 < goal.max_velocity <= 1.0 else 1.0
-        return Work(
+        return GoalWork(
             step, stop=lambda: self._turn(self._head.pan(), 1.0),
             missed=lambda: "the head is at %.4f rad, %.4f rad from its goal of %.4f rad (tolerance %g)" % (
                 self._head.pan(), goal.position - self._head.pan(), goal.position, tolerance),

@@ -11,8 +11,8 @@ from baxter_control.pid import PID
 from joint_trajectory import Follower, GoalTolerances, Tolerances, bounds, merge_tolerances
 
 if TYPE_CHECKING:
-    from joint_trajectory import Verdict
-    from joint_trajectory.command import Command
+    from joint_trajectory import GoalVerdict
+    from joint_trajectory.command import TrajectoryCommand
     from joint_trajectory.limits import Limits
 
 # Duration of a stop, from the present velocity to rest [s].
@@ -24,7 +24,7 @@ LIMIT_SLACK_RAD = 0.05
 _AS_SETTINGS = GoalTolerances()
 
 
-class Mode(enum.Enum):
+class CommandMode(enum.Enum):
     """The command mode of an arm; the values are those of the server's option."""
 
     POSITION = "position"
@@ -69,8 +69,10 @@ class ArmMotion:
         When the present goal's trajectory began [s].
     """
 
-    def __init__(self, joint_names: list[str], mode: Mode, period_s: float, limits: Limits | None = None) -> None:
-        """``mode``: :class:`Mode`; ``period_s`` [s] between ticks; ``limits``: :class:`joint_trajectory.Limits`."""
+    def __init__(self, joint_names: list[str], mode: CommandMode, period_s: float,
+                 limits: Limits | None = None) -> None:
+        """``mode``: :class:`CommandMode`; ``period_s`` [s] between ticks; ``limits``:
+        :class:`joint_trajectory.Limits`."""
         self.joint_names = list(joint_names)
         self.goal = None
         self.engaged = False
@@ -84,9 +86,9 @@ class ArmMotion:
         self._now_s = 0.0
         self._output = np.zeros((3, len(self.joint_names)))
 
-    def begin(self, command: Command, now_s: float, position: np.ndarray, goal: Any, settings: GoalDefaults,
+    def begin(self, command: TrajectoryCommand, now_s: float, position: np.ndarray, goal: Any, settings: GoalDefaults,
               wanted: GoalTolerances = _AS_SETTINGS) -> Any:
-        """Follow ``command`` (:class:`joint_trajectory.Command`) from ``now_s`` [s] on.
+        """Follow ``command`` (:class:`joint_trajectory.TrajectoryCommand`) from ``now_s`` [s] on.
 
         ``position`` (n,): measured [rad]; ``goal``: any object. ``wanted``: the goal's own
         :class:`joint_trajectory.GoalTolerances`, which override ``settings`` (:class:`GoalDefaults`). Joints that the
@@ -115,8 +117,8 @@ class ArmMotion:
         self.begin_s = now_s if command.start_time is None else command.start_time
         return replacement
 
-    def tick(self, now_s: float, position: np.ndarray, velocity: np.ndarray) -> Verdict | None:
-        """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`Verdict` if the goal ends now.
+    def tick(self, now_s: float, position: np.ndarray, velocity: np.ndarray) -> GoalVerdict | None:
+        """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`GoalVerdict` if the goal ends now.
 
         A goal that fails during the motion stops the joints where they are; one that fails at its end holds the end.
         """
@@ -130,14 +132,14 @@ class ArmMotion:
                 self._follower.start(now_s, position, velocity)
         # A command acts until the next one, so it is the position at that time.
         self._output[:] = self._follower.look_ahead(now_s + self._period_s)
-        if self._mode is Mode.VELOCITY:
+        if self._mode is CommandMode.VELOCITY:
             self._correct()
         return verdict
 
     def command(self) -> dict[str, float]:
         """The command of this tick: {joint name: rad, or rad/s in velocity mode} of the joints that goals have
         named."""
-        row = 1 if self._mode is Mode.VELOCITY else 0
+        row = 1 if self._mode is CommandMode.VELOCITY else 0
         return {name: float(value) for name, value, named
                 in zip(self.joint_names, self._output[row], self._named, strict=True) if named}
 

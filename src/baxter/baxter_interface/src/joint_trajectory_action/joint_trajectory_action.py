@@ -28,9 +28,9 @@ from baxter_interface.joint_limits import read_joint_limits
 from command_line.options import counted
 from joint_trajectory import (
     ErrorCode,
+    GoalOutcome,
     Limits,
     NoPoints,
-    Outcome,
     TrajectoryError,
     code_of_error,
     code_of_outcome,
@@ -39,7 +39,7 @@ from joint_trajectory import (
     tolerances_of,
 )
 
-from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, GoalDefaults, Mode
+from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, CommandMode, GoalDefaults
 from .robot_watch import RobotWatch
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class JointTrajectoryActionServer:
 
     def __init__(self, limb: str, reconfig_server: ParameterServer, rate: float = 100.0,
                  mode: str = "position_w_id") -> None:
-        self._mode = Mode(mode)
+        self._mode = CommandMode(mode)
         self._config = reconfig_server
         self._limb = Limb(limb)
         self._names = self._limb.joint_names()
@@ -235,10 +235,10 @@ class JointTrajectoryActionServer:
 
     def _send(self, now_s: float) -> None:
         command = self._motion.command()
-        if self._mode is Mode.VELOCITY:
+        if self._mode is CommandMode.VELOCITY:
             self._limb.set_joint_velocities(command)
             return
-        if self._mode is Mode.POSITION:
+        if self._mode is CommandMode.POSITION:
             self._limb.set_joint_positions(command)
             return
         self._limb.set_joint_positions(command, raw=True)
@@ -260,7 +260,7 @@ class JointTrajectoryActionServer:
     # -- ends of goals ----------------------------------------------------------------------------------------------
 
     def _conclude(self, handle: Any, verdict) -> None:
-        if verdict.outcome is Outcome.SUCCEEDED:
+        if verdict.outcome is GoalOutcome.SUCCEEDED:
             handle.set_succeeded(FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), ""))
         else:
             # The loop has no time to wait for the robot's answer.
@@ -268,7 +268,7 @@ class JointTrajectoryActionServer:
                              args=(handle, code_of_outcome(verdict.outcome), verdict.text)).start()
 
     def _abort_with_reason(self, handle: Any, code, text: str) -> None:
-        why = ask_what_holds(self._limb.name, is_kept_away=self._mode is not Mode.POSITION_WITH_DYNAMICS)
+        why = ask_what_holds(self._limb.name, is_kept_away=self._mode is not CommandMode.POSITION_WITH_DYNAMICS)
         self._abort(handle, code, "; ".join(filter(None, (text, why))))
 
     def _give_up(self, why) -> None:

@@ -14,10 +14,10 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from std_srvs.srv import Trigger, TriggerResponse
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.grippers.electric import OPEN, ElectricGripper
+from baxter_sim_hardware.grippers.electric import OPEN, ElectricGripperHardware
 from baxter_sim_hardware.grippers.hands import NoHand
-from baxter_sim_hardware.grippers.suction import SuctionGripper
-from baxter_sim_hardware.robot_state import RobotState, State
+from baxter_sim_hardware.grippers.suction import SuctionGripperHardware
+from baxter_sim_hardware.robot_state import BaxterState, RobotState
 from baxter_sim_hardware.topics.grippers import GripperTopics
 from lab_testing.waiting import beats
 
@@ -42,7 +42,7 @@ class Fingers:
     """Two fingers that jump to their target, unless something lies between them."""
 
     def __init__(self, knobs):
-        self.gripper = ElectricGripper(TRAVEL_M, OPEN, 1.0 / RATE_HZ)
+        self.gripper = ElectricGripperHardware(TRAVEL_M, OPEN, 1.0 / RATE_HZ)
         self.gripper.calibrated, self.gripper.error = knobs["calibrated"], knobs["error"]
         self._block = knobs["block_at"] / 100.0
         self._position, self._squeeze = OPEN, 0.0
@@ -62,7 +62,7 @@ class Cup:
     """A cup on an object, or on nothing."""
 
     def __init__(self, knobs):
-        self.gripper = SuctionGripper(1.0 / RATE_HZ)
+        self.gripper = SuctionGripperHardware(1.0 / RATE_HZ)
         self._seal = knobs["seal"]
 
     def readings(self, _positions):
@@ -95,7 +95,7 @@ class FakeGripper:
             self._knobs = {name: rospy.get_param("~" + name, default) for name, default in KNOBS.items()}
             kind = self._knobs["ui_type"]
             self._hand = HANDS[kind](self._knobs) if kind in HANDS else NoHand()
-            state = RobotState(State.ENABLED if self._knobs["enabled"] else State.DISABLED)
+            state = RobotState(BaxterState.ENABLED if self._knobs["enabled"] else BaxterState.DISABLED)
             self._topics = GripperTopics({SIDE: self._hand}, state)
             if kind == EndEffectorProperties.PASSIVE_GRIPPER:
                 self._take("gripper_set_properties", EndEffectorProperties(id=CUSTOM_ID, ui_type=kind))

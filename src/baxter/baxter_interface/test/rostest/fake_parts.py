@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import PanDrive
-from baxter_sim_hardware.robot_state import RobotState, State
+from baxter_sim_hardware.robot_state import BaxterState, RobotState
 from baxter_sim_hardware.topics.head import HeadTopics
 from baxter_sim_hardware.topics.panel import PanelTopics
 from lab_testing.waiting import beats
@@ -75,7 +75,7 @@ class FakeParts:
         self._joint = PanJoint()
         # The robot is enabled here.
         self._pan = PanDrive(self._joint, 1.0 / RATE_HZ)
-        self._head = HeadTopics(self._pan, RobotState(State.ENABLED), 1.0 / RATE_HZ)
+        self._head = HeadTopics(self._pan, RobotState(BaxterState.ENABLED), 1.0 / RATE_HZ)
         self._publishers = {**panel.publishers, **self._head.publishers}
         self._handlers = {**panel.handlers, **self._head.handlers}
         self._nods_on = False

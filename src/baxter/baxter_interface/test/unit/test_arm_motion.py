@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from baxter_interface import parameter_tables
-from joint_trajectory import BeyondPosition, Command, GoalTolerances, Limits, Outcome
-from joint_trajectory_action.arm_motion import STOP_DURATION_S, ArmMotion, GoalDefaults, Mode
+from joint_trajectory import BeyondPosition, GoalOutcome, GoalTolerances, Limits, TrajectoryCommand
+from joint_trajectory_action.arm_motion import STOP_DURATION_S, ArmMotion, CommandMode, GoalDefaults
 
 NAMES = ["left_%s" % joint for joint in ("s0", "s1", "e0")]
 PERIOD = 0.01
 LIMITS = Limits(NAMES, [-2.0] * 3, [2.0] * 3, [1.5] * 3, 0.05)
-TABLES = {Mode.POSITION: parameter_tables.POSITION, Mode.VELOCITY: parameter_tables.VELOCITY,
-          Mode.POSITION_WITH_DYNAMICS: parameter_tables.POSITION_FF}
+TABLES = {CommandMode.POSITION: parameter_tables.POSITION, CommandMode.VELOCITY: parameter_tables.VELOCITY,
+          CommandMode.POSITION_WITH_DYNAMICS: parameter_tables.POSITION_FF}
 
 
 class Arm:
     """Joints that follow their commands one tick later; those in `stuck` do not."""
 
-    def __init__(self, mode=Mode.POSITION_WITH_DYNAMICS, **changes):
+    def __init__(self, mode=CommandMode.POSITION_WITH_DYNAMICS, **changes):
         self.mode = mode
         self.motion = ArmMotion(NAMES, mode, PERIOD, LIMITS)
         self.settings = GoalDefaults.from_config(
@@ -32,8 +32,8 @@ class Arm:
         return self.ticks * PERIOD
 
     def go(self, points, names=NAMES, goal="goal", start=None, **options):
-        return self.motion.begin(Command(names, points, start), self.now_s, self.position, goal, self.settings,
-                                 **options)
+        return self.motion.begin(TrajectoryCommand(names, points, start), self.now_s, self.position, goal,
+                                 self.settings, **options)
 
     def run(self, seconds):
         """Returns the verdicts."""
@@ -47,8 +47,8 @@ class Arm:
             before = self.position.copy()
             for joint, name in enumerate(NAMES):
                 if name in command and not self.stuck[joint]:
-                    step = command[name] * PERIOD if self.mode is Mode.VELOCITY else command[name] - before[joint]
-                    self.position[joint] += step
+                    is_velocity = self.mode is CommandMode.VELOCITY
+                    self.position[joint] += command[name] * PERIOD if is_velocity else command[name] - before[joint]
             self.velocity = (self.position - before) / PERIOD
             self.ticks += 1
         return verdicts
@@ -61,18 +61,18 @@ def there(*positions):
     return list(positions), [], []
 
 
-@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("mode", CommandMode)
 def test_goal_is_followed_reached_once_and_held(mode):
     arm = Arm(mode)
     arm.go([(1.0, *there(0.5, -0.5, 0.2)), (2.0, *there(0.5, 0.5, 0.4))])
     verdicts = arm.run(3.0)
-    assert [verdict.outcome for _, verdict in verdicts] == [Outcome.SUCCEEDED]
+    assert [verdict.outcome for _, verdict in verdicts] == [GoalOutcome.SUCCEEDED]
     assert verdicts[0][0] == pytest.approx(2.0, abs=0.03)
     np.testing.assert_allclose(arm.position, [0.5, 0.5, 0.4], atol=1e-3)
     assert arm.motion.engaged and arm.motion.goal is None
 
 
-@pytest.mark.parametrize("mode", [Mode.POSITION, Mode.POSITION_WITH_DYNAMICS])
+@pytest.mark.parametrize("mode", [CommandMode.POSITION, CommandMode.POSITION_WITH_DYNAMICS])
 def test_commanded_positions_do_not_jump(mode):
     arm = Arm(mode)
     arm.go([(0.0, *there(0.04, 0.0, 0.0)), (1.0, *there(0.5, -0.5, 0.2)), (1.5, *there(0.5, 0.0, 0.2))])
@@ -111,7 +111,7 @@ def test_blocked_joint_fails_the_goal_on_the_way_and_the_arm_stops_where_it_is()
     arm.stuck[1] = True
     arm.go([(2.0, *there(0.5, 1.0, 0.0))])
     (at_s, verdict), = arm.run(2.0)
-    assert verdict.outcome is Outcome.PATH_TOLERANCE_VIOLATED
+    assert verdict.outcome is GoalOutcome.PATH_TOLERANCE_VIOLATED
     assert verdict.text.startswith("left_s1 path error 0.35") and "tolerance 0.35" in verdict.text
     assert "at %.3f s" % at_s in verdict.text
     assert arm.motion.engaged
@@ -126,7 +126,7 @@ def test_goal_tolerance_and_goal_time():
     arm.go([(1.0, *there(0.0, 0.0, 0.2))], wanted=GoalTolerances(
         goal=[("left_e0", 0.1, 0.0, 0.0)], goal_time_s=0.3))
     (at_s, verdict), = arm.run(2.0)
-    assert verdict.outcome is Outcome.GOAL_TOLERANCE_VIOLATED
+    assert verdict.outcome is GoalOutcome.GOAL_TOLERANCE_VIOLATED
     assert "left_e0 goal error 0.2" in verdict.text and at_s == pytest.approx(1.32, abs=0.021)
 
 
@@ -135,7 +135,7 @@ def test_default_goal_tolerance_is_none_and_path_tolerance_can_be_lifted():
     arm.stuck[2] = True
     arm.go([(1.0, *there(0.0, 0.0, 0.9))], wanted=GoalTolerances(path=[("left_e0", -1.0, 0.0, 0.0)]))
     (_, verdict), = arm.run(1.5)
-    assert verdict.outcome is Outcome.SUCCEEDED
+    assert verdict.outcome is GoalOutcome.SUCCEEDED
 
 
 def test_stop_comes_to_rest_within_its_time():
@@ -159,7 +159,7 @@ def test_refused_goal_leaves_the_one_before_alone():
         arm.go([(5.0, *there(2.5, 0.0, 0.0))], goal="second")
     assert arm.motion.goal == "first"
     (_, verdict), = arm.run(1.0)
-    assert verdict.outcome is Outcome.SUCCEEDED
+    assert verdict.outcome is GoalOutcome.SUCCEEDED
 
 
 def test_refused_goal_engages_nothing():
@@ -170,7 +170,7 @@ def test_refused_goal_engages_nothing():
 
 
 def test_velocity_mode_corrects_what_is_amiss():
-    arm = Arm(Mode.VELOCITY, left_s0_kp=4.0)
+    arm = Arm(CommandMode.VELOCITY, left_s0_kp=4.0)
     arm.go([(2.0, *there(0.5, 0.5, 0.5))])
     arm.run(1.0)
     arm.position[0] += 0.2
@@ -195,9 +195,10 @@ def test_farthest_joint_from_the_end():
 
 def test_defaults_are_those_of_the_robot():
     """Modes position_w_id, position, velocity: time, stopped velocity, path, goal."""
-    found = {mode: Arm(mode).settings for mode in Mode}
-    for mode, expected in ((Mode.POSITION_WITH_DYNAMICS, (0.1, 0.20, 0.35, -1.0)),
-                           (Mode.POSITION, (0.1, 0.25, 0.2, -1.0)), (Mode.VELOCITY, (0.0, -1.0, -1.0, -1.0))):
+    found = {mode: Arm(mode).settings for mode in CommandMode}
+    for mode, expected in ((CommandMode.POSITION_WITH_DYNAMICS, (0.1, 0.20, 0.35, -1.0)),
+                           (CommandMode.POSITION, (0.1, 0.25, 0.2, -1.0)),
+                           (CommandMode.VELOCITY, (0.0, -1.0, -1.0, -1.0))):
         settings = found[mode]
         assert (settings.goal_time_s, settings.stopped_velocity, settings.path[0], settings.goal[0]) == expected
-    assert found[Mode.VELOCITY].gains[:, 0].tolist() == [2.0, 0.0, 0.0]
+    assert found[CommandMode.VELOCITY].gains[:, 0].tolist() == [2.0, 0.0, 0.0]

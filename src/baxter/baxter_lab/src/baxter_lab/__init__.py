@@ -12,11 +12,12 @@
 from baxter_sim_hardware.simulated import Which
 from bullet_sim import BulletSimError
 
-from .cameras import Picture
+from .cameras import CameraPicture
 from .errors import LabError, MeshesMissing, NotReached
 from .lab import Lab, Options, Thing, pose
-from .robot import Arm, Baxter, CommandRefused, Event, Gripper, Mode, NoSolution, State
+from .robot import Arm, Baxter, BaxterState, CommandRefused, Event, Gripper, Mode, NoSolution
 from .tools import Tool
 
 __all__ = ["Arm", "Baxter", "BulletSimError", "CommandRefused", "Event", "Gripper", "Lab", "LabError", "MeshesMissing",
-           "Mode", "NoSolution", "NotReached", "Options", "Picture", "State", "Thing", "Tool", "Which", "pose"]
+           "Mode", "NoSolution", "NotReached", "Options", "CameraPicture", "BaxterState", "Thing", "Tool", "Which",
+           "pose"]

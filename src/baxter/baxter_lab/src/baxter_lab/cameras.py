@@ -29,7 +29,7 @@ LINKS = {"head": "head_camera", "left_hand": "left_hand_camera", "right_hand": "
 OUTSIDE_FIELD_RAD, NEAR_M, FAR_M = 0.75, 0.05, 100.0
 
 
-class Picture(NamedTuple):
+class CameraPicture(NamedTuple):
     """pixels (height, width, 3) uint8; depth (height, width) [m], or None where it was not asked for; camera (4, 4):
     its optical frame (x right, y down, z ahead) in `base`; matrix (3, 3): focal lengths and middle [pixels]."""
 
@@ -39,7 +39,7 @@ class Picture(NamedTuple):
     matrix: np.ndarray
 
 
-class Cameras:
+class LabCameras:
     """Draws the world of a lab. lab: `lab.Lab`. What it draws with is made at the first picture."""
 
     def __init__(self, lab: Lab) -> None:
@@ -55,7 +55,7 @@ class Cameras:
             self._renderer = None
 
     def take(self, camera: str, width: int = 640, height: int = 400, depth: bool = False,
-             moved: npt.NDArray[np.float64] | None = None) -> Picture:
+             moved: npt.NDArray[np.float64] | None = None) -> CameraPicture:
         """A picture by one of the robot's cameras: head, left_hand, right_hand. moved: where it sits, (4, 4) in its
         usual frame. Raises LabError for another name."""
         if camera not in LINKS:
@@ -69,7 +69,7 @@ class Cameras:
         return self._draw(Pinhole.from_field_of_view(width, height, *self._lenses[link]), frame, depth)
 
     def look(self, eye: npt.ArrayLike, target: npt.ArrayLike, width: int = 640, height: int = 480,
-             depth: bool = False) -> Picture:
+             depth: bool = False) -> CameraPicture:
         """A picture from `eye` (3,) towards `target` (3,) [m]."""
         pinhole = Pinhole.from_field_of_view(width, height, OUTSIDE_FIELD_RAD, NEAR_M, FAR_M)
         return self._draw(pinhole, looking_at(np.asarray(eye, dtype=float), np.asarray(target, dtype=float)), depth)
@@ -78,7 +78,7 @@ class Cameras:
         renderer, mirror = self._follow()
         pixels, distance = renderer.render(mirror, pinhole, frame, True, depth)
         matrix = np.array([[pinhole.fx, 0.0, pinhole.cx], [0.0, pinhole.fy, pinhole.cy], [0.0, 0.0, 1.0]])
-        return Picture(np.array(pixels), None if distance is None else distance.copy(), frame, matrix)
+        return CameraPicture(np.array(pixels), None if distance is None else distance.copy(), frame, matrix)
 
     def _follow(self) -> tuple[GlRenderer | TinyRenderer, Mirror]:
         """Bring the mirror to the world's present state."""

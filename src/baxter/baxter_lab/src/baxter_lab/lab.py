@@ -35,11 +35,11 @@ from urdf_model import (
     parse_urdf,
 )
 
-from .cameras import Cameras
+from .cameras import LabCameras
 from .descriptions import baxter_urdf
 from .errors import LabError, NotReached
 from .meshes import MeshFinder, mesh_folder
-from .planning import FLOOR, Planning
+from .planning import FLOOR, LabPlanner
 from .robot import MOVE_S, Baxter
 from .saving import SavedState
 from .tools import with_tools
@@ -142,11 +142,11 @@ class Lab:
         self.world = World(time_step_s=time_step_s, seed=seed, find_mesh=self.find_mesh,
                            warn=warn if options.with_meshes else lambda text: None)
         self.things: dict[str, Thing] = {}
-        self._spawn(FLOOR, Plane(), (0.0, 0.0, -BASE_HEIGHT_M), 0.0, Body(colour=(0.75, 0.77, 0.80, 1.0)))
+        self._spawn(FLOOR, Plane(), (0.0, 0.0, -BASE_HEIGHT_M), 0.0, ThingProperties(colour=(0.75, 0.77, 0.80, 1.0)))
         self.robot = self._spawn_robot()
         self.world._warn = warn  # of objects that come later
-        self.cameras = Cameras(self)
-        self._planning = Planning(self)
+        self.cameras = LabCameras(self)
+        self._planning = LabPlanner(self)
 
     def _spawn_robot(self):
         described = parse_urdf(self.robot_urdf, source=ROBOT)
@@ -234,20 +234,20 @@ class Lab:
     def add_box(self, name: str, size: Sequence[float], place: npt.ArrayLike, yaw: float = 0.0, **body: Any) -> Thing:
         """Add a box of `size` (3,) [m] with its centre at `place`: a pose (4, 4), or (x, y, z) and `yaw` [rad].
 
-        It is fixed unless it has a `mass_kg`; `friction`, `colour`: as in `Body`. Raises BulletSimError for a name
-        that is taken, and for numbers out of bounds.
+        It is fixed unless it has a `mass_kg`; `friction`, `colour`: as in `ThingProperties`. Raises BulletSimError for
+        a name that is taken, and for numbers out of bounds.
         """
         x, y, z = map(float, size)
-        return self._spawn(name, Box((x, y, z)), place, yaw, Body(**body))
+        return self._spawn(name, Box((x, y, z)), place, yaw, ThingProperties(**body))
 
     def add_cylinder(self, name: str, radius: float, length: float, place: npt.ArrayLike, yaw: float = 0.0,
                      **body: Any) -> Thing:
         """Add a cylinder along z; otherwise as `add_box`."""
-        return self._spawn(name, Cylinder(radius, length), place, yaw, Body(**body))
+        return self._spawn(name, Cylinder(radius, length), place, yaw, ThingProperties(**body))
 
     def add_sphere(self, name: str, radius: float, place: npt.ArrayLike, **body: Any) -> Thing:
         """Add a ball; otherwise as `add_box`."""
-        return self._spawn(name, Sphere(radius), place, 0.0, Body(**body))
+        return self._spawn(name, Sphere(radius), place, 0.0, ThingProperties(**body))
 
     def add_urdf(self, name: str, description: str | Path, place: npt.ArrayLike, yaw: float = 0.0,
                  static: bool | None = None) -> Thing:
@@ -281,7 +281,7 @@ class Lab:
         self._planning.follow(side, timed)
 
 
-class Body(NamedTuple):
+class ThingProperties(NamedTuple):
     """mass_kg: None for what is fixed; friction: None for the world's usual; colour: red, green, blue, opacity."""
 
     mass_kg: float | None = None

@@ -28,7 +28,7 @@ def _lowered(pose):
     return lower
 
 
-class Planning:
+class LabPlanner:
     """The planner of a Lab; made at the first plan, which takes seconds. lab: `lab.Lab`."""
 
     def __init__(self, lab: Lab) -> None:
@@ -65,14 +65,14 @@ class Planning:
 
     def plan(self, side: str, goal: npt.ArrayLike, held: str | None, time_limit_s: float, seed: int) -> Timed:
         """As `Lab.plan`."""
-        from motion_planning.planners.planning import Search, plan_path
+        from motion_planning.planners.planning import SearchOptions, plan_path
         from motion_planning.timing import time_path
 
         arm, group = self._lab.robot.arms[side], "%s_arm" % side
         goal = np.asarray(goal, dtype=float)
         target = goal if goal.shape == (len(JOINTS),) else arm.ik(goal)
         exact = self._checker()
-        search = Search(exact, seed, time_limit_s, time.monotonic)
+        search = SearchOptions(exact, seed, time_limit_s, time.monotonic)
         path = plan_path(self._scene(side, held), group, arm.angles, target[None], search)
         limits = [self._limits[name] for name in arm.joint_names]
         return time_path(path.points, np.array([row["max_velocity"] for row in limits]),

@@ -9,14 +9,14 @@ import numpy as np
 
 from arm_kinematics import NoSolution, solve, solve_as_vendor
 from baxter_model import JOINTS, SIDES
-from baxter_sim_hardware.arms.joint_command import JointCommand, Mode
+from baxter_sim_hardware.arms.joint_command import CheckedCommand, Mode
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.robot_state import Event, State
+from baxter_sim_hardware.robot_state import BaxterState, Event
 from baxter_sim_hardware.simulated import SimulatedBaxter
 
 from .errors import LabError
 
-__all__ = ["Arm", "Baxter", "CommandRefused", "Event", "Gripper", "Head", "Mode", "NoSolution", "State"]
+__all__ = ["Arm", "Baxter", "CommandRefused", "Event", "Gripper", "Head", "Mode", "NoSolution", "BaxterState"]
 
 #: An arm is there when each joint is so near [rad], and so slow [rad/s].
 ARRIVED_RAD, AT_REST_RAD_S = 0.0087, 0.02
@@ -138,7 +138,7 @@ class Arm:
         return [Mode(mode) for mode in self._simulated.baxter.arms.modes(self.side)]
 
     def command(self, mode: Mode, values: Sequence[float] | np.ndarray,
-                names: Sequence[str] | None = None) -> JointCommand:
+                names: Sequence[str] | None = None) -> CheckedCommand:
         """One joint command, as on ``joint_command``: `values` [rad, rad/s or Nm] for `names`, by default all joints.
 
         Streamed modes expire after 0.2 s. Returns the command as the robot took it, whose ``clamped`` names the joints
@@ -206,7 +206,7 @@ class Baxter:
         self.head = Head(simulated)
 
     @property
-    def state(self) -> State:
+    def state(self) -> BaxterState:
         """Enabled, disabled, stopped ..."""
         return self.simulated.baxter.state.state
 

@@ -6,7 +6,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from baxter_lab import CommandRefused, Lab, LabError, Mode, NoSolution, NotReached, Options, State, meshes, pose
+from baxter_lab import BaxterState, CommandRefused, Lab, LabError, Mode, NoSolution, NotReached, Options, meshes, pose
 from baxter_lab.descriptions import baxter_srdf
 
 
@@ -22,7 +22,7 @@ def test_a_disabled_robot_refuses_and_an_enabled_one_moves(lab):
     with pytest.raises(CommandRefused):
         arm.move(arm.angles)
     lab.robot.enable()
-    assert lab.robot.state is State.ENABLED
+    assert lab.robot.state is BaxterState.ENABLED
     for side in ("left", "right"):
         arm = lab.robot.arms[side]
         goal = arm.pose

@@ -28,7 +28,7 @@ from baxter_sim_examples.scene import ABOUT_M, MIDDLE_M
 from gazebo_ros.gazebo_interface import GazeboInterfaceError
 
 if TYPE_CHECKING:
-    from baxter_sim_examples.looking import View
+    from baxter_sim_examples.looking import CameraView
 
 MISS_M = 0.01  # largest distance of a block that reached its target
 STARTING_S = 30.0  # [wall] for the IK service, which may start beside this program on a busy machine
@@ -69,7 +69,7 @@ class SeeingArm(SdkArm):
         super().__init__(limb)
         self._senses = HandSenses(limb)
 
-    def look(self) -> View:
+    def look(self) -> CameraView:
         rospy.sleep(SETTLING_S)
         return self._senses.look()
 

@@ -14,13 +14,13 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from baxter_interface.programs import expect, run
 from baxter_sim_examples.gazebo_scene import GAZEBO, TABLE
 from baxter_sim_examples.scene import BASE_HEIGHT_M, TABLE_XY_M
-from baxter_sim_examples.vision_scene import COLOURED, THE_BOARD, Thing, board_urdf
+from baxter_sim_examples.vision_scene import COLOURED, THE_BOARD, PlacedModel, board_urdf
 from gazebo_ros.gazebo_interface import call, delete_model_client
 
 
 def build() -> None:
     models = Path(rospkg.RosPack().get_path("model_files")) / "models"
-    table = Thing(TABLE, *TABLE_XY_M, -BASE_HEIGHT_M, 0.0)
+    table = PlacedModel(TABLE, *TABLE_XY_M, -BASE_HEIGHT_M, 0.0)
     there = call(GAZEBO + "/get_world_properties", GetWorldProperties).model_names
     for thing in (table, *COLOURED, THE_BOARD):
         if thing.name in there:

@@ -35,7 +35,7 @@ class Fit(NamedTuple):
     deviation: Array
 
 
-class Bounds(NamedTuple):
+class FitBounds(NamedTuple):
     """least, most (p,): of the numbers; step (p,): by how much a number is changed to see what follows."""
 
     least: Array
@@ -43,7 +43,7 @@ class Bounds(NamedTuple):
     step: Array
 
 
-def least_squares(errors: Errors, start: Array, bounds: Bounds, rows: NDArray[np.bool_] | None = None,
+def least_squares(errors: Errors, start: Array, bounds: FitBounds, rows: NDArray[np.bool_] | None = None,
                   rounds: int = MAX_ROUNDS) -> Fit:
     """The numbers that make the sum of squares of `errors` least (Levenberg-Marquardt); rows: those that count."""
     numbers = np.clip(start, bounds.least, bounds.most)
@@ -70,7 +70,7 @@ def least_squares(errors: Errors, start: Array, bounds: Bounds, rows: NDArray[np
 
 
 def _one_by_one(errors: Errors, numbers: Array, error: Array, counts: NDArray[np.bool_],
-                bounds: Bounds) -> tuple[Array, Array]:
+                bounds: FitBounds) -> tuple[Array, Array]:
     """Change each number by itself, by a step or by a share of itself, and by twice as much each time, as long as the
     cost becomes less."""
     for index in range(len(numbers)):
@@ -86,7 +86,7 @@ def _one_by_one(errors: Errors, numbers: Array, error: Array, counts: NDArray[np
     return numbers, error
 
 
-def slopes_of(errors: Errors, numbers: Array, error: Array, bounds: Bounds) -> Array:
+def slopes_of(errors: Errors, numbers: Array, error: Array, bounds: FitBounds) -> Array:
     """(p, rows, k) how `errors` change with each number."""
     slopes = np.empty((len(numbers), *error.shape))
     for index, step in enumerate(bounds.step):
@@ -119,7 +119,7 @@ def deviations(slopes: Array, error: Array) -> Array:
     return found
 
 
-def instrumented(errors: Errors, other: Errors, fit: Fit, bounds: Bounds, steps: int = 4) -> Fit:
+def instrumented(errors: Errors, other: Errors, fit: Fit, bounds: FitBounds, steps: int = 4) -> Fit:
     """A fit of a model that has noise of its own, begun at `fit`.
 
     other: the same errors with the model's noise drawn again. Least squares is biased here, because errors and their
@@ -141,7 +141,7 @@ def block_slices(rows: int, count: int = BLOCKS) -> list[slice]:
     return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
 
 
-def left_out(errors: Errors, fit: Fit, bounds: Bounds, count: int = BLOCKS, rounds: int = 1) -> Array:
+def left_out(errors: Errors, fit: Fit, bounds: FitBounds, count: int = BLOCKS, rounds: int = 1) -> Array:
     """(count, rows, k): for each block of time the error with numbers fitted without it; all rows, of which the caller
     takes the block's. A fit begins at `fit` and takes `rounds` steps."""
     found = np.empty((count, *fit.error.shape))
@@ -169,7 +169,7 @@ def _cost(error: Array) -> float:
     return float(np.sum(error ** 2))
 
 
-def _pressed(numbers: Array, slopes: Array, error: Array, bounds: Bounds) -> NDArray[np.bool_]:
+def _pressed(numbers: Array, slopes: Array, error: Array, bounds: FitBounds) -> NDArray[np.bool_]:
     """(p,) which numbers stand at a bound that the cost presses them against."""
     downhill = -np.einsum("prk,rk->p", slopes, error)
     return ((numbers <= bounds.least) & (downhill < 0.0)) | ((numbers >= bounds.most) & (downhill > 0.0))

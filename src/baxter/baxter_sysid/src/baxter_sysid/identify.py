@@ -17,8 +17,8 @@ from urdf_model import Robot
 
 from . import fit as least
 from .arm_body import ArmBody, Array, arm_body, hand_in_last, with_load
-from .recording import COUNT_RAD, Recording, start_of
-from .replay import Motion, replay, set_points
+from .recording import COUNT_RAD, ArmRecording, start_of
+from .replay import ReplayedMotion, replay, set_points
 
 #: {number: (least, most, largest standard deviation with which it counts as determined: a share of it, or so much)}.
 FREE = {"proportional_gain": (5.0, 1500.0, 0.3, 0.0), "motor_damping": (0.05, 300.0, 0.45, 0.0),
@@ -55,7 +55,7 @@ class Settings(NamedTuple):
     jitter_s: float = 0.0
 
 
-class Found(NamedTuple):
+class IdentifiedNumbers(NamedTuple):
     """names (p,) of the fitted numbers, values and deviations (p,); refused: {name: deviation} of those that the
     recording does not determine; before, after, without (rows, arms, 7) [rad]: simulated less recorded, with the
     numbers as they were, as fitted, and, in each block of time, as fitted without it; motions: of each arm, after;
@@ -69,7 +69,7 @@ class Found(NamedTuple):
     before: Array
     after: Array
     without: Array
-    motions: list[Motion]
+    motions: list[ReplayedMotion]
     numbers: dict[str, Array]
 
     def value(self, name: Name, default: float = 0.0) -> float:
@@ -87,13 +87,13 @@ class _Arm(NamedTuple):
     sensed: Array
 
 
-class Model:
+class FittedModel:
     """Arms that share the numbers that are fitted, and their recording.
 
     rows: section "lag" of `effects.read`. Raises SysidError for a description that is no Baxter's.
     """
 
-    def __init__(self, robot: Robot, rows: dict, recording: Recording, sides: tuple[str, ...],
+    def __init__(self, robot: Robot, rows: dict, recording: ArmRecording, sides: tuple[str, ...],
                  settings: Settings) -> None:
         self.settings, self._period = settings, recording.period_s
         self.arms = [_Arm(side, arm_body(robot, side), hand_in_last(robot, side),
@@ -123,7 +123,7 @@ class Model:
                 numbers[NUMBERS.index(number), JOINTS.index(joint)] = value
         return numbers
 
-    def motions(self, names: list[Name], values: Array, draw: int = 0) -> list[Motion]:
+    def motions(self, names: list[Name], values: Array, draw: int = 0) -> list[ReplayedMotion]:
         """The motion of the arms with these numbers; draw: of the jitter."""
         common = dict(zip(names, values, strict=True))
         mass, found = float(common.get(MASS, self.settings.given)), []
@@ -142,7 +142,7 @@ class Model:
             self.motions(names, values, draw), self.arms, strict=True)], axis=1) for draw in draws], axis=0)
 
 
-def identify(model: Model) -> Found:
+def identify(model: FittedModel) -> IdentifiedNumbers:
     """Fit a model's numbers."""
     names, refused = model.names(), {}
     before = model.errors([], np.zeros(0))
@@ -171,13 +171,13 @@ def identify(model: Model) -> Found:
     for number, block in enumerate(least.block_slices(len(without))):
         without[block] = others[number][block]
     shape = (len(without), len(model.arms), len(JOINTS))
-    return Found(tuple(arm.side for arm in model.arms), names, found.numbers, found.deviation, refused,
-                 before.reshape(shape), found.error.reshape(shape), without.reshape(shape),
-                 model.motions(names, found.numbers),
-                 {arm.side: model.numbers(arm, names, found.numbers) for arm in model.arms})
+    return IdentifiedNumbers(tuple(arm.side for arm in model.arms), names, found.numbers, found.deviation, refused,
+                             before.reshape(shape), found.error.reshape(shape), without.reshape(shape),
+                             model.motions(names, found.numbers),
+                             {arm.side: model.numbers(arm, names, found.numbers) for arm in model.arms})
 
 
-def _left_out(model: Model, names: list[Name], found: least.Fit, bounds: least.Bounds) -> Array:
+def _left_out(model: FittedModel, names: list[Name], found: least.Fit, bounds: least.FitBounds) -> Array:
     """`fit.left_out` of a model. What friction held at the start is kept: other blocks of time say nothing of it."""
     free = np.array([name[0] != HELD for name in names])
 
@@ -187,7 +187,7 @@ def _left_out(model: Model, names: list[Name], found: least.Fit, bounds: least.B
         return model.errors(names, whole, _DRAWS if model.settings.jitter_s else (0,))
 
     part = least.Fit(found.numbers[free], found.error, found.slopes[free], found.deviation[free])
-    return least.left_out(errors, part, least.Bounds(*(each[free] for each in bounds)))
+    return least.left_out(errors, part, least.FitBounds(*(each[free] for each in bounds)))
 
 
 def _with_jitter(names: list[Name], found: least.Fit) -> Array:
@@ -207,10 +207,10 @@ def _limits(name: Name) -> tuple[float, float, float, float]:
     return COMMON[name] if name in COMMON else FREE[name[0]]
 
 
-def _bounds(names: list[Name], start: Array) -> least.Bounds:
+def _bounds(names: list[Name], start: Array) -> least.FitBounds:
     limits = np.array([_limits(name)[:2] for name in names])
     steps = np.where([name[0] == HELD for name in names], 0.02, np.maximum(0.02 * np.abs(start), 2e-3))
-    return least.Bounds(limits[:, 0], limits[:, 1], steps)
+    return least.FitBounds(limits[:, 0], limits[:, 1], steps)
 
 
 def _vague(names: list[Name], found: least.Fit) -> NDArray[np.bool_]:
@@ -226,7 +226,7 @@ def _vague(names: list[Name], found: least.Fit) -> NDArray[np.bool_]:
     return vague
 
 
-def table_of(table: dict, found: Found, source: str) -> dict:
+def table_of(table: dict, found: IdentifiedNumbers, source: str) -> dict:
     """A copy of the YAML table of physical_robot.yaml in which the fitted numbers are an arm's own."""
     lag = {number: {**row, "values": dict(row["values"])} for number, row in table["lag"].items()}
     for number, joint in found.names:

@@ -25,7 +25,7 @@ from urdf_model import Robot
 from .arm_body import Array
 from .errors import SysidError
 from .excitation import PERIOD_S
-from .recording import Recording
+from .recording import ArmRecording
 
 #: The way to the first set-point: its speed in the fastest joint [rad/s], and how near [rad] the arm must be there
 #: within so long [s].
@@ -43,7 +43,7 @@ class Stopped(SysidError):
     """The motion ended before its time, and the arm was told to stay where it was."""
 
 
-class Seen(NamedTuple):
+class ArmReading(NamedTuple):
     """time_s: of the robot's joint states; position (7,) [rad]; trouble: why the arm must not go on, else ""."""
 
     time_s: float
@@ -54,7 +54,7 @@ class Seen(NamedTuple):
 class RobotArm(Protocol):
     """One arm of a robot that is at hand."""
 
-    def next(self) -> Seen:
+    def next(self) -> ArmReading:
         """Wait for the next joint states. Raises SysidError if none come."""
         ...
 
@@ -116,7 +116,7 @@ def straight(start: Array, goal: Array) -> Array:
     return np.linspace(start, goal, count)
 
 
-def record(arm: RobotArm, way: Array, points: Array, side: str) -> Recording:
+def record(arm: RobotArm, way: Array, points: Array, side: str) -> ArmRecording:
     """Move an arm along `way` in position mode, then along raw set-points `points`, both (rows, 7) every PERIOD_S.
 
     What it does along `points` is returned. Whatever ends it, Ctrl-C too, the arm is told to stay where it is. Raises
@@ -140,7 +140,7 @@ def _stay(arm: RobotArm) -> None:
             arm.command(position, raw=False)
 
 
-def _follow(arm: RobotArm, seen: Seen, points: Array, raw: bool) -> list[tuple[Seen, Array]]:
+def _follow(arm: RobotArm, seen: ArmReading, points: Array, raw: bool) -> list[tuple[ArmReading, Array]]:
     """[(what was seen, the set-points (7,) sent then)], until the last one was sent."""
     begin, rows = seen.time_s, []
     end = PERIOD_S * (len(points) - 1)
@@ -156,7 +156,7 @@ def _follow(arm: RobotArm, seen: Seen, points: Array, raw: bool) -> list[tuple[S
         seen = arm.next()
 
 
-def _settle(arm: RobotArm, seen: Seen, goal: Array) -> Seen:
+def _settle(arm: RobotArm, seen: ArmReading, goal: Array) -> ArmReading:
     """Wait until the arm rests at `goal` (7,)."""
     begin, last = seen.time_s, deque([seen])
     while True:
@@ -175,7 +175,7 @@ def _settle(arm: RobotArm, seen: Seen, goal: Array) -> Seen:
                 JOINTS[int(np.argmax(off))], off.max()))
 
 
-def _require(seen: Seen, before_s: float, largest_gap_s: float) -> None:
+def _require(seen: ArmReading, before_s: float, largest_gap_s: float) -> None:
     if seen.trouble:
         raise Stopped(seen.trouble)
     if not -1e-9 <= seen.time_s - before_s <= largest_gap_s:
@@ -184,7 +184,7 @@ def _require(seen: Seen, before_s: float, largest_gap_s: float) -> None:
                           before_s, seen.time_s, largest_gap_s))
 
 
-def resampled(rows: list[tuple[Seen, Array]], side: str) -> Recording:
+def resampled(rows: list[tuple[ArmReading, Array]], side: str) -> ArmRecording:
     """The recording in equal steps; rows: of what was seen, and what was sent then. Joint states of the same time count
     once."""
     times = np.array([seen.time_s for seen, _ in rows])
@@ -193,4 +193,4 @@ def resampled(rows: list[tuple[Seen, Array]], side: str) -> Recording:
     grid = PERIOD_S * np.arange(int(times[-1] / PERIOD_S) + 1)
     sensed, sent = (np.array(each)[keep] for each in zip(*((seen.position, goal) for seen, goal in rows), strict=True))
     arrays = [np.stack([np.interp(grid, times, joint) for joint in values.T], axis=1) for values in (sent, sensed)]
-    return Recording(grid, {side: arrays[0]}, {side: arrays[1]})
+    return ArmRecording(grid, {side: arrays[0]}, {side: arrays[1]})

@@ -31,7 +31,7 @@ _REST_S = 1.0
 _CREEPING, _STILL_RAD = 0.005, 0.005  # [rad/s], [rad]: a joint at rest is not faster, and not farther from a line
 
 
-class Recording(NamedTuple):
+class ArmRecording(NamedTuple):
     """time_s (rows,), in equal steps; commanded, sensed: {side: (rows, 7) [rad]}, s0 to w2."""
 
     time_s: Array
@@ -43,7 +43,7 @@ class Recording(NamedTuple):
         return float(np.median(np.diff(self.time_s)))
 
     @classmethod
-    def read(cls, path: str | Path) -> Recording:
+    def read(cls, path: str | Path) -> ArmRecording:
         """Read a CSV file with the columns time_s, left_s0_commanded_rad, left_s0_sensed_rad ... of one arm or both;
         its rows are put into equal steps of whole ticks. Raises SysidError where it cannot be used.
         """
@@ -113,7 +113,7 @@ class Recording(NamedTuple):
                                  "its numbers if each joint that is fitted goes some 0.1 rad or more" % (
                                      name, side, way.max()))
 
-    def in_ticks(self) -> Recording:
+    def in_ticks(self) -> ArmRecording:
         """The same in equal steps of whole ticks, as a replay needs it."""
         step = TICK_S * max(1, round(self.period_s / TICK_S))
         grid = self.time_s[0] + step * np.arange(1 + int((self.time_s[-1] - self.time_s[0]) / step + 0.01))
@@ -121,7 +121,7 @@ class Recording(NamedTuple):
             return self
         arms = [{side: np.stack([np.interp(grid, self.time_s, joint) for joint in rows.T], axis=1)
                  for side, rows in each.items()} for each in (self.commanded, self.sensed)]
-        return Recording(grid, *arms)
+        return ArmRecording(grid, *arms)
 
     def write(self, path: str | Path) -> None:
         """Write the CSV file that `read` reads."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_sim_hardware.arms import actuators
-from baxter_sim_hardware.arms.actuators import Wanted, turn
+from baxter_sim_hardware.arms.actuators import ActuatorCommands, turn
 from baxter_sim_hardware.robot import INERTIA_TICKS
 from disk_cache.compiled import compiler
 
@@ -22,7 +22,7 @@ _compiled = compiler("baxter_sysid", [__file__, arm_body.__file__, actuators.__f
 ARM_TICKS = 5  # the inertia of an arm changes that slowly
 
 
-class Motion(NamedTuple):
+class ReplayedMotion(NamedTuple):
     """position (rows, n) [rad]; bounded (rows, n): whether a motor was at its torque limit since the row before;
     effort (rows, n) [Nm]: what the actuators exerted, counterbalance not counted."""
 
@@ -64,7 +64,7 @@ def _streamed(commanded: Array, came: Array, period_s: float, time_s: Array) -> 
 
 
 def replay(body: ArmBody, known: ArmBody, numbers: Array, start: Sequence[Array], points: Array,
-           period_s: float) -> Motion:
+           period_s: float) -> ReplayedMotion:
     """The motion of an arm along set-points.
 
     known: the arm as gravity compensation knows it; numbers: (k, n) of the actuators, in the order of
@@ -74,8 +74,8 @@ def replay(body: ArmBody, known: ArmBody, numbers: Array, start: Sequence[Array]
     """
     whole = np.zeros((3, len(start[0])))
     whole[:len(start)] = start
-    return Motion(*_replay(body, known, np.ascontiguousarray(numbers), whole, np.ascontiguousarray(points),
-                           round(period_s / TICK_S)))
+    return ReplayedMotion(*_replay(body, known, np.ascontiguousarray(numbers), whole, np.ascontiguousarray(points),
+                                   round(period_s / TICK_S)))
 
 
 @_compiled
@@ -112,7 +112,8 @@ def _replay(body: ArmBody, known: ArmBody, numbers: Array, begin: Array, points:
             if tick % INERTIA_TICKS == 0:
                 for i in range(count):
                     links[2, i] = matrix[i, i]
-        torque = turn(state, begun, numbers, Wanted(driven, points[tick], still, raw, gravity, limit), links, dt)
+        torque = turn(state, begun, numbers, ActuatorCommands(driven, points[tick], still, raw, gravity, limit), links,
+                      dt)
         torques(body, turned, links[1], still, GRAVITY, work, own)
         row = tick // every + 1
         for i in range(count):

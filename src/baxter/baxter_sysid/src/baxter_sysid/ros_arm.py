@@ -19,8 +19,8 @@ from urdf_model import Robot, UrdfError, parse_urdf
 from .arm_body import Array
 from .errors import SysidError
 from .excitation import PERIOD_S, motion
-from .live import Seen, Space, record, straight
-from .recording import Recording
+from .live import ArmReading, Space, record, straight
+from .recording import ArmRecording
 
 #: Within this [s, wall] joint states must come; at first, within the longer one.
 _SILENT_S, _START_S = 2.0, 20.0
@@ -29,7 +29,7 @@ _LATE_S = 0.5
 _COMMANDS = "robot/limb/%s/joint_command"
 
 
-class RosArm:
+class IdentifiedRosArm:
     """One arm, as `live.RobotArm`. Make it after rospy.init_node. Raises SysidError if the robot does not report."""
 
     def __init__(self, side: str) -> None:
@@ -58,13 +58,13 @@ class RosArm:
         with self._changed:
             return np.array([self._joints[name] for name in self._names[side]])
 
-    def next(self) -> Seen:
+    def next(self) -> ArmReading:
         """As `live.RobotArm` says."""
         self._wait(lambda: self._count > self._told, _SILENT_S, "robot/joint_states")
         with self._changed:
             self._told = self._count
             position = np.array([self._joints[name] for name in self._names[self.side]])
-            return Seen(self._stamp_s, position, self._trouble())
+            return ArmReading(self._stamp_s, position, self._trouble())
 
     def command(self, position: Array, raw: bool) -> None:
         """As `live.RobotArm` says."""
@@ -127,7 +127,7 @@ def _publishers(master: Any) -> list[tuple[str, list[str]]]:
     return master.getSystemState()[0]
 
 
-def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tuple[Robot, Recording]:
+def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tuple[Robot, ArmRecording]:
     """Move one arm of the robot on the ROS master, after `agreed(what will happen)`. This process becomes a node.
 
     Returns the robot's description, and the recording. Raises SysidError.
@@ -141,7 +141,7 @@ def record_live(side: str, seconds: float, agreed: Callable[[str], bool]) -> tup
         robot = parse_urdf(str(rospy.get_param("robot_description")), source="robot_description")
     except (KeyError, OSError, rospy.ROSException, UrdfError) as error:
         raise SysidError("robot_description on %s cannot be used: %s" % (uri, error)) from error
-    space, arm = Space(robot), RosArm(side)
+    space, arm = Space(robot), IdentifiedRosArm(side)
     if trouble := arm.next().trouble:
         raise SysidError(trouble)
     other, = set(SIDES) - {side}

@@ -9,15 +9,15 @@ from baxter_sim_hardware.arms.actuators import NUMBERS
 
 from .arm_body import Array
 from .fit import rms
-from .identify import HELD, Found
+from .identify import HELD, IdentifiedNumbers
 from .recording import COUNT_RAD
-from .replay import Motion
+from .replay import ReplayedMotion
 
 _QUIET = 0.01  # [rad] errors below it have no cause worth naming
 _FAST = 0.05  # [rad/s]
 
 
-def errors(found: Found) -> list[str]:
+def errors(found: IdentifiedNumbers) -> list[str]:
     """Lines: RMSE [rad] of each joint before, after and left out, and the largest error."""
     lines = ["%-9s %9s %9s %9s %9s" % ("joint", "before", "after", "left out", "largest")]
     for arm, side in enumerate(found.sides):
@@ -28,7 +28,7 @@ def errors(found: Found) -> list[str]:
     return lines
 
 
-def numbers(found: Found) -> list[str]:
+def numbers(found: IdentifiedNumbers) -> list[str]:
     """Lines: the fitted numbers with their standard deviations, and what the recording does not determine."""
     lines = ["%s of %s: %.4g, +- %.2g" % (number, joint, value, deviation)
              for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True)
@@ -43,7 +43,7 @@ def numbers(found: Found) -> list[str]:
                     for (number, joint), deviation in found.refused.items() if number != HELD]
 
 
-def worst_seconds(time_s: Array, error: Array, motion: Motion, names: list[str],
+def worst_seconds(time_s: Array, error: Array, motion: ReplayedMotion, names: list[str],
                   events: dict[str, list[tuple[float, str]]] | None = None) -> list[str]:
     """Lines: for each joint the second in which `error` (rows, n) [rad] is largest, and what the model does there.
 

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from baxter_interface import RobotEnable
 from baxter_model import joint_names
 from baxter_sim_hardware import effects
-from baxter_sysid.recording import Recording
+from baxter_sysid.recording import ArmRecording
 from lab_testing.waiting import stretched, wait_for_message, wait_for_time, wait_until
 
 SIDE = "left"
@@ -89,7 +89,7 @@ class LiveTest(unittest.TestCase):
             found = effects.read(out)["lag"]["proportional_gain"]["%s_s0" % SIDE]
             usual = effects.read(effects.physical_robot())["lag"]["proportional_gain"]["s0"]
             self.assertLess(abs(found / usual - 1.0), 0.05)
-            self.assertGreater(len(Recording.read(kept).time_s), 1500)
+            self.assertGreater(len(ArmRecording.read(kept).time_s), 1500)
 
     def test_ctrl_c_ends_it(self):
         program = self.start("--yes")

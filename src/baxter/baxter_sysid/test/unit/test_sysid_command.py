@@ -13,7 +13,7 @@ import pytest
 
 from baxter_model import poses
 from baxter_sysid import results
-from baxter_sysid.recording import Recording
+from baxter_sysid.recording import ArmRecording
 from lab_testing.waiting import stretched, wait_until
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "sysid"
@@ -71,7 +71,7 @@ def written(path, rows=100, still=False):
     """A CSV file of a left arm that swings."""
     time_s = 0.01 * np.arange(rows)
     positions = NEUTRAL + 0.2 * np.sin(time_s)[:, None] * (not still)
-    Recording(time_s, {"left": positions}, {"left": positions}).write(path)
+    ArmRecording(time_s, {"left": positions}, {"left": positions}).write(path)
     return str(path)
 
 

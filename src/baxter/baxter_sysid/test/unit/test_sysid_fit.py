@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from baxter_sysid.fit import Bounds, block_slices, instrumented, least_squares, left_out, rms
+from baxter_sysid.fit import FitBounds, block_slices, instrumented, least_squares, left_out, rms
 
 TIME_S = np.linspace(0.0, 4.0, 400)
 TRUE = np.array([2.0, 0.7])
-BOUNDS = Bounds(np.array([0.0, 0.0]), np.array([10.0, 5.0]), np.array([0.02, 0.01]))
+BOUNDS = FitBounds(np.array([0.0, 0.0]), np.array([10.0, 5.0]), np.array([0.02, 0.01]))
 
 
 def model(numbers):
@@ -41,7 +41,7 @@ def test_numbers_of_which_only_the_ratio_counts_are_uncertain():
 
 
 def test_a_model_with_noise_of_its_own_is_fitted_without_bias():
-    swing, bounds = np.sin(3.0 * TIME_S), Bounds(np.array([0.0]), np.array([10.0]), np.array([0.02]))
+    swing, bounds = np.sin(3.0 * TIME_S), FitBounds(np.array([0.0]), np.array([10.0]), np.array([0.02]))
 
     def response(gain, draw):
         return gain * (swing + 0.5 * np.random.default_rng(draw).standard_normal(len(TIME_S)))[:, None]

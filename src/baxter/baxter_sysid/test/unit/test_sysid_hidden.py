@@ -14,8 +14,8 @@ from baxter_model import JOINTS, SIDES, joint_names
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.simulated import Which
 from baxter_sysid.excitation import PERIOD_S, motion
-from baxter_sysid.identify import DELAY, EXCESS, JITTER_S, LOAD_M, MASS, Model, Settings, identify
-from baxter_sysid.recording import Recording
+from baxter_sysid.identify import DELAY, EXCESS, JITTER_S, LOAD_M, MASS, FittedModel, Settings, identify
+from baxter_sysid.recording import ArmRecording
 from urdf_model import parse_urdf
 
 WEIGHT = ('<robot name="w"><link name="weight"><inertial><mass value="%g"/>'
@@ -59,7 +59,7 @@ def recorded(path, side, seed, noise, delay, mass):
                 lab.step()
                 tick += 1
     sensed = np.array(rows) + noise * random.standard_normal((len(way), len(JOINTS)))
-    return Recording(PERIOD_S * np.arange(len(way)), {side: way}, {side: sensed})
+    return ArmRecording(PERIOD_S * np.arange(len(way)), {side: way}, {side: sensed})
 
 
 @pytest.mark.long
@@ -74,8 +74,8 @@ def test_a_hidden_robot_is_found_again(tmp_path, seed, noise, delay, mass, stick
     file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     bare = parse_urdf(xacro.process_file(file, mappings={"%s_gripper" % one: "none" for one in SIDES}).toxml())
     rows = effects.read(effects.physical_robot())["lag"]
-    found = identify(Model(bare, rows, recorded(path, side, seed, noise, delay, mass), (side,),
-                           Settings(load=bool(mass), delay=True, excess=not mass, jitter_s=delay[1] - delay[0])))
+    found = identify(FittedModel(bare, rows, recorded(path, side, seed, noise, delay, mass), (side,),
+                                 Settings(load=bool(mass), delay=True, excess=not mass, jitter_s=delay[1] - delay[0])))
     assert set(found.refused) == set()
     off = {}
     for (number, joint), value, deviation in zip(found.names, found.values, found.deviations, strict=True):

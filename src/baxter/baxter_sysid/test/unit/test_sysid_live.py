@@ -8,7 +8,7 @@ import xacro
 from baxter_model import SIDES, poses
 from baxter_sysid.errors import SysidError
 from baxter_sysid.excitation import PERIOD_S, motion
-from baxter_sysid.live import LARGEST_GAP_S, Seen, Space, Stopped, record, straight
+from baxter_sysid.live import LARGEST_GAP_S, ArmReading, Space, Stopped, record, straight
 from urdf_model import parse_urdf
 
 
@@ -30,7 +30,7 @@ class FollowingArm:
         event = self.events.get(len(self.commands), "")
         if isinstance(event, BaseException):
             raise event
-        return Seen(self.time_s, self.position + self.noise_rad * self.random.standard_normal(7), event)
+        return ArmReading(self.time_s, self.position + self.noise_rad * self.random.standard_normal(7), event)
 
     def command(self, position, raw):
         self.commands.append((np.array(position), raw))

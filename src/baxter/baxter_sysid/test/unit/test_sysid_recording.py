@@ -8,7 +8,7 @@ import xacro
 from baxter_model import JOINTS, joint_names, poses
 from baxter_sysid.arm_body import TICK_S
 from baxter_sysid.errors import SysidError
-from baxter_sysid.recording import Recording, start_of
+from baxter_sysid.recording import ArmRecording, start_of
 from urdf_model import parse_urdf
 
 COLUMNS = ["time_s", *("left_%s_%s_rad" % (joint, kind) for kind in ("commanded", "sensed") for joint in JOINTS)]
@@ -24,7 +24,7 @@ def robot():
 def swinging(time_s):
     """A recording of an arm that swings around its pose, exactly as it is commanded."""
     rows = NEUTRAL + 0.2 * np.sin(time_s)[:, None]
-    return Recording(time_s, {"left": rows}, {"left": rows.copy()})
+    return ArmRecording(time_s, {"left": rows}, {"left": rows.copy()})
 
 
 def text_of(recording, mark=","):
@@ -65,14 +65,14 @@ def test_an_error_says_what_was_found(tmp_path, text, said):
     path = tmp_path / "arm.csv"
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(SysidError, match="arm.csv") as caught:
-        Recording.read(path)
+        ArmRecording.read(path)
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_what_is_no_file_is_refused_at_once(tmp_path):
     for path, said in ((tmp_path, "folder"), ("/dev/zero", "device"), (tmp_path / "none.csv", "none.csv cannot")):
         with pytest.raises(SysidError, match=said):
-            Recording.read(path)
+            ArmRecording.read(path)
 
 
 def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path):
@@ -80,7 +80,7 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path):
     with path.open("wb") as file:
         file.truncate(10**12)
     with pytest.raises(SysidError, match="1000000000000 bytes, expected at most"):
-        Recording.read(path)
+        ArmRecording.read(path)
 
 
 def test_a_table_of_other_programs_is_read(tmp_path):
@@ -89,7 +89,7 @@ def test_a_table_of_other_programs_is_read(tmp_path):
              *(line + ",words" for line in LINES[1:]), ""]
     (tmp_path / "arm.csv").write_text("\r\n".join(lines), encoding="utf-8")
     (tmp_path / "plain.csv").write_text(GOOD)
-    read, plain = (Recording.read(tmp_path / name) for name in ("arm.csv", "plain.csv"))
+    read, plain = (ArmRecording.read(tmp_path / name) for name in ("arm.csv", "plain.csv"))
     np.testing.assert_array_equal(read.sensed["left"], plain.sensed["left"])
 
 
@@ -99,7 +99,7 @@ def test_rows_of_any_rate_are_put_into_whole_ticks(tmp_path, period_s, step_s):
     time_s[1:-1] += 0.3 * period_s * np.random.default_rng(0).uniform(-1.0, 1.0, len(time_s) - 2) * (period_s < 0.05)
     path = tmp_path / "arm.csv"
     path.write_text(text_of(swinging(time_s)))
-    read = Recording.read(path)
+    read = ArmRecording.read(path)
     np.testing.assert_allclose(np.diff(read.time_s), step_s, atol=1e-9)
     assert read.time_s[-1] == pytest.approx(time_s[-1], abs=step_s + 1e-6)
     np.testing.assert_allclose(read.sensed["left"], swinging(read.time_s).sensed["left"], atol=1e-4)
@@ -108,8 +108,8 @@ def test_rows_of_any_rate_are_put_into_whole_ticks(tmp_path, period_s, step_s):
 def test_an_arm_that_cannot_have_been_there_is_refused(robot):
     good = swinging(0.01 * np.arange(200))
     good.require_motion("it", robot, ("left",))
-    degrees = Recording(good.time_s, *({"left": np.degrees(good.commanded["left"])} for _ in range(2)))
-    still = Recording(good.time_s, *({"left": np.tile(NEUTRAL, (200, 1))} for _ in range(2)))
+    degrees = ArmRecording(good.time_s, *({"left": np.degrees(good.commanded["left"])} for _ in range(2)))
+    still = ArmRecording(good.time_s, *({"left": np.tile(NEUTRAL, (200, 1))} for _ in range(2)))
     swapped = good.commanded["left"].copy()
     swapped[:, [1, 3]] = swapped[:, [3, 1]]
     for recording, said in ((degrees, "in degrees"), (still, "is commanded to go farther than 0 rad"),

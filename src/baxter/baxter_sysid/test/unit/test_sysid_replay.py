@@ -13,8 +13,8 @@ from baxter_sim_hardware.arms.actuators import NUMBERS
 from baxter_sysid.arm_body import TICK_S, arm_body, hand_in_last, holding_torques, with_load
 from baxter_sysid.errors import SysidError
 from baxter_sysid.excitation import AMPLITUDES, PERIOD_S, motion
-from baxter_sysid.identify import DELAY, HELD, LOAD_M, MASS, Model, Settings, identify, table_of
-from baxter_sysid.recording import Recording, start_of
+from baxter_sysid.identify import DELAY, HELD, LOAD_M, MASS, FittedModel, Settings, identify, table_of
+from baxter_sysid.recording import ArmRecording, start_of
 from baxter_sysid.replay import replay, set_points
 from baxter_sysid.sheet import errors, numbers, worst_seconds
 from bullet_sim import World
@@ -140,15 +140,15 @@ def record(robot, rows, side, seed, mass=0.0, delay=0.0, seconds=12.0):
     done = replay(loaded, body, actuators(rows, side), (commanded[0], np.zeros(7), held),
                   set_points(commanded, PERIOD_S, delay), PERIOD_S).position
     counts = (done + 4e-4 * np.random.default_rng(seed).standard_normal(done.shape)) / 0.000383495
-    return Recording(PERIOD_S * np.arange(len(done)), {side: commanded}, {side: 0.000383495 * np.round(counts)})
+    return ArmRecording(PERIOD_S * np.arange(len(done)), {side: commanded}, {side: 0.000383495 * np.round(counts)})
 
 
 @pytest.fixture(scope="module")
 def found(robot, rows):
     truth = hidden(rows, 5)
     recording = record(robot, truth, "left", 5, mass=0.8, delay=0.012)
-    return truth, recording, identify(Model(robot, rows, recording, ("left",),
-                                            Settings(load=True, delay=True, excess=False)))
+    return truth, recording, identify(FittedModel(robot, rows, recording, ("left",),
+                                                  Settings(load=True, delay=True, excess=False)))
 
 
 def test_a_hidden_robot_with_a_weight_and_late_messages_is_found_again(found):
@@ -191,7 +191,7 @@ def test_what_is_fitted_is_the_arms_own_in_the_file_that_is_written(found, rows,
 def test_a_recording_is_what_was_written(tmp_path, robot, rows):
     recording = record(robot, rows, "right", 1, seconds=1.0)
     recording.write(tmp_path / "arm.csv")
-    again = Recording.read(tmp_path / "arm.csv")
+    again = ArmRecording.read(tmp_path / "arm.csv")
     np.testing.assert_allclose(again.sensed["right"], recording.sensed["right"], atol=1e-6)
     assert set(again.commanded) == {"right"} and again.period_s == pytest.approx(0.01)
 
@@ -204,4 +204,4 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path, text, said):
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(SysidError, match=said):
-        Recording.read(path)
+        ArmRecording.read(path)

@@ -33,7 +33,7 @@ ESCAPE_TRIES = 60
 ESCAPE_SLACK_M = 0.001
 
 
-class NoPath(Exception):
+class NoFreePath(Exception):
     """No free path was found; the text gives the reason."""
 
 
@@ -58,12 +58,12 @@ class PathPlanner:
         """Return a path from `start` to `goal` as a list of postures, straight in between; `via`: postures to try
         first.
 
-        A start in contact is left by a path that increases the clearance. Raises NoPath.
+        A start in contact is left by a path that increases the clearance. Raises NoFreePath.
         """
         first, last = np.asarray(start, dtype=float), np.asarray(goal, dtype=float)
         at_goal_m = self._clearance(last)
         if at_goal_m <= 0.0:
-            raise NoPath("parts of the robot overlap by %.0f mm where it should go" % (-1000.0 * at_goal_m))
+            raise NoFreePath("parts of the robot overlap by %.0f mm where it should go" % (-1000.0 * at_goal_m))
         # The folded arm is closer to its own body than the margin of a path.
         margin_m = min(self._margin_m, 0.9 * at_goal_m)
         way = [first]
@@ -88,7 +88,7 @@ class PathPlanner:
                 end = np.clip(start + self._rng.uniform(-radius, radius, len(start)), self._lower, self._upper)
                 if self._clearance(end) >= margin_m and self._is_free(start, end, touch_m - ESCAPE_SLACK_M):
                     return end
-        raise NoPath("parts of the robot touch (clearance %.0f mm) and no way out was found" % (1000.0 * touch_m))
+        raise NoFreePath("parts of the robot touch (clearance %.0f mm) and no way out was found" % (1000.0 * touch_m))
 
     def _connect(self, start: np.ndarray, goal: np.ndarray, margin_m: float) -> list[np.ndarray]:
         trees = [_Tree(start), _Tree(goal)]
@@ -102,7 +102,7 @@ class PathPlanner:
                 if np.array_equal(other.postures[meeting], target):
                     here, there = grown.branch(node), other.branch(meeting)
                     return here[::-1] + there[1:] if grown is trees[0] else there[::-1] + here[1:]
-        raise NoPath("no free way was found in %d tries" % TREE_LIMIT)
+        raise NoFreePath("no free way was found in %d tries" % TREE_LIMIT)
 
     def _grow(self, tree: _Tree, target: np.ndarray, margin_m: float) -> int | None:
         """Extend `tree` towards `target`; return the new node, or None if it is blocked."""

@@ -23,7 +23,7 @@ from baxter_interface.resets import PUT_ELSEWHERE
 from baxter_model import SIDES, poses
 from baxter_model.readiness import NOT_ENABLED
 
-from .path_planner import NoPath, PathPlanner
+from .path_planner import NoFreePath, PathPlanner
 from .self_clearance import SelfClearance
 
 # Least distance between parts on the path [m]; the folded arms themselves are nearer to each other.
@@ -36,7 +36,7 @@ SUPPRESS_RATE_HZ = 20.0
 OPEN_POSES = ("untucked", "neutral")
 
 
-class Arms:
+class BothArms:
     """Both arms as one set of joints."""
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class Tucking:
         start = np.array([angles[name] for name in self._names])
         try:
             way = planner.plan(start, self._posture(pose), via=[self._posture(name) for name in OPEN_POSES])
-        except NoPath as failure:
+        except NoFreePath as failure:
             raise ProgramFailed("there is no way to the pose %r: %s. Move the arms a little by hand, or with "
                                 "joint_position_keyboard.py" % (pose, failure)) from failure
         return [dict(zip(self._names, posture.tolist(), strict=True)) for posture in way]

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from baxter_tools.path_planner import ESCAPE_SLACK_M, NoPath, PathPlanner
+from baxter_tools.path_planner import ESCAPE_SLACK_M, NoFreePath, PathPlanner
 
 LOWER, UPPER = (-1.0, -1.0), (1.0, 1.0)
 MARGIN_M = 0.05
@@ -64,10 +64,10 @@ def test_goal_near_the_wall_lowers_the_margin_to_its_own():
 
 
 def test_goal_inside_is_refused():
-    with pytest.raises(NoPath, match="overlap by 100 mm"):
+    with pytest.raises(NoFreePath, match="overlap by 100 mm"):
         planner().plan(START, (0.0, 0.0))
 
 
 def test_closed_wall_is_refused():
-    with pytest.raises(NoPath, match="no free way"):
+    with pytest.raises(NoFreePath, match="no free way"):
         planner(lambda point: wall(point, top=2.0)).plan(START, GOAL)

@@ -11,7 +11,7 @@ import numpy as np
 WOOD, STEEL, RED = (0.72, 0.45, 0.25, 1.0), (0.55, 0.57, 0.62, 1.0), (0.75, 0.20, 0.16, 1.0)
 
 
-class Part(NamedTuple):
+class SolidPart(NamedTuple):
     """A box of `size` (3,), or a cylinder (radius, length) along z, [m], with its middle at `place` (3,) [m];
     density [kg/m^3]."""
 
@@ -36,10 +36,10 @@ class Part(NamedTuple):
         return self.mass_kg * np.diag([across, across, 0.5 * radius**2])
 
 
-class Link(NamedTuple):
+class CompositeBody(NamedTuple):
     """A body of several parts; friction: None for the world's usual."""
 
-    parts: Sequence[Part]
+    parts: Sequence[SolidPart]
     colour: tuple = WOOD
     friction: float | None = None
 
@@ -55,7 +55,7 @@ class Slide(NamedTuple):
     damping: float
 
 
-def urdf(name: str, links: dict[str, Link], slides: Sequence[Slide] = ()) -> str:
+def urdf(name: str, links: dict[str, CompositeBody], slides: Sequence[Slide] = ()) -> str:
     """The description of a thing; the first link is its root."""
     robot = ElementTree.Element("robot", name=name)
     for link_name, link in links.items():
@@ -74,7 +74,7 @@ def _text(numbers: Iterable[float]) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
-def _add_link(robot: ElementTree.Element, name: str, body: Link) -> None:
+def _add_link(robot: ElementTree.Element, name: str, body: CompositeBody) -> None:
     link = ElementTree.SubElement(robot, "link", name=name)
     masses = [part.mass_kg for part in body.parts]
     total = sum(masses)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from baxter_lab.saving import SavedState
 
-    from .randomised import Drawn
+    from .randomised import EpisodeDraw
 
 # Set-points are streamed at 100 Hz, as programs on the robot do.
 STREAM_S = 0.01
@@ -155,13 +155,13 @@ class Core:
 
     # -- states
 
-    def save(self) -> tuple[SavedState, list[Callable[[], object]], dict[str, Any], Drawn]:
+    def save(self) -> tuple[SavedState, list[Callable[[], object]], dict[str, Any], EpisodeDraw]:
         """The whole state: the physics, the robot's control logic, the task's."""
         logic = [restorer(vars(control)) for control in self._controls]
         goal = {name: value for name, value in vars(self.task).items() if name == "goal"}
         return self.lab.save(), logic, goal, self._randomiser.drawn
 
-    def restore(self, state: tuple[SavedState, list[Callable[[], object]], dict[str, Any], Drawn]) -> dict:
+    def restore(self, state: tuple[SavedState, list[Callable[[], object]], dict[str, Any], EpisodeDraw]) -> dict:
         """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
         for bit. Raises LabError."""
         saved, logic, task, drawn = state

@@ -8,7 +8,7 @@ import numpy as np
 
 from baxter_lab import Lab
 
-from .bodies import STEEL, WOOD, Link, Part, Slide, urdf
+from .bodies import STEEL, WOOD, CompositeBody, Slide, SolidPart, urdf
 from .names import places, poses
 from .stage import Stage
 from .task import TABLE_TOP_M, Task, near, posed
@@ -90,27 +90,29 @@ class Drawer(Task[Lab]):
     def build(self) -> None:
         self._table((0.6, 1.2), (0.85, 0.1))
         depth, width, height = self.SIZE_M
-        links = {"cabinet": Link(self._box((depth, width, height), 0.0), WOOD),
-                 "drawer": Link([*self._box((depth - 0.03, width - 0.04, height - 0.03), -0.015), *self._handle()],
-                                STEEL, friction=1.0)}
+        links = {"cabinet": CompositeBody(self._box((depth, width, height), 0.0), WOOD),
+                 "drawer": CompositeBody([*self._box((depth - 0.03, width - 0.04, height - 0.03), -0.015),
+                                          *self._handle()],
+                                         STEEL, friction=1.0)}
         slide = Slide("cabinet", "drawer", (-1.0, 0.0, 0.0), self.TRAVEL_M, self.FRICTION_N, self.DAMPING)
         self.cabinet = self.lab.add_urdf("cabinet", urdf("cabinet", links, [slide]),
                                          (0.9, 0.2, TABLE_TOP_M + 0.5 * height), static=True)
         self._joint = self.cabinet.model.index(["drawer_slide"])
 
-    def _box(self, size: tuple[float, float, float], ahead: float) -> list[Part]:
+    def _box(self, size: tuple[float, float, float], ahead: float) -> list[SolidPart]:
         """Bottom, back and sides of a box without a lid, and without a front where it is the cabinet."""
         (x, y, z), wall = size, self.WALL_M
-        parts = [Part((x, y, wall), (ahead, 0.0, 0.5 * (wall - z)), 300.0),
-                 Part((wall, y, z), (ahead + 0.5 * (x - wall), 0.0, 0.0), 300.0)]
-        return parts + [Part((x, wall, z), (ahead, sign * 0.5 * (y - wall), 0.0), 300.0) for sign in (-1.0, 1.0)]
+        parts = [SolidPart((x, y, wall), (ahead, 0.0, 0.5 * (wall - z)), 300.0),
+                 SolidPart((wall, y, z), (ahead + 0.5 * (x - wall), 0.0, 0.0), 300.0)]
+        return parts + [SolidPart((x, wall, z), (ahead, sign * 0.5 * (y - wall), 0.0), 300.0) for sign in (-1.0, 1.0)]
 
-    def _handle(self) -> list[Part]:
+    def _handle(self) -> list[SolidPart]:
         """The front of the drawer, its handle's bar, and what holds the bar."""
         depth, width, height = self.SIZE_M
         front, bar = -0.5 * (depth + self.WALL_M), self._bar()
-        found = [Part((self.WALL_M, width, height), (front, 0.0, 0.0), 300.0), Part(self.BAR_M, bar, 300.0)]
-        return found + [Part((self.BEFORE_M, 0.01, 0.01), (bar[0] + 0.5 * self.BEFORE_M, sign * 0.055, bar[2]), 300.0)
+        found = [SolidPart((self.WALL_M, width, height), (front, 0.0, 0.0), 300.0), SolidPart(self.BAR_M, bar, 300.0)]
+        return found + [SolidPart((self.BEFORE_M, 0.01, 0.01), (bar[0] + 0.5 * self.BEFORE_M, sign * 0.055, bar[2]),
+                                  300.0)
                         for sign in (-1.0, 1.0)]
 
     def _bar(self) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from baxter_lab import Lab, Tool
 from urdf_model.transforms import quaternion_from_matrix
 
-from .bodies import RED, WOOD, Link, Part, urdf
+from .bodies import RED, WOOD, CompositeBody, SolidPart, urdf
 from .names import places, poses
 from .task import Task
 
@@ -36,8 +36,8 @@ class TwoArmPegInHole(Task[Lab]):
 
     @classmethod
     def robot(cls, options: Options) -> Options:
-        peg = Link([Part((cls.RADIUS_M, 2.0 * cls.HALF_LENGTH_M), (0.0, 0.0, 0.0))], RED)
-        plate = Link([Part(size, place) for size, place in cls.PLATE], WOOD)
+        peg = CompositeBody([SolidPart((cls.RADIUS_M, 2.0 * cls.HALF_LENGTH_M), (0.0, 0.0, 0.0))], RED)
+        plate = CompositeBody([SolidPart(size, place) for size, place in cls.PLATE], WOOD)
         tools = (Tool("left", urdf("plate", {"plate": plate}), cls.PLATE_PLACE_M, (math.pi / 2.0, 0.0, math.pi)),
                  Tool("right", urdf("peg", {"peg": peg}), (0.0, 0.0, cls.HALF_LENGTH_M)))
         return options._replace(left_gripper="none", right_gripper="none", tools=tools)

@@ -38,7 +38,7 @@ class Randomised(NamedTuple):
                 raise ValueError("randomised.%s is %r; it must be a number from 0" % (name, value))
 
 
-class Drawn(NamedTuple):
+class EpisodeDraw(NamedTuple):
     """Of one episode. masses, frictions: factors of the things in their order; light: (3,) factors of red, green and
     blue; cameras: (n, 4, 4), each a camera's pose in its usual frame."""
 
@@ -58,7 +58,8 @@ class Randomiser:
         self._bodies = [[(model, body, None if model.static else model.inertial(body), link.surface)
                          for body, link in model.merged.links.items()] for model in things]
         count = len(things)
-        self.drawn = Drawn(np.ones(count), np.ones(count), np.ones(3), np.tile(np.eye(4), (len(self._cameras), 1, 1)))
+        self.drawn = EpisodeDraw(np.ones(count), np.ones(count), np.ones(3),
+                                 np.tile(np.eye(4), (len(self._cameras), 1, 1)))
 
     def draw(self, random: np.random.Generator) -> None:
         """Another episode."""
@@ -72,9 +73,9 @@ class Randomiser:
         shifts, turns = random.uniform(-1.0, 1.0, (2, len(self._cameras), 3))
         cameras = [pose_matrix(much.camera_m * shift, much.camera_rad * turn)
                    for shift, turn in zip(shifts, turns, strict=True)]
-        self.put(Drawn(masses, frictions, light, np.reshape(cameras, (-1, 4, 4))))
+        self.put(EpisodeDraw(masses, frictions, light, np.reshape(cameras, (-1, 4, 4))))
 
-    def put(self, drawn: Drawn) -> None:
+    def put(self, drawn: EpisodeDraw) -> None:
         """Make the things so."""
         for bodies, mass, friction in zip(self._bodies, drawn.masses, drawn.frictions, strict=True):
             for model, body, inertial, surface in bodies:

@@ -11,7 +11,7 @@ import numpy as np
 from baxter_lab import Lab, Thing
 from baxter_model import SIDES
 
-from .bodies import RED, STEEL, WOOD, Link, Part, urdf
+from .bodies import RED, STEEL, WOOD, CompositeBody, SolidPart, urdf
 from .names import places, poses
 from .task import TABLE_TOP_M, Task, posed
 
@@ -41,25 +41,25 @@ class TwoArmTransport(Task[Lab]):
         self.bins = {name: self._bin(name, x, sign * self.TABLE_Y_M) for name, x, sign in (
             ("start_bin", self.APART_M, -1.0), ("target_bin", -self.APART_M, 1.0), ("trash_bin", self.APART_M, 1.0))}
         lid, knob = self.LID_M, self.KNOB_M
-        self.lid = self.lab.add_urdf("lid", urdf("lid", {"lid": Link([
-            Part(lid, (0.0, 0.0, 0.0), self.LID_DENSITY),
-            Part(knob, (0.0, 0.0, 0.5 * (lid[2] + knob[2])), self.KNOB_DENSITY)], STEEL)}), (0.86, -0.45, 0.1))
+        self.lid = self.lab.add_urdf("lid", urdf("lid", {"lid": CompositeBody([
+            SolidPart(lid, (0.0, 0.0, 0.0), self.LID_DENSITY),
+            SolidPart(knob, (0.0, 0.0, 0.5 * (lid[2] + knob[2])), self.KNOB_DENSITY)], STEEL)}), (0.86, -0.45, 0.1))
         width = 2.0 * self.HALF_WIDTH_M
-        self.hammer = self.lab.add_urdf("hammer", urdf("hammer", {"hammer": Link([
-            Part((self.HANDLE_M, width, width), (0.0, 0.0, 0.0), self.DENSITY),
-            Part(self.HEAD_M, (0.5 * (self.HANDLE_M + self.HEAD_M[0]), 0.0, 0.0), self.HEAD_DENSITY)],
+        self.hammer = self.lab.add_urdf("hammer", urdf("hammer", {"hammer": CompositeBody([
+            SolidPart((self.HANDLE_M, width, width), (0.0, 0.0, 0.0), self.DENSITY),
+            SolidPart(self.HEAD_M, (0.5 * (self.HANDLE_M + self.HEAD_M[0]), 0.0, 0.0), self.HEAD_DENSITY)],
             WOOD, self.FRICTION)}), (0.86, -0.45, 0.0))
-        self.trash = self.lab.add_urdf("trash", urdf("trash", {"trash": Link([
-            Part((self.CUBE_M,) * 3, (0.0, 0.0, 0.0))], RED)}), (0.46, 0.45, 0.0))
+        self.trash = self.lab.add_urdf("trash", urdf("trash", {"trash": CompositeBody([
+            SolidPart((self.CUBE_M,) * 3, (0.0, 0.0, 0.0))], RED)}), (0.46, 0.45, 0.0))
 
     def _bin(self, name: str, x: float, y: float) -> Thing:
         length, width, height = self.BIN_M
         wall = self.WALL_M
-        parts = [Part((length - wall, width - wall, wall), (0.0, 0.0, 0.5 * (wall - height)))]
+        parts = [SolidPart((length - wall, width - wall, wall), (0.0, 0.0, 0.5 * (wall - height)))]
         for sign in (-1.0, 1.0):
-            parts += [Part((wall, width, height), (sign * 0.5 * (length - wall), 0.0, 0.0)),
-                      Part((length, wall, height), (0.0, sign * 0.5 * (width - wall), 0.0))]
-        return self.lab.add_urdf(name, urdf(name, {name: Link(parts, (0.85, 0.85, 0.88, 1.0))}),
+            parts += [SolidPart((wall, width, height), (sign * 0.5 * (length - wall), 0.0, 0.0)),
+                      SolidPart((length, wall, height), (0.0, sign * 0.5 * (width - wall), 0.0))]
+        return self.lab.add_urdf(name, urdf(name, {name: CompositeBody(parts, (0.85, 0.85, 0.88, 1.0))}),
                                  (self.TABLE_X_M + x, y, TABLE_TOP_M + 0.5 * height), static=True)
 
     def begin(self, random: np.random.Generator) -> None:

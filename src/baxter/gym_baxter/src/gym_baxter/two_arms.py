@@ -9,7 +9,7 @@ import numpy as np
 
 from baxter_model import SIDES
 
-from .bodies import STEEL, Link, Part, urdf
+from .bodies import STEEL, CompositeBody, SolidPart, urdf
 from .names import places, poses
 from .stage import Stage
 from .task import TABLE_TOP_M, Task, near, posed
@@ -28,10 +28,10 @@ class TwoArmLift(Task[Stage]):
 
     def build(self) -> None:
         self._table((0.8, 0.8), (0.26 + 0.4, 0.0))
-        self.pot = self.lab.add_urdf("pot", urdf("pot", {"link": Link(self._parts(), STEEL)}),
+        self.pot = self.lab.add_urdf("pot", urdf("pot", {"link": CompositeBody(self._parts(), STEEL)}),
                                      (0.66, 0.0, TABLE_TOP_M + self.HALF_M))
 
-    def _parts(self) -> list[Part]:
+    def _parts(self) -> list[SolidPart]:
         """Walls, bottom and handles; the handles are along y."""
         half, wall, rod, handle = self.HALF_M, self.WALL_M, self.ROD_M, self.HANDLE_M
         found = [((2 * half, 2 * half, wall), (0.0, 0.0, 0.5 * wall - half))]
@@ -43,7 +43,7 @@ class TwoArmLift(Task[Stage]):
             found += [((rod, handle, rod), (across * 0.5 * (handle - rod), sign * out, half - rod))
                       for across in (-1.0, 1.0)]
             found.append(((handle, rod, rod), (0.0, sign * (half + handle + 0.5 * rod), half - rod)))
-        return [Part(size, place, self.DENSITY) for size, place in found]
+        return [SolidPart(size, place, self.DENSITY) for size, place in found]
 
     def begin(self, random: np.random.Generator) -> None:
         x, y = random.uniform(-0.03, 0.03, 2)
@@ -101,9 +101,10 @@ class TwoArmHandover(Task[Stage]):
         # A quarter of a table of 0.8 x 1.2 m, on the right.
         self._table((0.8, 0.3), (0.26 + 0.4, -0.45))
         width = 2.0 * self.HALF_WIDTH_M
-        parts = [Part((self.LENGTH_M, width, width), (0.0, 0.0, 0.0), self.DENSITY),
-                 Part(self.HEAD_M, (0.5 * (self.LENGTH_M + self.HEAD_M[0]), 0.0, 0.0), self.DENSITY)]
-        self.hammer = self.lab.add_urdf("hammer", urdf("hammer", {"link": Link(parts, friction=self.FRICTION)}),
+        parts = [SolidPart((self.LENGTH_M, width, width), (0.0, 0.0, 0.0), self.DENSITY),
+                 SolidPart(self.HEAD_M, (0.5 * (self.LENGTH_M + self.HEAD_M[0]), 0.0, 0.0), self.DENSITY)]
+        self.hammer = self.lab.add_urdf("hammer",
+                                        urdf("hammer", {"link": CompositeBody(parts, friction=self.FRICTION)}),
                                         (0.6, -0.45, TABLE_TOP_M + 0.5 * self.HEAD_M[2]))
 
     def begin(self, random: np.random.Generator) -> None:

@@ -22,8 +22,8 @@ from command_line.options import Parser
 from command_line.user_files import PIPE_WAIT_S, read_file
 from lab_class import control, control_groups, memory
 from lab_class.disk import ENTRIES, entries_left, remove, room
-from lab_class.labs import ClassError, State
-from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError, default_folder
+from lab_class.labs import ClassError, ClassLabState
+from lab_class.store import HOME, RUNTIME, ClassOptions, ClassRecord, Store, StoreError, default_folder
 from lab_web.libraries import LibrariesError, fetched
 from processes import isolation
 from processes.family import is_running
@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     """The options; ``run`` is the command's function."""
-    defaults = Options()
+    defaults = ClassOptions()
     parser = Parser(prog="./baxter.sh labs", description="Labs for a class on this machine, each behind walls, with "
                     "one address for each student; docs/class.md.")
     text = "of the class: roster, tokens, students' files (default: %s)" % default_folder()
@@ -190,9 +190,9 @@ def _record(options: argparse.Namespace, store: Store) -> ClassRecord:
         values["idle_s"] = options.idle or None
     if options.who is None and earlier is not None:
         kept = {**vars(earlier.options), **values}
-        return ClassRecord.made(Options(**kept), earlier.students, earlier)
+        return ClassRecord.made(ClassOptions(**kept), earlier.students, earlier)
     values.setdefault("at_once", max(1, (os.cpu_count() or 1) // 2))
-    return ClassRecord.made(Options(**values), _students(options.who or ""), earlier)
+    return ClassRecord.made(ClassOptions(**values), _students(options.who or ""), earlier)
 
 
 def _is_up(store: Store) -> bool:
@@ -247,7 +247,7 @@ def _up(options: argparse.Namespace, store: Store):
     return _DONE if options.no_wait else _await_labs(store)
 
 
-def _refuse_launch_outside(options: Options) -> None:
+def _refuse_launch_outside(options: ClassOptions) -> None:
     """Labs behind walls see the workspace, and no other folder of this user."""
     file = Path(options.launch[0])
     seen = [*isolation.workspaces(os.environ), "/usr", "/opt"]
@@ -307,15 +307,15 @@ def _await_labs(store: Store) -> int:
         while True:
             labs = control.call(store, "GET", "/labs")["labs"]
             for lab in labs:
-                is_waiting = lab["state"] == State.WAITING.value and not lab["reason"]
+                is_waiting = lab["state"] == ClassLabState.WAITING.value and not lab["reason"]
                 if lab["name"] not in shown and not lab["is_starting"] and not is_waiting:
                     shown.add(lab["name"])
                     print("%s is %s%s" % (lab["name"], lab["state"], ": " + lab["reason"] if lab["reason"] else ""),
                           flush=True)
             if len(shown) == len(labs):
-                if any(lab["state"] == State.PAUSED.value for lab in labs):
+                if any(lab["state"] == ClassLabState.PAUSED.value for lab in labs):
                     print("A paused lab goes on as soon as its page is opened.", flush=True)
-                return _FAILED if any(lab["state"] == State.FAILED.value for lab in labs) else _DONE
+                return _FAILED if any(lab["state"] == ClassLabState.FAILED.value for lab in labs) else _DONE
             time.sleep(_LOOK_S)
     except KeyboardInterrupt:
         print("\nThe class goes on; %s shows it." % store.command("list"))
@@ -357,7 +357,7 @@ def _shown(value: Any, form: str, unit: float = 1.0):
 def _change(options: argparse.Namespace, store: Store):
     names = options.names
     if names == ["all"]:
-        wanted = {"pause": (State.RUNNING.value,)}.get(options.verb)
+        wanted = {"pause": (ClassLabState.RUNNING.value,)}.get(options.verb)
         names = [lab["name"] for lab in control.call(store, "GET", "/labs")["labs"]
                  if wanted is None or lab["state"] in wanted]
     for name in names:

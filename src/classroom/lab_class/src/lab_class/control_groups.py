@@ -50,7 +50,7 @@ class _Home:
     is_own: bool = False
 
 
-class Group:
+class LabGroup:
     """The groups of one lab: a folder in each _Home."""
 
     def __init__(self, folders: list[tuple[_Home, Path]]) -> None:
@@ -125,8 +125,8 @@ class ControlGroups:
         what = "control groups for " + ", ".join(self.controllers) if self.controllers else "no control groups"
         return "%s (%s); the supervisor looks at each lab's memory" % (what, "; ".join(self._problems))
 
-    def lab(self, name: str, memory_bytes: int, tasks: int) -> Group:
-        """A Group with its limits. Raises OSError."""
+    def lab(self, name: str, memory_bytes: int, tasks: int) -> LabGroup:
+        """A LabGroup with its limits. Raises OSError."""
         made = []
         for home in self._homes:
             folder = home.folder / name
@@ -138,7 +138,7 @@ class ControlGroups:
                 optional = "sw" in file or "tcp" in file
                 with contextlib.suppress(FileNotFoundError) if optional else contextlib.nullcontext():
                     _write(folder / file, value)
-        return Group(made)
+        return LabGroup(made)
 
     def remove(self) -> None:
         """Remove all groups of the class."""

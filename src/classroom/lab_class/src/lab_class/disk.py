@@ -48,7 +48,7 @@ class _Limit:
         return True
 
 
-class Quota:
+class DiskQuota:
     """The limits of each lab's files. ``limit_bytes``; ``folder``: one on the disk of the labs' files [Path];
     ``entries``: of files and folders."""
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from tornado import web
 
-from lab_class.labs import MAX_FAILURES, ClassError, Kind, Role, State, may
+from lab_class.labs import MAX_FAILURES, ClassError, ClassLabState, Kind, Role, may
 from lab_class.store import StoreError
 from web_bridge import http_text
 from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from tornado.httputil import HTTPHeaders
 
-    from lab_class.labs import Lab
+    from lab_class.labs import ClassLab
     from lab_class.store import ClassRecord
     from lab_class.supervisor import Supervisor
 
@@ -48,7 +48,7 @@ def same(token: str, known: str) -> bool:
     return hmac.compare_digest(token.encode("utf-8", "surrogateescape"), known.encode())
 
 
-class Door:
+class FrontDoor:
     """State that the handlers share. ``record``: store.ClassRecord; ``supervisor``: supervisor.Supervisor."""
 
     def __init__(self, record: ClassRecord, supervisor: Supervisor) -> None:
@@ -68,23 +68,23 @@ class Door:
     def is_instructor(self, token: str) -> bool:
         return same(token, self.record.instructor)
 
-    def words_of(self, lab: Lab) -> str:
+    def words_of(self, lab: ClassLab) -> str:
         """The text for the student of a lab that does not run."""
-        if lab.state is State.WAITING and lab.reason:
+        if lab.state is ClassLabState.WAITING and lab.reason:
             return "The lab is going to start. It waits: %s." % lab.reason
-        if lab.state is State.WAITING:
+        if lab.state is ClassLabState.WAITING:
             before = self.supervisor.labs.place_in_line(lab.name)
             return "The lab is going to start; %s." % ("%d start before it" % before if before else "it is the next")
-        if lab.state is State.STARTING:
+        if lab.state is ClassLabState.STARTING:
             return "The lab is starting. This page opens it as soon as it runs."
-        if lab.state is State.FAILED:
+        if lab.state is ClassLabState.FAILED:
             again = "It starts again." if lab.failures < MAX_FAILURES else "The instructor can start it again."
             return "The lab has ended: %s. %s" % (lab.reason, again)
         return "The instructor has stopped this lab."
 
 
 class _Handler(PlainHandler):
-    def initialize(self, door: Door) -> None:
+    def initialize(self, door: FrontDoor) -> None:
         self.door = door
 
 
@@ -120,7 +120,7 @@ class Passed(PassingHandler):
 
     SERVER, OWN_COOKIE = "the lab", COOKIE
 
-    def initialize(self, door: Door) -> None:
+    def initialize(self, door: FrontDoor) -> None:
         super().initialize()
         self.door = door
 
@@ -144,7 +144,7 @@ class Passed(PassingHandler):
                 self.refuse(409, "this lab is not awake")
             return
         lab = self.door.supervisor.request(self._name)
-        if lab.state is not State.RUNNING:
+        if lab.state is not ClassLabState.RUNNING:
             self._say_wait(lab)
         elif lab.busy + lab.sockets >= MAX_AT_ONCE:
             self.refuse(429, "this lab has %d requests and open pages already; close some" % MAX_AT_ONCE)
@@ -184,7 +184,7 @@ class Passed(PassingHandler):
         # A paused lab would find old heartbeats when it wakes, and take them for a page that is there.
         return self.door.supervisor.is_awake(self._name)
 
-    def _say_wait(self, lab: Lab) -> None:
+    def _say_wait(self, lab: ClassLab) -> None:
         words = self.door.words_of(lab)
         if "text/html" not in self.request.headers.get("Accept", ""):
             self.set_header("Retry-After", str(_AGAIN_S))
@@ -199,7 +199,7 @@ class _ForInstructor(_Handler):
     """Needs the instructor's token in a header, which no page of a lab can send; ``trusted``: at the control socket,
     which belongs to the owner of the class alone."""
 
-    def initialize(self, door: Door, trusted: bool = False) -> None:
+    def initialize(self, door: FrontDoor, trusted: bool = False) -> None:
         super().initialize(door)
         self._trusted = trusted
 
@@ -255,7 +255,7 @@ class Down(_ForInstructor):
 class InstructorPage(_Handler):
     """The page has no secret; the labs that it shows need the token."""
 
-    def initialize(self, door: Door, page: Path) -> None:
+    def initialize(self, door: FrontDoor, page: Path) -> None:
         super().initialize(door)
         self._page = page
 
@@ -271,7 +271,7 @@ class InstructorPage(_Handler):
         self.finish((self._page / file).read_text(encoding="utf-8"))
 
 
-def application(door: Door, page: Path) -> web.Application:
+def application(door: FrontDoor, page: Path) -> web.Application:
     """The front door; ``page``: folder of the instructor's page [Path]."""
     prefix = re.escape(door.record.options.prefix)
     return web.Application([
@@ -282,7 +282,7 @@ def application(door: Door, page: Path) -> web.Application:
         (prefix + r"/([a-z0-9-]+)(?:/.*)?", Passed, {"door": door})], log_function=lambda handler: None)
 
 
-def control(door: Door) -> web.Application:
+def control(door: FrontDoor) -> web.Application:
     """The same for the commands of the class's owner, at the control socket."""
     owner = {"door": door, "trusted": True}
     return web.Application([(r"/labs", Overview, owner), (r"/labs/([a-z0-9-]+)/([a-z]+)", Change, owner),

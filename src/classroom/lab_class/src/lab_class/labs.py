@@ -16,7 +16,7 @@ STEADY_S = 60.0
 HAND_OVER_S = 15.0
 
 
-class State(enum.Enum):
+class ClassLabState(enum.Enum):
     """Of a lab. The value is the word that people see."""
 
     STOPPED = "stopped"
@@ -58,13 +58,13 @@ class ClassError(Exception):
 
 
 @dataclass
-class Lab:
+class ClassLab:
     """One lab; times are of the clock that the caller passes in [s]. ``busy``: answers that are under way;
     ``sockets``: open WebSockets, of which ``pages`` are the lab's page; ``visited``: a client has asked since the lab
     was told to start; ``settled``: it has finished starting, of which its first answer is only a part."""
 
     name: str
-    state: State = State.STOPPED
+    state: ClassLabState = ClassLabState.STOPPED
     since: float = 0.0
     used: float = 0.0
     busy: int = 0
@@ -79,11 +79,11 @@ class Lab:
     @property
     def is_starting(self) -> bool:
         """Whether it takes the place of one of those that start at a time."""
-        return self.state is State.STARTING or (self.state is State.RUNNING and not self.settled)
+        return self.state is ClassLabState.STARTING or (self.state is ClassLabState.RUNNING and not self.settled)
 
     @property
     def has_processes(self) -> bool:
-        return self.state in (State.STARTING, State.RUNNING, State.PAUSED)
+        return self.state in (ClassLabState.STARTING, ClassLabState.RUNNING, ClassLabState.PAUSED)
 
 
 class Labs:
@@ -93,15 +93,15 @@ class Labs:
         """names: in the order of the roster; at_once: labs that may start at a time; idle_s: a lab without a client for
         so long is paused [s], or None; keep_running: else a lab that had no client yet is paused when it has settled,
         unless idle_s is None."""
-        self._labs = {name: Lab(name) for name in names}
+        self._labs = {name: ClassLab(name) for name in names}
         self._at_once, self._idle_s = at_once, idle_s
         self._waits_paused = idle_s is not None and not keep_running
         self._handed_over = -HAND_OVER_S
 
-    def __iter__(self) -> Iterator[Lab]:
+    def __iter__(self) -> Iterator[ClassLab]:
         return iter(self._labs.values())
 
-    def __getitem__(self, name: str) -> Lab:
+    def __getitem__(self, name: str) -> ClassLab:
         if name not in self._labs:
             raise ClassError("there is no lab %s; there are: %s" % (name, ", ".join(self._labs)))
         return self._labs[name]
@@ -116,9 +116,9 @@ class Labs:
     def start(self, name: str, now: float) -> list[Any]:
         """The instructor, or the beginning of the class, wants this lab."""
         lab = self[name]
-        if lab.state is State.PAUSED:
+        if lab.state is ClassLabState.PAUSED:
             return self._wake(lab, now)
-        if lab.state in (State.STOPPED, State.FAILED):
+        if lab.state in (ClassLabState.STOPPED, ClassLabState.FAILED):
             lab.failures = 0
             self._enter_line(lab, now)
         return []
@@ -127,30 +127,30 @@ class Labs:
         """The instructor ends this lab."""
         lab = self[name]
         had_processes = lab.has_processes
-        self._set(lab, State.STOPPED, now)
+        self._set(lab, ClassLabState.STOPPED, now)
         return [(Action.END, name)] if had_processes else []
 
     def pause(self, name: str, now: float) -> list[tuple[Action, str]]:
         """Raises ClassError unless the lab is running."""
         lab = self[name]
-        if lab.state is State.PAUSED:
+        if lab.state is ClassLabState.PAUSED:
             return []
-        if lab.state is not State.RUNNING:
+        if lab.state is not ClassLabState.RUNNING:
             raise ClassError("the lab %s is %s; only a running lab can be paused" % (name, lab.state.value))
         # When it goes on, nobody waits for the end of its start any more.
         lab.settled = True
-        self._set(lab, State.PAUSED, now)
+        self._set(lab, ClassLabState.PAUSED, now)
         return [(Action.PAUSE, name)]
 
     def request(self, name: str, now: float) -> list[tuple[Action, str]]:
         """A client with a token asks this lab for something."""
         lab = self[name]
         lab.used = now
-        if lab.state is State.PAUSED:
+        if lab.state is ClassLabState.PAUSED:
             return self._wake(lab, now)
-        if lab.state is State.FAILED and lab.failures < MAX_FAILURES:
+        if lab.state is ClassLabState.FAILED and lab.failures < MAX_FAILURES:
             self._enter_line(lab, now)
-        lab.asked = lab.state is State.WAITING
+        lab.asked = lab.state is ClassLabState.WAITING
         lab.visited = True
         return []
 
@@ -167,8 +167,8 @@ class Labs:
     def answered(self, name: str, now: float) -> None:
         """A lab that was starting answers requests."""
         lab = self[name]
-        if lab.state is State.STARTING:
-            self._set(lab, State.RUNNING, now)
+        if lab.state is ClassLabState.STARTING:
+            self._set(lab, ClassLabState.RUNNING, now)
             lab.used = now
 
     def has_settled(self, name: str, now: float) -> list[tuple[Action, str]]:
@@ -197,9 +197,9 @@ class Labs:
         """
         actions = []
         for lab in self:
-            if lab.state is State.STARTING and now - lab.since > START_LIMIT_S:
+            if lab.state is ClassLabState.STARTING and now - lab.since > START_LIMIT_S:
                 actions += self._fail(lab, "it did not answer within %d s" % START_LIMIT_S, now)
-            elif (lab.state is State.RUNNING and self._idle_s is not None and not lab.busy
+            elif (lab.state is ClassLabState.RUNNING and self._idle_s is not None and not lab.busy
                   and now - lab.used > self._idle_s):
                 actions += self.pause(lab.name, now)
         starting = sum(lab.is_starting for lab in self)
@@ -209,39 +209,39 @@ class Labs:
         if shortage and any(lab.has_processes for lab in self):
             return actions + self._hand_over(now)
         for lab in self._line()[:max(0, self._at_once - starting)]:
-            self._set(lab, State.STARTING, now)
+            self._set(lab, ClassLabState.STARTING, now)
             actions.append((Action.START, lab.name))
         return actions
 
     def _hand_over(self, now: float) -> list[tuple[Action, str]]:
         """A paused lab that nobody has visited ends, and waits, where another one has a visitor and may not start."""
-        unused = [lab for lab in self if lab.state is State.PAUSED and not lab.visited]
+        unused = [lab for lab in self if lab.state is ClassLabState.PAUSED and not lab.visited]
         if not unused or not any(lab.asked for lab in self._line()) or now - self._handed_over < HAND_OVER_S:
             return []
         self._handed_over = now
         self._enter_line(unused[-1], now)
         return [(Action.END, unused[-1].name)]
 
-    def _line(self) -> list[Lab]:
+    def _line(self) -> list[ClassLab]:
         """Waiting labs: those with a waiting client first, then in the order of the roster."""
-        return sorted((lab for lab in self if lab.state is State.WAITING), key=lambda lab: not lab.asked)
+        return sorted((lab for lab in self if lab.state is ClassLabState.WAITING), key=lambda lab: not lab.asked)
 
-    def _enter_line(self, lab: Lab, now: float) -> None:
+    def _enter_line(self, lab: ClassLab, now: float) -> None:
         lab.visited = lab.settled = False
-        self._set(lab, State.WAITING, now)
+        self._set(lab, ClassLabState.WAITING, now)
 
-    def _wake(self, lab: Lab, now: float) -> list[tuple[Action, str]]:
-        self._set(lab, State.RUNNING, now)
+    def _wake(self, lab: ClassLab, now: float) -> list[tuple[Action, str]]:
+        self._set(lab, ClassLabState.RUNNING, now)
         lab.used = now
         return [(Action.WAKE, lab.name)]
 
-    def _fail(self, lab: Lab, reason: str, now: float) -> list[tuple[Action, str]]:
-        lab.failures = 1 if lab.state is State.RUNNING and now - lab.since > STEADY_S else lab.failures + 1
-        self._set(lab, State.FAILED, now, reason)
+    def _fail(self, lab: ClassLab, reason: str, now: float) -> list[tuple[Action, str]]:
+        lab.failures = 1 if lab.state is ClassLabState.RUNNING and now - lab.since > STEADY_S else lab.failures + 1
+        self._set(lab, ClassLabState.FAILED, now, reason)
         return [(Action.END, lab.name)]
 
     @staticmethod
-    def _set(lab: Lab, state: State, now: float, reason: str = "") -> None:
+    def _set(lab: ClassLab, state: ClassLabState, now: float, reason: str = "") -> None:
         lab.state, lab.since, lab.reason, lab.asked = state, now, reason, False
 
 

@@ -17,7 +17,7 @@ from rf_checks.handout import STUBBED, emptied_notebook, stub
 from world_picture.results import READY, cache_folder, ready_for
 
 if TYPE_CHECKING:
-    from lab_class.store import Options, Tokens
+    from lab_class.store import ClassOptions, Tokens
 
 #: Ports inside of a lab's separate network, as on any lab's machine.
 MASTER_PORT, PAGE_PORT = 11311, 8090
@@ -30,7 +30,7 @@ HIDDEN = (*hidden_paths.SOLVED, ".baxter/jupyter", ".baxter/logs", ".baxter/labs
 
 
 @dataclass(frozen=True)
-class Place:
+class LabPlace:
     """Where a lab runs. ``folder``: of its files [Path]; ``state_folder``: of the class, which no lab shows;
     ``libraries``: of the page's libraries [Path]; ``walls``: in a sandbox."""
 
@@ -40,12 +40,12 @@ class Place:
     walls: bool
 
 
-def prepared(place: Place, options: Options, tokens: Tokens, listener: int,
+def prepared(place: LabPlace, options: ClassOptions, tokens: Tokens, listener: int,
              refused: tuple[list[Any], tuple[Any, ...]]) -> tuple[list[str], dict[str, str], tuple[int]]:
     """(command, environment, descriptors to inherit) of one lab.
 
-    options, tokens: store.Options, store.Tokens; listener: descriptor of the socket that the front door connects to;
-    refused: what `system_calls.refused` yields. Raises isolation.NotIsolated, OSError without a free port.
+    options, tokens: store.ClassOptions, store.Tokens; listener: descriptor of the socket that the front door connects
+    to; refused: what `system_calls.refused` yields. Raises isolation.NotIsolated, OSError without a free port.
     """
     if place.walls:
         home, master, page = isolation.HOME, MASTER_PORT, PAGE_PORT

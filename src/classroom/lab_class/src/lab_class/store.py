@@ -35,7 +35,7 @@ class StoreError(Exception):
 
 
 @dataclass(frozen=True)
-class Options:
+class ClassOptions:
     """How a class runs. ``launch``: the words after roslaunch, by default with 100 messages of the clock a second;
     ``idle_s``: None means never; ``keep_running``: labs do not wait for their first visitor paused; ``memory_bytes``,
     ``disk_bytes``: of each lab; ``at_once``: labs that start at a time; ``address``: of a server in front of the
@@ -71,13 +71,13 @@ class Tokens:
 class ClassRecord:
     """The content of class.json: options, students, tokens by name, the instructor's token."""
 
-    options: Options
+    options: ClassOptions
     students: tuple
     tokens: dict
     instructor: str
 
     @staticmethod
-    def made(options: Options, students: Sequence[Student], earlier: ClassRecord | None = None) -> ClassRecord:
+    def made(options: ClassOptions, students: Sequence[Student], earlier: ClassRecord | None = None) -> ClassRecord:
         """A record for these students; those of an ``earlier`` one keep their tokens."""
         known = earlier.tokens if earlier else {}
         tokens = {student.name: known.get(student.name) or Tokens(_token(), _token()) for student in students}
@@ -140,10 +140,10 @@ class Store:
             return None
         try:
             found = json.loads(data.decode("utf-8"))
-            names = {one.name for one in fields(Options)}
+            names = {one.name for one in fields(ClassOptions)}
             options = {name: value for name, value in found["options"].items() if name in names}
             options["launch"] = tuple(options["launch"])
-            return ClassRecord(Options(**options), tuple(Student(*row) for row in found["students"]),
+            return ClassRecord(ClassOptions(**options), tuple(Student(*row) for row in found["students"]),
                                {name: Tokens(*pair) for name, pair in found["tokens"].items()}, found["instructor"])
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise StoreError("%s is not the record of a class (%s: %s); remove it to begin again, which gives the "

@@ -23,10 +23,10 @@ from tornado import netutil
 from tornado.httpserver import HTTPServer
 
 from lab_class import control_groups, front_door, launching, memory
-from lab_class.disk import Quota, remove
+from lab_class.disk import DiskQuota, remove
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess
-from lab_class.labs import Action, ClassError, Labs, State
+from lab_class.labs import Action, ClassError, ClassLabState, Labs
 from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.settling import Settling, demand_s
 from lab_class.store import HOME, RUNTIME, Store, StoreError
@@ -35,7 +35,7 @@ from processes.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
 if TYPE_CHECKING:
-    from lab_class.labs import Kind, Lab
+    from lab_class.labs import ClassLab, Kind
     from lab_class.store import ClassRecord
 
 _TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S = 0.2, 0.5, 2.0, 5.0
@@ -58,7 +58,7 @@ class Supervisor:
         names = [student.name for student in record.students]
         options = record.options
         self.labs = Labs(names, options.at_once, options.idle_s, options.keep_running)
-        self.door = front_door.Door(record, self)
+        self.door = front_door.FrontDoor(record, self)
         self._page = page
         self._processes, self._listeners, self._tasks, self._memory, self._groups = {}, {}, {}, {}, {}
         self._end = asyncio.Event()
@@ -66,7 +66,7 @@ class Supervisor:
         self._runtime = Path(tempfile.mkdtemp(prefix=RUNTIME))
         self._factors = Factors(self.socket_of, lambda name: self._record.tokens[name].view)
         self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
-        self._quota, self._scratch = Quota(options.disk_bytes, store.folder), Scratch()
+        self._quota, self._scratch = DiskQuota(options.disk_bytes, store.folder), Scratch()
         self._class_groups = control_groups.found(self._runtime.name, len(names))
 
     # For the front door.
@@ -75,13 +75,13 @@ class Supervisor:
         """The socket on which a lab answers [Path]."""
         return self._runtime / name
 
-    def request(self, name: str) -> Lab:
-        """A client asks this lab for something: wake it. Returns its labs.Lab."""
+    def request(self, name: str) -> ClassLab:
+        """A client asks this lab for something: wake it. Returns its labs.ClassLab."""
         self._do(self.labs.request(name, self._now()))
         return self.labs[name]
 
     def is_awake(self, name: str) -> bool:
-        return self.labs[name].state is State.RUNNING
+        return self.labs[name].state is ClassLabState.RUNNING
 
     def serving(self, name: str, kind: Kind, by: int) -> None:
         """The number of a lab's connections of one labs.Kind changes ``by`` 1 or -1."""
@@ -116,8 +116,8 @@ class Supervisor:
                 "name": lab.name, "full_name": student.full_name, "state": lab.state.value,
                 "is_starting": lab.is_starting, "reason": lab.reason,
                 "since_s": round(now - lab.since, 1), "unused_s": round(now - lab.used, 1) if lab.used else None,
-                "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
-                "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
+                "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is ClassLabState.RUNNING
+                else None, "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
                 "disk_bytes": self._quota.used.get(lab.name), "token": tokens.act, "view_token": tokens.view,
                 "verdicts": self._verdicts[lab.name].known})
         return {"labs": labs, "idle_s": self._record.options.idle_s, "limits": str(self._class_groups)}
@@ -228,11 +228,11 @@ class Supervisor:
         self._tasks[name] = asyncio.ensure_future(next_one())
 
     async def _start(self, name: str) -> None:
-        if self.labs[name].state is not State.STARTING:
+        if self.labs[name].state is not ClassLabState.STARTING:
             return
         try:
-            place = launching.Place(self._store.lab(name), self._store.folder, self._libraries,
-                                    not self._record.options.trusted)
+            place = launching.LabPlace(self._store.lab(name), self._store.folder, self._libraries,
+                                       not self._record.options.trusted)
             with launching.refused(place.walls) as refused:
                 started = await asyncio.get_running_loop().run_in_executor(
                     None, launching.prepared, place, self._record.options, self._record.tokens[name],
@@ -247,7 +247,7 @@ class Supervisor:
         asyncio.ensure_future(self._await_answer(name, self._processes[name]))
 
     async def _await_answer(self, name: str, process: Any) -> None:
-        while self._processes.get(name) is process and self.labs[name].state is State.STARTING:
+        while self._processes.get(name) is process and self.labs[name].state is ClassLabState.STARTING:
             if await self._answers(name):
                 self.labs.answered(name, self._now())
                 self._factors.follow(name)
@@ -320,7 +320,7 @@ class Supervisor:
         for name, process in list(self._processes.items()):
             group = self._groups.get(name)
             # Nothing changes while it is paused.
-            if group is None or (self.labs[name].state is State.PAUSED and name in self._memory):
+            if group is None or (self.labs[name].state is ClassLabState.PAUSED and name in self._memory):
                 continue
             used = group.memory_bytes()
             if used is None:
@@ -345,7 +345,7 @@ class Supervisor:
 
     async def _look_at_scratch(self) -> None:
         for name, process in list(self._processes.items()):
-            if self.labs[name].state is not State.PAUSED:
+            if self.labs[name].state is not ClassLabState.PAUSED:
                 self._exceed(name, self._scratch.exceeded(name, process.family))
 
     async def _look_at_verdicts(self) -> None:

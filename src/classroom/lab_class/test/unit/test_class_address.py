@@ -9,8 +9,8 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import command, front_door, launching
-from lab_class.labs import ClassError, Labs, State
-from lab_class.store import ClassRecord, Options, Store, Tokens
+from lab_class.labs import ClassError, ClassLabState, Labs
+from lab_class.store import ClassOptions, ClassRecord, Store, Tokens
 from rf_checks.roster import Student
 from world_picture.results import READY
 
@@ -28,10 +28,10 @@ class Supervisor:
 
 
 def test_printed_addresses_begin_with_the_servers(tmp_path):
-    record = ClassRecord.made(Options(address=ADDRESS), [Student("anna", "Anna")])
+    record = ClassRecord.made(ClassOptions(address=ADDRESS), [Student("anna", "Anna")])
     address = command._address(record, Store(tmp_path), "anna")
     assert address == "%s/anna/?token=%s" % (ADDRESS, record.tokens["anna"].act)
-    assert Options(address=ADDRESS).prefix == PREFIX and Options(address="https://labs.example").prefix == ""
+    assert ClassOptions(address=ADDRESS).prefix == PREFIX and ClassOptions(address="https://labs.example").prefix == ""
 
 
 @pytest.mark.parametrize("text", ["labs.example", "ftp://labs.example", "https:///x", "https://a/b?c", "https://a/(.*)"])
@@ -43,10 +43,10 @@ def test_an_address_that_is_none(text):
 
 def test_all_paths_of_the_door_begin_with_the_servers():
     async def check():
-        record = ClassRecord.made(Options(address=ADDRESS), [Student("anna", "Anna")])
+        record = ClassRecord.made(ClassOptions(address=ADDRESS), [Student("anna", "Anna")])
         supervisor = Supervisor()
-        supervisor.labs["anna"].state = State.STOPPED
-        server = HTTPServer(front_door.application(front_door.Door(record, supervisor), PAGE))
+        supervisor.labs["anna"].state = ClassLabState.STOPPED
+        server = HTTPServer(front_door.application(front_door.FrontDoor(record, supervisor), PAGE))
         sockets = bind_sockets(0, "127.0.0.1")
         server.add_sockets(sockets)
 
@@ -78,28 +78,28 @@ def test_all_paths_of_the_door_begin_with_the_servers():
 
 
 def test_a_lab_knows_the_whole_path(tmp_path):
-    place = launching.Place(tmp_path / "anna", tmp_path, tmp_path / "libraries", False)
-    found, _, _ = launching.prepared(place, Options(address=ADDRESS), Tokens("a", "b"), 3, ([], ()))
+    place = launching.LabPlace(tmp_path / "anna", tmp_path, tmp_path / "libraries", False)
+    found, _, _ = launching.prepared(place, ClassOptions(address=ADDRESS), Tokens("a", "b"), 3, ([], ()))
     assert found[found.index("--below") + 1] == PREFIX + "/anna"
 
 
 def test_a_lab_sees_what_set_up_has_made_ready_for_pictures(tmp_path, monkeypatch):
-    place = launching.Place(tmp_path / "anna", tmp_path, tmp_path / "libraries", True)
+    place = launching.LabPlace(tmp_path / "anna", tmp_path, tmp_path / "libraries", True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert READY not in launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))[1]
+    assert READY not in launching.prepared(place, ClassOptions(), Tokens("a", "b"), 3, ([], ()))[1]
     ready = tmp_path / "cache" / "bullet_gazebo"
     ready.mkdir(parents=True)
     (place.folder / "caches").rename(tmp_path / "former caches")
-    found, environment, _ = launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))
+    found, environment, _ = launching.prepared(place, ClassOptions(), Tokens("a", "b"), 3, ([], ()))
     assert found[found.index(str(ready)) - 1:][:3] == ["--ro-bind", str(ready), environment[READY]]
-    place = launching.Place(tmp_path / "bo", tmp_path, tmp_path / "libraries", False)
-    assert launching.prepared(place, Options(), Tokens("a", "b"), 3, ([], ()))[1][READY] == str(ready)
+    place = launching.LabPlace(tmp_path / "bo", tmp_path, tmp_path / "libraries", False)
+    assert launching.prepared(place, ClassOptions(), Tokens("a", "b"), 3, ([], ()))[1][READY] == str(ready)
 
 
 def test_a_launch_file_that_no_lab_sees_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(command.isolation, "workspaces", lambda environment: ["/srv/space"])
     for words in (("baxter_gazebo", "baxter_world.launch"), ("/srv/space/src/my.launch",), ("/opt/my.launch",)):
-        command._refuse_launch_outside(Options(launch=words))
-    command._refuse_launch_outside(Options(launch=("/home/me/my.launch",), trusted=True))
+        command._refuse_launch_outside(ClassOptions(launch=words))
+    command._refuse_launch_outside(ClassOptions(launch=("/home/me/my.launch",), trusted=True))
     with pytest.raises(ClassError, match="labs do not see /home/me/my.launch; put .* /srv/space"):
-        command._refuse_launch_outside(Options(launch=("/home/me/my.launch",)))
+        command._refuse_launch_outside(ClassOptions(launch=("/home/me/my.launch",)))

@@ -13,7 +13,7 @@ import pytest
 from lab_class import command
 from lab_class.disk import remove
 from lab_class.factors import factor_of
-from lab_class.store import ClassRecord, Options, Store, StoreError, default_folder
+from lab_class.store import ClassOptions, ClassRecord, Store, StoreError, default_folder
 from lab_class.supervisor import Supervisor
 from rf_checks import roster
 from rf_checks.roster import Student
@@ -70,7 +70,7 @@ def test_a_port_that_is_taken_is_named():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        supervisor = SimpleNamespace(_record=SimpleNamespace(options=Options(port=port)))
+        supervisor = SimpleNamespace(_record=SimpleNamespace(options=ClassOptions(port=port)))
         with pytest.raises(StoreError, match=re.escape(
             "port %d cannot be opened (%s); --port" % (port, os.strerror(errno.EADDRINUSE)))):
             Supervisor._open(supervisor)
@@ -85,7 +85,7 @@ def test_a_roster_of_another_encoding_says_where_and_what_to_do(tmp_path, capsys
 def test_addresses_are_shown_again_while_the_class_runs(tmp_path, monkeypatch, capsys):
     store = Store(tmp_path / "class")
     store.make()
-    record = ClassRecord.made(Options(), [Student("anna", "Anna Müller")])
+    record = ClassRecord.made(ClassOptions(), [Student("anna", "Anna Müller")])
     store.write(record)
     store.write_running({"port": 8123})
     monkeypatch.setattr(command.control, "call", lambda *_: {"labs": []})
@@ -99,7 +99,7 @@ def test_addresses_are_a_table_that_is_a_roster_again(tmp_path, monkeypatch, cap
     store = Store(tmp_path / "class")
     store.make()
     students = [Student("am1", "Müller, Anna"), Student("ben", "Ben")]
-    record = ClassRecord.made(Options(), students)
+    record = ClassRecord.made(ClassOptions(), students)
     store.write(record)
     store.write_running({"port": 8123})
     monkeypatch.setattr(command.control, "call", lambda *_: {"labs": []})
@@ -119,7 +119,7 @@ def test_addresses_of_a_class_whose_record_is_gone(tmp_path, monkeypatch, capsys
 def test_logs_of_a_lab_that_the_class_has_not_names_those_that_it_has(tmp_path, capsys):
     store = Store(tmp_path / "class")
     store.make()
-    store.write(ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")]))
+    store.write(ClassRecord.made(ClassOptions(), [Student("anna", "Anna"), Student("ben", "Ben")]))
     for name, text in (("bem", "there is no lab bem; there are: anna, ben"), ("ben", "a class that runs has logs")):
         assert command.main(["--folder", str(store.folder), "logs", name]) == 1
         assert text in capsys.readouterr().err
@@ -130,7 +130,7 @@ def after_power_cut(tmp_path):
     """The folder of a class as a host that lost power may have left it."""
     store = Store(tmp_path / "class")
     store.make()
-    store.write(ClassRecord.made(Options(), [Student("anna", "Anna")]))
+    store.write(ClassRecord.made(ClassOptions(), [Student("anna", "Anna")]))
     for name in ("home", "caches/cache-0"):
         (store.lab("anna") / name).mkdir(parents=True, exist_ok=True)
     (store.lab("anna") / "home/work.py").write_text("print()")
@@ -182,7 +182,7 @@ def test_what_a_student_has_made_deep_is_deleted_with_the_class(after_power_cut,
 def test_new_addresses_while_no_class_runs(tmp_path, capsys):
     store = Store(tmp_path / "class")
     store.make()
-    before = ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")])
+    before = ClassRecord.made(ClassOptions(), [Student("anna", "Anna"), Student("ben", "Ben")])
     store.write(before)
     assert command.main(["--folder", str(store.folder), "renew", "anna", "instructor"]) == 0
     after = store.read()
@@ -195,8 +195,8 @@ def test_new_addresses_while_no_class_runs(tmp_path, capsys):
 
 
 def test_students_who_are_not_in_the_class_any_more_are_named(capsys):
-    earlier = ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")])
-    command._say_who_has_left(earlier, ClassRecord.made(Options(), [Student("anna", "Anna")], earlier))
+    earlier = ClassRecord.made(ClassOptions(), [Student("anna", "Anna"), Student("ben", "Ben")])
+    command._say_who_has_left(earlier, ClassRecord.made(ClassOptions(), [Student("anna", "Anna")], earlier))
     assert capsys.readouterr().out == ("Ben (ben) is not in the class any more, and the address opens nothing; the "
                                        "files stay in labs/ben/home.\n")
     command._say_who_has_left(None, earlier)

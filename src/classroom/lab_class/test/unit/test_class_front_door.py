@@ -9,8 +9,8 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import front_door
-from lab_class.labs import MAX_FAILURES, Labs, State
-from lab_class.store import ClassRecord, Options
+from lab_class.labs import MAX_FAILURES, ClassLabState, Labs
+from lab_class.store import ClassOptions, ClassRecord
 from rf_checks import roster
 from web_bridge import passing
 
@@ -31,7 +31,7 @@ class Supervisor:
         self.labs = Labs(["anna", "ben"], 2, None)
         self._folder, self.requests = folder, []
         for lab in self.labs:
-            lab.state = State.RUNNING
+            lab.state = ClassLabState.RUNNING
 
     def socket_of(self, name):
         return self._folder / name
@@ -42,7 +42,7 @@ class Supervisor:
         return self.labs[name]
 
     def is_awake(self, name):
-        return self.labs[name].state is State.RUNNING
+        return self.labs[name].state is ClassLabState.RUNNING
 
     def serving(self, name, kind, by):
         self.labs.serving(name, kind, by, 0.0)
@@ -59,12 +59,13 @@ class House:
 
     def __init__(self, folder, lab=None):
         self._folder, self._lab = folder, lab
-        self.record = ClassRecord.made(Options(), [roster.Student("anna", "Anna <b>"), roster.Student("ben", "Ben")])
+        self.record = ClassRecord.made(ClassOptions(),
+                                       [roster.Student("anna", "Anna <b>"), roster.Student("ben", "Ben")])
         self.supervisor = Supervisor(folder)
         self.tokens = self.record.tokens
 
     async def __aenter__(self):
-        self._server = HTTPServer(front_door.application(front_door.Door(self.record, self.supervisor), PAGE),
+        self._server = HTTPServer(front_door.application(front_door.FrontDoor(self.record, self.supervisor), PAGE),
                                   max_body_size=65536)
         sockets = bind_sockets(0, "127.0.0.1")
         self.port = sockets[0].getsockname()[1]
@@ -175,12 +176,12 @@ def test_a_lab_that_does_not_run_says_what_is_to_come(tmp_path):
     async def check():
         async with House(tmp_path) as house:
             lab, token = house.supervisor.labs["anna"], house.tokens["anna"].act
-            lab.state = State.WAITING
+            lab.state = ClassLabState.WAITING
             status, head, body = await house.ask("/anna/", token=token)
             assert (status, "Retry-After: 2" in head, b"it is the next" in body) == (503, True, True)
             body = (await house.ask("/anna/", token=token, Accept="text/html"))[2]
             assert b"refresh" in body and b"Anna &lt;b&gt;" in body
-            lab.state, lab.reason, lab.failures = State.FAILED, "it used 3 GB", MAX_FAILURES
+            lab.state, lab.reason, lab.failures = ClassLabState.FAILED, "it used 3 GB", MAX_FAILURES
             assert b"it used 3 GB. The instructor can start it again" in (await house.ask("/anna/", token=token))[2]
             # Whoever asks for its WebSocket is told so, too.
             assert (await house.ask("/anna/lab", token=token, **UPGRADE))[0] == 503
@@ -404,7 +405,7 @@ def test_an_operation_wakes_a_paused_lab_and_a_heartbeat_does_not(tmp_path):
                 return heard
 
             await until(is_heard)
-            assert labs["anna"].state is State.RUNNING and len(house.supervisor.requests) > asked
+            assert labs["anna"].state is ClassLabState.RUNNING and len(house.supervisor.requests) > asked
             assert heard.startswith((OPERATION, BEAT + OPERATION))
 
     run(check())
@@ -477,15 +478,15 @@ def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awak
             for name in polls:
                 assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 200
             assert house.supervisor.requests == [] and (lab.busy, lab.sockets) == (0, 0)
-            lab.state = State.PAUSED
+            lab.state = ClassLabState.PAUSED
             for name in polls:
                 assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 409
-            assert lab.state is State.PAUSED
+            assert lab.state is ClassLabState.PAUSED
             assert (await house.ask("/anna/notebook/api/kernels"))[0] == 403
             await house.ask("/anna/notebook/api/contents/a.ipynb?type=notebook&content=1", Cookie="lab_token=" + token)
-            assert lab.state is State.RUNNING
-            lab.state = State.PAUSED
+            assert lab.state is ClassLabState.RUNNING
+            lab.state = ClassLabState.PAUSED
             await house.ask("/anna/notebook/api/kernels", "POST", Cookie="lab_token=" + token)
-            assert lab.state is State.RUNNING
+            assert lab.state is ClassLabState.RUNNING
 
     run(check())

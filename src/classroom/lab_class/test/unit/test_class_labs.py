@@ -3,7 +3,7 @@
 import pytest
 
 from lab_class.front_door import kind_of
-from lab_class.labs import MAX_FAILURES, START_LIMIT_S, Action, ClassError, Kind, Labs, Role, State, may
+from lab_class.labs import MAX_FAILURES, START_LIMIT_S, Action, ClassError, ClassLabState, Kind, Labs, Role, may
 
 IDLE_S = 900.0
 
@@ -17,7 +17,7 @@ def labs():
 
 
 def run(labs, name, now=0.0):
-    while labs[name].state is not State.RUNNING:
+    while labs[name].state is not ClassLabState.RUNNING:
         (_, started), = labs.due(now)
         labs.answered(started, now)
         labs[started].visited = True
@@ -46,7 +46,7 @@ def test_a_lab_waits_for_its_first_client_paused(labs):
     # One that goes on does not start a second time.
     assert not labs["anna"].is_starting
     assert labs.has_settled("anna", 4.0) == []
-    assert labs["anna"].state is State.RUNNING
+    assert labs["anna"].state is ClassLabState.RUNNING
 
 
 @pytest.mark.parametrize("visit", [
@@ -56,7 +56,7 @@ def test_a_lab_with_a_client_is_not_paused_when_it_has_started(labs, visit):
     labs.due(0.0)
     visit(labs)
     assert settled(labs) == []
-    assert labs["anna"].state is State.RUNNING
+    assert labs["anna"].state is ClassLabState.RUNNING
 
 
 def test_a_lab_that_starts_again_waits_for_its_client_again(labs):
@@ -75,7 +75,7 @@ def test_labs_run_from_their_start_where_that_is_wanted(idle_s, keep_running):
     labs = Labs(["anna"], 1, idle_s, keep_running)
     labs.start("anna", 0.0)
     assert settled(labs) == []
-    assert labs["anna"].state is State.RUNNING
+    assert labs["anna"].state is ClassLabState.RUNNING
 
 
 def test_a_lab_that_is_paused_while_it_starts_makes_room_for_the_next(labs):
@@ -99,7 +99,7 @@ def test_an_unused_lab_is_paused_and_woken_by_a_request(labs):
     assert (Action.PAUSE, "anna") not in labs.due(10.0 + IDLE_S)
     assert (Action.PAUSE, "anna") in labs.due(11.0 + IDLE_S)
     assert labs.request("anna", 5000.0) == [(Action.WAKE, "anna")]
-    assert labs["anna"].state is State.RUNNING
+    assert labs["anna"].state is ClassLabState.RUNNING
     assert (Action.PAUSE, "anna") not in labs.due(5001.0)
 
 
@@ -122,11 +122,11 @@ def test_a_lab_that_ends_starts_again_at_the_next_request_three_times_at_most(la
     for failures in range(1, MAX_FAILURES + 1):
         run(labs, "anna")
         assert labs.ended("anna", "roslaunch has ended", 1.0) == [(Action.END, "anna")]
-        assert (labs["anna"].state, labs["anna"].failures) == (State.FAILED, failures)
+        assert (labs["anna"].state, labs["anna"].failures) == (ClassLabState.FAILED, failures)
         labs.request("anna", 1.0)
-    assert labs["anna"].state is State.FAILED
+    assert labs["anna"].state is ClassLabState.FAILED
     labs.start("anna", 2.0)
-    assert (labs["anna"].state, labs["anna"].failures) == (State.WAITING, 0)
+    assert (labs["anna"].state, labs["anna"].failures) == (ClassLabState.WAITING, 0)
 
 
 def test_a_lab_that_has_run_for_long_may_fail_again(labs):
@@ -134,7 +134,7 @@ def test_a_lab_that_has_run_for_long_may_fail_again(labs):
         run(labs, "anna", now)
         labs.ended("anna", "x", now + 100.0)
         labs.request("anna", now + 100.0)
-        assert labs["anna"].state is State.WAITING
+        assert labs["anna"].state is ClassLabState.WAITING
 
 
 def test_a_lab_that_does_not_answer_fails_and_the_next_one_starts(labs):
@@ -147,7 +147,7 @@ def test_a_lab_over_its_limits_waits_for_the_instructor(labs):
     run(labs, "anna")
     assert labs.exceeded("anna", "it used 3 GB", 1.0) == [(Action.KILL, "anna")]
     labs.request("anna", 2.0)
-    assert (labs["anna"].state, labs["anna"].reason) == (State.FAILED, "it used 3 GB")
+    assert (labs["anna"].state, labs["anna"].reason) == (ClassLabState.FAILED, "it used 3 GB")
 
 
 def test_a_stopped_lab_stays_stopped_and_its_end_is_no_failure(labs):
@@ -155,7 +155,7 @@ def test_a_stopped_lab_stays_stopped_and_its_end_is_no_failure(labs):
     assert labs.stop("anna", 1.0) == [(Action.END, "anna")]
     assert labs.ended("anna", "x", 1.1) == []
     labs.request("anna", 2.0)
-    assert labs["anna"].state is State.STOPPED
+    assert labs["anna"].state is ClassLabState.STOPPED
     assert labs.stop("anna", 3.0) == []
 
 
@@ -194,7 +194,7 @@ def test_where_memory_is_short_labs_wait_and_say_so(labs):
     labs.answered("anna", 2.0)
     labs["anna"].visited = True
     labs.has_settled("anna", 3.0)
-    assert labs.due(4.0, SHORT) == [] and labs["ben"].reason == SHORT and labs["ben"].state is State.WAITING
+    assert labs.due(4.0, SHORT) == [] and labs["ben"].reason == SHORT and labs["ben"].state is ClassLabState.WAITING
     assert labs.due(5.0) == [(Action.START, "ben")] and labs["ben"].reason == labs["cleo"].reason == ""
 
 
@@ -205,7 +205,7 @@ def test_where_memory_is_short_an_unvisited_lab_gives_way_to_a_visitor(labs):
         assert labs.has_settled(name, now + 1.0) == [(Action.PAUSE, name)]
     assert labs.due(20.0, SHORT) == []
     labs.request("cleo", 21.0)
-    assert labs.due(22.0, SHORT) == [(Action.END, "ben")] and labs["ben"].state is State.WAITING
+    assert labs.due(22.0, SHORT) == [(Action.END, "ben")] and labs["ben"].state is ClassLabState.WAITING
     # Its memory is free a while later.
     assert labs.due(23.0, SHORT) == []
     assert labs.due(24.0) == [(Action.START, "cleo")]
@@ -215,4 +215,4 @@ def test_where_memory_is_short_no_visited_lab_gives_way(labs):
     run(labs, "anna")
     labs.pause("anna", 1.0)
     labs.request("ben", 2.0)
-    assert labs.due(3.0, SHORT) == [] and labs["anna"].state is State.PAUSED
+    assert labs.due(3.0, SHORT) == [] and labs["anna"].state is ClassLabState.PAUSED

@@ -10,7 +10,7 @@ from tornado.netutil import bind_sockets
 
 from lab_class import front_door
 from lab_class.labs import ClassError
-from lab_class.store import ClassRecord, Options
+from lab_class.store import ClassOptions, ClassRecord
 from lab_testing.browser import Browser, why_not
 from lab_testing.waiting import wait_until
 from rf_checks import roster
@@ -49,11 +49,11 @@ def shown():
     if reason := why_not():
         pytest.skip(reason)
     supervisor = Class()
-    record = ClassRecord.made(Options(), [roster.Student("anna", "Anna"), roster.Student("ben", "Ben")])
+    record = ClassRecord.made(ClassOptions(), [roster.Student("anna", "Anna"), roster.Student("ben", "Ben")])
     sockets, loop = bind_sockets(0, "127.0.0.1"), asyncio.new_event_loop()
 
     async def serve():
-        server = HTTPServer(front_door.application(front_door.Door(record, supervisor), PAGE))
+        server = HTTPServer(front_door.application(front_door.FrontDoor(record, supervisor), PAGE))
         server.add_sockets(sockets)
         return server
 

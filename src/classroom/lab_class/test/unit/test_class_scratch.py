@@ -11,7 +11,7 @@ import pytest
 
 from lab_class import scratch
 from lab_class.lab_process import LabProcess
-from lab_class.labs import Labs, State
+from lab_class.labs import ClassLabState, Labs
 from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.supervisor import Supervisor
 from processes import isolation, usage
@@ -86,7 +86,7 @@ def test_sockets_are_counted_once(monkeypatch):
 def watcher(**values):
     """A supervisor for its watches, with one lab that runs."""
     found = SimpleNamespace(labs=Labs(["anna"], 1, None), done=[], _now=lambda: 0.0, **values)
-    found.labs["anna"].state = State.RUNNING
+    found.labs["anna"].state = ClassLabState.RUNNING
     found._do = found.done.append
     found._processes = {"anna": SimpleNamespace(family=set, memory_bytes=lambda files: 100 + files)}
     found._exceed = lambda name, why: Supervisor._exceed(found, name, why)
@@ -96,7 +96,7 @@ def watcher(**values):
 def test_the_supervisor_ends_a_lab_for_files_in_memory():
     found = watcher(_scratch=SimpleNamespace(exceeded=lambda name, family: "it has made 7 files"))
     asyncio.run(Supervisor._look_at_scratch(found))
-    assert found.labs["anna"].state is State.FAILED and found.labs["anna"].reason == "it has made 7 files"
+    assert found.labs["anna"].state is ClassLabState.FAILED and found.labs["anna"].reason == "it has made 7 files"
 
 
 def test_without_a_control_group_files_in_memory_and_sockets_count(monkeypatch):

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from lab_class.labs import ClassError
-from lab_class.store import ClassRecord, Options, Store, StoreError
+from lab_class.store import ClassOptions, ClassRecord, Store, StoreError
 from rf_checks import roster
 
 
@@ -18,7 +18,7 @@ def store(tmp_path):
 
 
 def test_a_class_comes_back_as_it_was(store):
-    record = ClassRecord.made(Options(port=9000, idle_s=None), roster.numbered(2))
+    record = ClassRecord.made(ClassOptions(port=9000, idle_s=None), roster.numbered(2))
     store.write(record)
     assert store.read() == record
     assert (store.folder / "class.json").stat().st_mode & 0o077 == 0
@@ -26,8 +26,8 @@ def test_a_class_comes_back_as_it_was(store):
 
 
 def test_students_that_stay_keep_their_addresses():
-    first = ClassRecord.made(Options(), roster.numbered(2))
-    second = ClassRecord.made(Options(), roster.numbered(3), first)
+    first = ClassRecord.made(ClassOptions(), roster.numbered(2))
+    second = ClassRecord.made(ClassOptions(), roster.numbered(3), first)
     assert second.instructor == first.instructor
     assert second.tokens["student-01"] == first.tokens["student-01"]
     tokens = [token for pair in second.tokens.values() for token in (pair.act, pair.view)] + [second.instructor]
@@ -35,7 +35,7 @@ def test_students_that_stay_keep_their_addresses():
 
 
 def test_new_tokens_for_one_student_or_the_instructor():
-    first = ClassRecord.made(Options(), roster.numbered(2))
+    first = ClassRecord.made(ClassOptions(), roster.numbered(2))
     second = first.renewed("student-01")
     assert second.tokens["student-01"] != first.tokens["student-01"]
     assert (second.tokens["student-02"], second.instructor) == (first.tokens["student-02"], first.instructor)
@@ -81,7 +81,7 @@ def test_a_host_that_lost_power_has_kept_any_part_of_a_supervisors_file(store, d
 
 
 def test_on_a_full_disk_the_class_stays_as_it_was(store, monkeypatch):
-    record = ClassRecord.made(Options(), roster.numbered(1))
+    record = ClassRecord.made(ClassOptions(), roster.numbered(1))
     store.write(record)
 
     def full(descriptor):

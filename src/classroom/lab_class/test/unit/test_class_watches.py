@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from lab_class import disk
-from lab_class.disk import Quota, nameless_bytes, occupied, remove
-from lab_class.labs import Labs, State
+from lab_class.disk import DiskQuota, nameless_bytes, occupied, remove
+from lab_class.labs import ClassLabState, Labs
 from lab_class.supervisor import Supervisor, _end_of
 
 _NOBODY = 65534
@@ -104,7 +104,7 @@ def test_a_locked_folder_is_removed():
 def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked_at(tmp_path, monkeypatch):
     monkeypatch.setattr(disk, "occupied", _either)
     labs = Labs(["anna", "ben", "cleo"], 3, None)
-    watcher = SimpleNamespace(labs=labs, done=[], _quota=Quota(2**20, tmp_path))
+    watcher = SimpleNamespace(labs=labs, done=[], _quota=DiskQuota(2**20, tmp_path))
     for name in ("anna", "ben", "cleo"):
         (tmp_path / name).mkdir()
     watcher._processes = dict.fromkeys(["anna", "ben", "cleo"], SimpleNamespace(family=set))
@@ -112,9 +112,10 @@ def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked
     watcher._now, watcher._do = lambda: 0.0, watcher.done.append
     watcher._exceed = lambda name, why: Supervisor._exceed(watcher, name, why)
     for lab in labs:
-        lab.state = State.RUNNING
+        lab.state = ClassLabState.RUNNING
     asyncio.run(Supervisor._look_at_disk(watcher))
-    assert [lab.state for lab in labs] == [State.FAILED, State.RUNNING, State.FAILED] and len(watcher.done) == 2
+    assert [lab.state for lab in labs] == [ClassLabState.FAILED, ClassLabState.RUNNING,
+                                           ClassLabState.FAILED] and len(watcher.done) == 2
     assert labs["anna"].reason == "its files could not be measured: du cannot read anna"
     assert labs["cleo"].reason.startswith("its files have 0.00 GB, and may have 0.00 GB")
 
@@ -148,7 +149,7 @@ def free(monkeypatch):
 
 
 def test_files_are_measured_as_soon_as_the_disk_fills(free, tmp_path):
-    quota = Quota(1000 * 2**20, tmp_path)
+    quota = DiskQuota(1000 * 2**20, tmp_path)
     assert quota.is_due(0.0)
     quota.looked(0.0, 1.0)
     free.f_bavail -= 10
@@ -163,7 +164,7 @@ def test_files_are_measured_as_soon_as_the_disk_fills(free, tmp_path):
 
 def test_many_empty_files_fill_the_disk_too(free, tmp_path):
     free.f_favail = 10**7
-    quota = Quota(2**30, tmp_path)
+    quota = DiskQuota(2**30, tmp_path)
     quota.looked(0.0, 0.0)
     free.f_favail -= disk.ENTRIES // 20
     assert not quota.is_due(1.0)
@@ -172,7 +173,7 @@ def test_many_empty_files_fill_the_disk_too(free, tmp_path):
 
 
 def test_a_lab_with_too_many_empty_files_is_ended_and_may_run_again_to_delete_some(free, tmp_path):
-    quota = Quota(2**30, tmp_path, entries=100)
+    quota = DiskQuota(2**30, tmp_path, entries=100)
     for number in range(100):
         (tmp_path / str(number)).touch()
     assert quota.measured("anna", tmp_path, ()).startswith("it has 101 files and folders, and may have 100. Some")
@@ -185,7 +186,7 @@ def test_a_lab_with_too_many_empty_files_is_ended_and_may_run_again_to_delete_so
 def test_a_lab_with_too_many_files_may_run_again_to_delete_some(free, tmp_path, monkeypatch):
     used = {"files": 2000}
     monkeypatch.setattr(disk, "occupied", lambda folder: (used["files"], 1))
-    quota = Quota(1000, tmp_path)
+    quota = DiskQuota(1000, tmp_path)
     assert "may have" in quota.measured("anna", tmp_path, ())
     assert quota.used == {"anna": 2000}
     assert quota.measured("anna", tmp_path, ()) == ""
@@ -203,7 +204,7 @@ def test_on_a_disk_that_is_nearly_full_the_lab_that_writes_ends(free, tmp_path, 
     monkeypatch.setattr(disk, "nameless_bytes", lambda pids, device: 0)
     monkeypatch.setattr(disk, "written_bytes", lambda name: written[name])
     limit = 100 * 2**20
-    quota = Quota(limit, tmp_path)
+    quota = DiskQuota(limit, tmp_path)
     written["writes"] = written["idle"] = 2 * limit
     assert [quota.measured(name, tmp_path, name) for name in written] == ["", ""]
     free.f_bavail, written["writes"] = 150, 3 * limit

@@ -43,7 +43,7 @@ _LINK, _FILE_KIND, _REGULAR = 0o120000, 0o170000, 0o100000
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ArchiveBounds:
     """Most entries of an archive, its most unpacked bytes, the most files that are taken from it and their most
     bytes."""
 
@@ -53,9 +53,9 @@ class Bounds:
     taken_bytes: int
 
 
-OF_A_STUDENT = Bounds(10_000, 1 << 30, MAX_FILES, MAX_TAKEN_BYTES)
+OF_A_STUDENT = ArchiveBounds(10_000, 1 << 30, MAX_FILES, MAX_TAKEN_BYTES)
 #: The export of a whole class: a thousand submissions.
-OF_A_CLASS = Bounds(500_000, 32 << 30, 50_000, 1 << 30)
+OF_A_CLASS = ArchiveBounds(500_000, 32 << 30, 50_000, 1 << 30)
 
 
 class BadArchive(Exception):
@@ -98,13 +98,13 @@ def safe_name(name: str) -> str:
     return posixpath.normpath(plain)
 
 
-def read(source: Path, name: str, is_wanted: Callable[..., Any], bounds: Bounds = OF_A_STUDENT,
+def read(source: Path, name: str, is_wanted: Callable[..., Any], bounds: ArchiveBounds = OF_A_STUDENT,
          refused: dict[str, Any] | None = None) -> tuple[dict[str, bytes], list[str]]:
     """{path in the archive: bytes} of the wanted files, and the list of the other files' paths.
 
     source: path, or bytes. name: its name, which tells the kind. is_wanted: function of a path. bounds:
-    Bounds. refused: a dict that gets {path: sentence} of files that are not read, as links and what is too large; None:
-    such an archive is refused. Raises BadArchive.
+    ArchiveBounds. refused: a dict that gets {path: sentence} of files that are not read, as links and what is too
+    large; None: such an archive is refused. Raises BadArchive.
     """
     try:
         with (io.BytesIO(source) if isinstance(source, bytes) else open(source, "rb")) as stream:
@@ -115,7 +115,7 @@ def read(source: Path, name: str, is_wanted: Callable[..., Any], bounds: Bounds 
         raise BadArchive("is damaged and cannot be unpacked: %s" % (str(error) or type(error).__name__)) from error
 
 
-def _take(entries: Iterator[Any], is_wanted: Callable[[Any], bool], bounds: Bounds,
+def _take(entries: Iterator[Any], is_wanted: Callable[[Any], bool], bounds: ArchiveBounds,
           refused: dict[str, Any] | None) -> tuple[dict[str, bytes], list[str]]:
     taken, others, seen, size = {}, [], set(), 0
     for count, (name, problem, read_it) in enumerate(entries, 1):
@@ -174,7 +174,7 @@ class _ListLimited:
         return self._stream.read(size)
 
 
-def _zip_entries(stream: BinaryIO, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
+def _zip_entries(stream: BinaryIO, bounds: ArchiveBounds) -> Iterator[tuple[Any, ...]]:
     limited = _ListLimited(stream, bounds.entries)
     with zipfile.ZipFile(cast("BinaryIO", limited)) as archive:
         limited.most = None
@@ -241,7 +241,7 @@ def _content(archive: tarfile.TarFile, info: tarfile.TarInfo) -> bytes:
     return b"" if file is None else file.read(most_bytes(info.name) + 1)
 
 
-def _tar_entries(stream: Any, name: str, bounds: Bounds) -> Iterator[tuple[Any, ...]]:
+def _tar_entries(stream: Any, name: str, bounds: ArchiveBounds) -> Iterator[tuple[Any, ...]]:
     if name.endswith((".gz", ".tgz")):
         stream = gzip.GzipFile(fileobj=stream)
     elif name.endswith((".bz2", ".tbz2", ".tbz")):

@@ -19,7 +19,7 @@ from command_line.user_files import read_file
 from disk_cache.files import remove_drafts
 from lab_batch import JobError, Spec
 from lab_batch.keeping import default_memory_bytes
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 from processes import isolation
 from processes.work_folder import work_folder
 from rf_checks import similarity
@@ -158,7 +158,7 @@ class _Grading:
             given = [read_file(path, archives.most_bytes(path.name)).decode("utf-8", "replace")
                      for path in options.given]
             texts = {entry.submission.entry: list(entry.texts.values()) for entry in entries if entry.texts}
-            handed_out = [*similarity.Library(_workspace()).handed_out, *given]
+            handed_out = [*similarity.References(_workspace()).handed_out, *given]
             try:
                 pairs = alike.pairs(texts, handed_out)
             except Exception as error:  # noqa: BLE001  (grading goes on without it)
@@ -178,7 +178,8 @@ class _Grading:
                                             tuple(pairs)), entries)
         return self._conclude(rows)
 
-    def _judge(self, todo: list[plan.Task], ledger: Ledger, entries: list[plan.Entry], work: Path) -> None:
+    def _judge(self, todo: list[plan.PlannedVerdict], ledger: Ledger, entries: list[plan.SubmissionEntry],
+               work: Path) -> None:
         if not todo:
             return
         owners = {}
@@ -194,7 +195,7 @@ class _Grading:
         processors = len(os.sched_getaffinity(0))
         workers = min(options.workers or workers_for(processors, _free_bytes()), len(todo))
         memory = max(MEMORY_BYTES + LAB_BYTES, default_memory_bytes(workers))
-        limits = Limits(workers, options.wall_limit + _GRACE_S, _CHECKS_OF_A_WORKER, memory)
+        limits = BatchLimits(workers, options.wall_limit + _GRACE_S, _CHECKS_OF_A_WORKER, memory)
         with contextlib.closing(map_seeds(spec, range(len(todo)), limits)) as outcomes:
             for count, outcome in enumerate(outcomes, 1):
                 task = todo[outcome.seed]
@@ -207,7 +208,7 @@ class _Grading:
                 print(formats.one_line("%d of %d: %s, %s: %s" % (
                     count, len(todo), ", ".join(owners[task.key]), task.exercise.name, said)), flush=True)
 
-    def _take(self, task: plan.Task, outcome: Outcome, ledger: Ledger) -> str:
+    def _take(self, task: plan.PlannedVerdict, outcome: Outcome, ledger: Ledger) -> str:
         """Keep what a worker has found; returns a sentence."""
         if not outcome.is_done:
             self._failures[task.key] = "the check itself failed, which is not the program's fault: %s" % outcome.error
@@ -220,7 +221,7 @@ class _Grading:
         ledger.add(task.key, verdict)
         return "%g points%s" % (round(verdict["points"], 1), "; " + verdict["hint"] if verdict["hint"] else "")
 
-    def _write(self, found: results.Results, entries: list[plan.Entry]) -> tuple[results.Row, ...]:
+    def _write(self, found: results.Results, entries: list[plan.SubmissionEntry]) -> tuple[results.Row, ...]:
         """Write all reports; returns the Rows that they show."""
         out = self._out
         found = replace(found, rows=tuple(self._reported(found, row) for row in found.rows))

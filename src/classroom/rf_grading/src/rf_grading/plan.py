@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Task:
+class PlannedVerdict:
     """One verdict to be found. program: path of the laid-out program."""
 
     key: str
@@ -24,7 +24,7 @@ class Task:
 
 
 @dataclass
-class Entry:
+class SubmissionEntry:
     """A Submission and, for each exercise's name, its key, or the sentence that says why it is not judged.
 
     paths: the program's path in the submission, notes: about its making; both by the exercise's name. texts: {path:
@@ -40,8 +40,9 @@ class Entry:
 
 
 def make(submissions: list[Submission], exercises: list[Exercise], version: str, conditions: dict[str, Any],
-         folder: Path, only_used: bool = False) -> tuple[list[Exercise], list[Entry], dict[str, Task]]:
-    """(exercises, entries, {key: Task}) for Submissions.
+         folder: Path, only_used: bool = False) -> tuple[list[Exercise], list[SubmissionEntry],
+                                                         dict[str, PlannedVerdict]]:
+    """(exercises, entries, {key: PlannedVerdict}) for Submissions.
 
     conditions: {"seed", "profile", ...} of every verdict. folder: an empty one for the programs. only_used: leave out
     exercises for which no submission has a program. Raises OSError.
@@ -52,7 +53,7 @@ def make(submissions: list[Submission], exercises: list[Exercise], version: str,
             isinstance(found.get(exercise), programs.Program) for found in assigned.values())]
     entries, tasks = [], {}
     for number, one in enumerate(submissions):
-        entry = Entry(one)
+        entry = SubmissionEntry(one)
         entries.append(entry)
         laid_out = None
         for exercise in exercises:
@@ -75,7 +76,7 @@ def make(submissions: list[Submission], exercises: list[Exercise], version: str,
             entry.keys[exercise.name], entry.paths[exercise.name] = key, found.path
             entry.notes[exercise.name] = found.note
             entry.texts.update(texts)
-            tasks.setdefault(key, Task(key, exercise, str(path)))
+            tasks.setdefault(key, PlannedVerdict(key, exercise, str(path)))
     return exercises, entries, tasks
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rf_checks.exercises import Exercise
-    from rf_grading.plan import Entry
+    from rf_grading.plan import SubmissionEntry
     from rf_grading.submissions import Submission
 
 #: The points of one exercise.
@@ -90,14 +90,14 @@ class Results:
         return POINTS * len(self.exercises)
 
 
-def rows_of(entries: list[Entry], exercises: list[Exercise], verdicts: dict[str, dict[str, Any]],
+def rows_of(entries: list[SubmissionEntry], exercises: list[Exercise], verdicts: dict[str, dict[str, Any]],
             failures: dict[str, str]) -> tuple[Row, ...]:
     """Rows of plan.Entries. verdicts: {key: verdict}; failures: {key: why there is none}."""
     return tuple(Row(entry.submission, {one.name: _cell(entry, one.name, verdicts, failures) for one in exercises})
                  for entry in entries)
 
 
-def _cell(entry: Entry, name: str, verdicts: dict[str, dict[str, Any]], failures: dict[str, str]) -> Cell:
+def _cell(entry: SubmissionEntry, name: str, verdicts: dict[str, dict[str, Any]], failures: dict[str, str]) -> Cell:
     if name in entry.problems:
         return Cell(NO_PROGRAM, 0.0, entry.problems[name])
     key, path, note = entry.keys[name], entry.paths[name], entry.notes[name]

@@ -80,7 +80,7 @@ def test_other_archives_are_refused_with_a_sentence(content, name, said):
 
 
 def test_an_archive_that_unpacks_to_much_is_left_early():
-    bounds = archives.Bounds(10, 1 << 20, 10, 1 << 20)
+    bounds = archives.ArchiveBounds(10, 1 << 20, 10, 1 << 20)
     # 64 MiB of zeros in 64 KiB, in a file that nobody wants.
     content = tarred([("film.mp4", bytes(64 << 20))])
     with pytest.raises(archives.BadArchive, match="more than 1 MiB"):
@@ -110,7 +110,7 @@ def test_long_names_are_read():
 def test_many_entries_are_refused():
     with pytest.raises(archives.BadArchive, match="more than 10 files"):
         archives.read(zipped([("%d.txt" % k, b"") for k in range(11)]), "x.zip", is_wanted,
-                      archives.Bounds(10, 1 << 20, 10, 1 << 20))
+                      archives.ArchiveBounds(10, 1 << 20, 10, 1 << 20))
 
 
 MANY = zipped([("%d.txt" % k, b"") for k in range(200)])
@@ -119,7 +119,7 @@ MANY = zipped([("%d.txt" % k, b"") for k in range(200)])
 def test_a_long_list_is_refused_before_it_is_read(monkeypatch):
     """A million names need a gigabyte of memory."""
     monkeypatch.setattr(archives.zipfile, "ZipInfo", None)
-    few = archives.Bounds(10, 1 << 20, 10, 1 << 20)
+    few = archives.ArchiveBounds(10, 1 << 20, 10, 1 << 20)
     with pytest.raises(archives.BadArchive, match="more than 10 files, or names"):
         archives.read(MANY, "x.zip", is_wanted, few)
 

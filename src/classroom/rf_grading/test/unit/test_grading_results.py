@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from rf_grading import alike, drawing, formats, motion, pages, programs, results
-from rf_grading.plan import Entry
+from rf_grading.plan import SubmissionEntry
 from rf_grading.submissions import Submission
 
 EXERCISES = programs.exercises_of("lab2", ["wave", "tf_listener"])
@@ -27,7 +27,7 @@ def verdict(points, hint=None, **more):
 
 
 def entry(name, keys=(), problems=(), full_name=""):
-    one = Entry(Submission(name, name, full_name, "%s@example.org" % name))
+    one = SubmissionEntry(Submission(name, name, full_name, "%s@example.org" % name))
     one.keys, one.problems = dict(keys), dict(problems)
     one.paths = dict.fromkeys(one.keys, "wave.py")
     one.notes = dict.fromkeys(one.keys, "")

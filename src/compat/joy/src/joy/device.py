@@ -15,14 +15,14 @@ _HINTS = {errno.ENOENT: "plug one in, or set ~dev", errno.ENODEV: "plug one in, 
           errno.EACCES: "put yourself into the group that owns the device (sudo usermod -aG input $USER)"}
 
 
-class DeviceLost(Exception):
+class JoystickLost(Exception):
     """The device does not exist, or is gone; the text says why in one line."""
 
 
-class Device:
+class JoystickDevice:
     """An open joystick. Attributes: `axes`, `buttons`, their numbers (0 if the device does not report them).
 
-    Raises DeviceLost when it cannot be opened.
+    Raises JoystickLost when it cannot be opened.
     """
 
     def __init__(self, path: str) -> None:
@@ -31,11 +31,12 @@ class Device:
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
             hint = _HINTS.get(error.errno or 0)
-            raise DeviceLost("no joystick at %s: %s%s" % (path, error.strerror, "; " + hint if hint else "")) from None
+            raise JoystickLost("no joystick at %s: %s%s" % (path, error.strerror,
+                                                            "; " + hint if hint else "")) from None
         self.axes, self.buttons = self._count(_AXES), self._count(_BUTTONS)
 
     def read(self, timeout_s: float) -> bytes:
-        """Return the bytes that arrive within a time [s]; may be empty. Raises DeviceLost."""
+        """Return the bytes that arrive within a time [s]; may be empty. Raises JoystickLost."""
         try:
             if not select.select([self._file], [], [], timeout_s)[0]:
                 return b""
@@ -43,9 +44,9 @@ class Device:
         except BlockingIOError:
             return b""
         except OSError as error:
-            raise DeviceLost("joystick %s is lost: %s" % (self._path, error.strerror)) from None
+            raise JoystickLost("joystick %s is lost: %s" % (self._path, error.strerror)) from None
         if not data:
-            raise DeviceLost("joystick %s is lost: it was closed" % self._path)
+            raise JoystickLost("joystick %s is lost: it was closed" % self._path)
         return data
 
     def close(self) -> None:

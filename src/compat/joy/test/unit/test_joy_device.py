@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from joy import Device, DeviceLost, Outgoing, Readings
+from joy import JoystickDevice, JoystickLost, Outgoing, Readings
 
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
 
@@ -101,19 +101,19 @@ def test_rates_out_of_range(values):
 def test_a_device_that_is_not_there_says_what_to_do(tmp_path):
     # In the user's language, as from the system.
     missing = os.strerror(errno.ENOENT)
-    with pytest.raises(DeviceLost, match="no joystick at .*js7: %s; plug one in, or set ~dev" % missing):
-        Device(str(tmp_path / "js7"))
+    with pytest.raises(JoystickLost, match="no joystick at .*js7: %s; plug one in, or set ~dev" % missing):
+        JoystickDevice(str(tmp_path / "js7"))
 
 
 def test_a_device_is_read_and_its_end_is_noticed(tmp_path):
     path = str(tmp_path / "js0")
     os.mkfifo(path)
-    device = Device(path)
+    device = JoystickDevice(path)
     writer = os.open(path, os.O_WRONLY)
     assert (device.axes, device.buttons) == (0, 0) and device.read(0.01) == b""
     os.write(writer, event(BUTTON, 0, 1))
     assert device.read(10.0) == event(BUTTON, 0, 1)
     os.close(writer)
-    with pytest.raises(DeviceLost, match="is lost: it was closed"):
+    with pytest.raises(JoystickLost, match="is lost: it was closed"):
         device.read(10.0)
     device.close()

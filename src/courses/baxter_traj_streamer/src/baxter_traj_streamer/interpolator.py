@@ -19,14 +19,14 @@ from joint_trajectory import rows_of_points
 from .action_server import TrajServer
 from .errors import GoalRefused
 from .judging import judge
-from .motion import Motion
+from .motion import StreamedMotion
 from .settings import SIDES
 
 if TYPE_CHECKING:
     from baxter_traj_streamer.settings import StreamerSettings
     from baxter_traj_streamer.versions import Version
 
-    from .judging import JointLimit, Plan
+    from .judging import AcceptedPlan, StreamedJointLimit
     from .robot_link import RobotLink
 
 ACTION_NAME = "trajActionServer"
@@ -41,7 +41,7 @@ class Interpolator:
     version: the clients' `versions.Version`.
     """
 
-    def __init__(self, robot: RobotLink, limits: Mapping[str, JointLimit], settings: StreamerSettings,
+    def __init__(self, robot: RobotLink, limits: Mapping[str, StreamedJointLimit], settings: StreamerSettings,
                  version: Version) -> None:
         self._robot = robot
         self._limits = limits
@@ -81,7 +81,7 @@ class Interpolator:
 
     # -- the loop -------------------------------------------------------------------------------------------------
 
-    def _judge(self, handle: Any, measured: dict[str, float] | None) -> Plan:
+    def _judge(self, handle: Any, measured: dict[str, float] | None) -> AcceptedPlan:
         why = self._robot.why_not_ready()
         if why:
             raise GoalRefused("robot", why)
@@ -103,13 +103,13 @@ class Interpolator:
             rospy.logwarn("goal %d: %s", self._count, text)
         end(self._result(handle), text)
 
-    def _stream(self, handle: Any, plan: Plan, resets: int, stops: int):
+    def _stream(self, handle: Any, plan: AcceptedPlan, resets: int, stops: int):
         """Move the arms; returns how the goal ends: the handle's method, and a text.
 
         resets, stops: how many of each the robot had seen before ``plan`` was made.
         """
         now = rospy.get_time()
-        motion = Motion(plan, now, self._settings.stop_deceleration)
+        motion = StreamedMotion(plan, now, self._settings.stop_deceleration)
         # After the end of a simulator, time stands still.
         ticker = Ticker(RosClock(gives_up=lambda: (
             rospy.is_shutdown() or self._robot.resets != resets or self._robot.is_gone())), self._settings.rate_hz)

@@ -29,7 +29,7 @@ _PLACES = np.linspace(0.0, 1.0, 33)
 _ROUNDING = 1e-6
 
 
-class JointLimit(NamedTuple):
+class StreamedJointLimit(NamedTuple):
     """``lower``, ``upper`` [rad], ``velocity`` [rad/s]."""
 
     lower: float
@@ -37,7 +37,7 @@ class JointLimit(NamedTuple):
     velocity: float
 
 
-class Plan(NamedTuple):
+class AcceptedPlan(NamedTuple):
     """The plan of an accepted goal: ``joint_names`` (k), ``trajectory`` from time 0 on, ``goal`` (k,) [rad]."""
 
     joint_names: tuple[str, ...]
@@ -49,15 +49,15 @@ class Plan(NamedTuple):
         return self.trajectory.end_time
 
 
-def judge(joint_names: Sequence[str], points: Sequence[Point], limits: Mapping[str, JointLimit],
-          measured: Mapping[str, float] | None, settings: StreamerSettings) -> Plan:
-    """Make a :class:`Plan`, or raise :class:`GoalRefused`.
+def judge(joint_names: Sequence[str], points: Sequence[Point], limits: Mapping[str, StreamedJointLimit],
+          measured: Mapping[str, float] | None, settings: StreamerSettings) -> AcceptedPlan:
+    """Make a :class:`AcceptedPlan`, or raise :class:`GoalRefused`.
 
     joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
     points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty. With
     positions only and all times 0 the server chooses the times: as short as the limits allow. limits: {joint:
-    JointLimit}; measured: {joint: angle [rad]} or None: the robot may still move, so do not check the start, and begin
-    at the first point. settings: :class:`~.settings.StreamerSettings`.
+    StreamedJointLimit}; measured: {joint: angle [rad]} or None: the robot may still move, so do not check the start,
+    and begin at the first point. settings: :class:`~.settings.StreamerSettings`.
     """
     names = tuple(joint_names) or RIGHT_ARM
     if settings.joints == "right_arm":
@@ -91,7 +91,7 @@ def judge(joint_names: Sequence[str], points: Sequence[Point], limits: Mapping[s
         if trajectory.end_time > settings.max_duration_s:
             raise GoalRefused("too_long", "the trajectory lasts %.9g s at best; it may last %g s (max_duration_s)" % (
                 trajectory.end_time, settings.max_duration_s), value=trajectory.end_time, limit=settings.max_duration_s)
-        return Plan(names, trajectory, positions[-1])
+        return AcceptedPlan(names, trajectory, positions[-1])
     curve = functools.partial(interpolate, times, points, interpolation=settings.interpolation)
     lead_in = None
     if settings.start == "jump":
@@ -105,7 +105,7 @@ def judge(joint_names: Sequence[str], points: Sequence[Point], limits: Mapping[s
         trajectory = curve(start=start)
     if settings.check_limits:
         _judge_curve(trajectory, names, bounds, first_point=1 if at_once else 0)
-    return Plan(names, joined(lead_in, trajectory) if lead_in else trajectory, positions[-1])
+    return AcceptedPlan(names, joined(lead_in, trajectory) if lead_in else trajectory, positions[-1])
 
 
 def _pace(names: tuple[str, ...], bounds: np.ndarray, settings: StreamerSettings) -> tuple[np.ndarray, np.ndarray]:
@@ -156,7 +156,7 @@ def _judge_times(times: np.ndarray, settings: StreamerSettings) -> None:
             index, times[index], settings.max_duration_s), index, None, times[index], settings.max_duration_s)
 
 
-def _start(names: tuple[str, ...], first: np.ndarray, limits: Mapping[str, JointLimit],
+def _start(names: tuple[str, ...], first: np.ndarray, limits: Mapping[str, StreamedJointLimit],
            measured: Mapping[str, float] | None) -> np.ndarray:
     """(k,) [rad]: the robot's position, or, if that is unknown, the position within the limits nearest to ``first``."""
     for name in names:
@@ -170,7 +170,8 @@ def _start(names: tuple[str, ...], first: np.ndarray, limits: Mapping[str, Joint
     return np.clip(first, [limits[name].lower for name in names], [limits[name].upper for name in names])
 
 
-def _bounds(names: tuple[str, ...], limits: Mapping[str, JointLimit], start: np.ndarray, slack: float) -> np.ndarray:
+def _bounds(names: tuple[str, ...], limits: Mapping[str, StreamedJointLimit], start: np.ndarray,
+            slack: float) -> np.ndarray:
     """(3, k): lower, upper, velocity; a joint that is beyond its limit may stay there, but not go farther."""
     table = np.array([limits[name] for name in names]).T
     table[0] = np.minimum(table[0], start) - slack

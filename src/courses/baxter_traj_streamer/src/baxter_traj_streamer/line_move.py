@@ -12,7 +12,7 @@ from arm_kinematics import Chain
 from baxter_model import BASE_FRAME, tip_of
 
 from .ros_settings import read_limits
-from .settings import SIDES, SettingsError, arm_joint_names
+from .settings import SIDES, StreamerSettingsError, arm_joint_names
 from .straight_line import straight_line
 from .traj_client import joint_trajectory
 
@@ -27,13 +27,14 @@ if TYPE_CHECKING:
 class LineMove:
     """The tip along a straight line, its orientation kept: ``trajectory(side, displacement, speed)``.
 
-    Raises SettingsError without robot_description, ChainError or UrdfError if it has no gripper.
+    Raises StreamerSettingsError without robot_description, ChainError or UrdfError if it has no gripper.
     """
 
     def __init__(self, client: TrajClient) -> None:
         self._client = client
         if not rospy.has_param("robot_description"):
-            raise SettingsError("the parameter robot_description is not set; the arms' kinematics are read from it")
+            raise StreamerSettingsError("the parameter robot_description is not set; the arms' kinematics are read "
+                                        "from it")
         robot = urdf_model.parse_urdf(str(rospy.get_param("robot_description")), source="robot_description")
         self._chains = {side: Chain.from_robot(robot, BASE_FRAME, tip_of(side)) for side in SIDES}
         self._limits = read_limits()

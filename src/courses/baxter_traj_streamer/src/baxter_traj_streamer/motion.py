@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from baxter_traj_streamer.judging import Plan
+    from baxter_traj_streamer.judging import AcceptedPlan
 
 # Number of samples in the search for the highest velocity of the rest of the path.
 _PLACES = 200
 
 
-class Motion:
-    """A :class:`~.judging.Plan` from ``start_time`` [s] on.
+class StreamedMotion:
+    """A :class:`~.judging.AcceptedPlan` from ``start_time`` [s] on.
 
     A stop stays on the checked path: the time along it slows down evenly to zero. The deceleration is then
     at most ``stop_deceleration`` [rad/s^2] more than the trajectory's own acceleration.
     """
 
-    def __init__(self, plan: Plan, start_time: float, stop_deceleration: float) -> None:
+    def __init__(self, plan: AcceptedPlan, start_time: float, stop_deceleration: float) -> None:
         self.plan = plan
         self._start_time = start_time
         self._stop_deceleration = stop_deceleration

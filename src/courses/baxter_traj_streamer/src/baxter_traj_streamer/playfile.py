@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from baxter_traj_streamer.settings import StreamerSettings
 
-    from .judging import JointLimit
+    from .judging import StreamedJointLimit
 
 #: Of a playfile; the notes' have some kilobytes.
 MAX_BYTES = 100_000_000
@@ -91,7 +91,8 @@ def merged(playfiles: Mapping[str, Playfile]) -> tuple[list[str], np.ndarray, np
     return names, times, np.array(columns).T
 
 
-def check(playfiles: Mapping[str, Playfile], limits: Mapping[str, JointLimit], settings: StreamerSettings) -> None:
+def check(playfiles: Mapping[str, Playfile], limits: Mapping[str, StreamedJointLimit],
+          settings: StreamerSettings) -> None:
     """Check {side: Playfile} as the server would, but without the start; arguments as for judging.judge.
 
     Raises PlayfileError, which names the file and, if known, the line.

@@ -11,8 +11,8 @@ import yaml
 
 import urdf_model
 
-from .judging import KNOWN_JOINTS, JointLimit
-from .settings import SettingsError, StreamerSettings
+from .judging import KNOWN_JOINTS, StreamedJointLimit
+from .settings import StreamerSettings, StreamerSettingsError
 
 # Parameters of this name override config/streamer.yaml.
 NAMESPACE = "/baxter_traj_streamer"
@@ -20,10 +20,11 @@ NAMESPACE = "/baxter_traj_streamer"
 
 def read_settings(changes: str | None = None) -> StreamerSettings:
     """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
-    it. Raises SettingsError."""
+    it. Raises StreamerSettingsError."""
     parameters = rospy.get_param(NAMESPACE, {})
     if not isinstance(parameters, dict):
-        raise SettingsError("the parameter %s is %r; expected settings by their names" % (NAMESPACE, parameters))
+        raise StreamerSettingsError("the parameter %s is %r; expected settings by their names" % (NAMESPACE,
+                                                                                                  parameters))
     return StreamerSettings(_read("streamer.yaml"), {**(_read(changes) if changes else {}), **parameters})
 
 
@@ -33,11 +34,13 @@ def _read(name: str) -> dict[str, Any]:
     return settings
 
 
-def read_limits() -> dict[str, JointLimit]:
-    """{joint: JointLimit} of both arms, from robot_description. Raises SettingsError, urdf_model.UrdfError."""
+def read_limits() -> dict[str, StreamedJointLimit]:
+    """{joint: StreamedJointLimit} of both arms, from robot_description. Raises StreamerSettingsError,
+    urdf_model.UrdfError."""
     if not rospy.has_param("robot_description"):
-        raise SettingsError("the parameter robot_description is not set; the joints' limits are read from its URDF")
+        raise StreamerSettingsError("the parameter robot_description is not set; the joints' limits are read from its "
+                                    "URDF")
     joints = urdf_model.parse_urdf(str(rospy.get_param("robot_description")), source="robot_description").joints
     found = {name: joints[name].limit for name in KNOWN_JOINTS if name in joints}
-    return {name: JointLimit(limit.lower, limit.upper, limit.velocity) for name, limit in found.items()
+    return {name: StreamedJointLimit(limit.lower, limit.upper, limit.velocity) for name, limit in found.items()
             if limit.lower is not None and limit.upper is not None and limit.velocity is not None}

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from baxter_traj_streamer.errors import GoalRefused
-from baxter_traj_streamer.judging import KNOWN_JOINTS, RIGHT_ARM, JointLimit, judge
+from baxter_traj_streamer.judging import KNOWN_JOINTS, RIGHT_ARM, StreamedJointLimit, judge
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 from streamer_settings import AS_IN_NOTES, DEFAULTS, make_settings  # noqa: E402
 
-LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
+LIMITS = {name: StreamedJointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 AT_ZERO = dict.fromkeys(KNOWN_JOINTS, 0.0)
 ARM = [0.0] * 7
 

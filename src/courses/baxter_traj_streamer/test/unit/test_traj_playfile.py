@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit
+from baxter_traj_streamer.judging import KNOWN_JOINTS, StreamedJointLimit
 from baxter_traj_streamer.playfile import Playfile, PlayfileError, check, merged
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
 
@@ -14,7 +14,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 from streamer_settings import make_settings  # noqa: E402
 
 SETTINGS = make_settings()
-LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
+LIMITS = {name: StreamedJointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 THREE_ROWS = """# wave
 0.1, 0, 0, 0, 0, 0, 0, 0.2
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from baxter_traj_streamer.errors import GoalRefused
-from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit, judge
-from baxter_traj_streamer.motion import Motion
-from baxter_traj_streamer.settings import JOINTS, SIDES, SettingsError, arm_joint_names
+from baxter_traj_streamer.judging import KNOWN_JOINTS, StreamedJointLimit, judge
+from baxter_traj_streamer.motion import StreamedMotion
+from baxter_traj_streamer.settings import JOINTS, SIDES, StreamerSettingsError, arm_joint_names
 from baxter_traj_streamer.timing import arrival_times, transition_time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
@@ -20,7 +20,7 @@ from spoilt_goals import WORDS, spoilt_goal  # noqa: E402
 from streamer_settings import make_settings  # noqa: E402
 
 SETTINGS = make_settings()
-LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
+LIMITS = {name: StreamedJointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 AT_ZERO = dict.fromkeys(KNOWN_JOINTS, 0.0)
 RIGHT = arm_joint_names("right")
 
@@ -66,7 +66,7 @@ def test_left_pre_pose_mirrors_the_right_one():
     {"poses": {"half": {"left": {"s0": 1.0}}}},
     {"max_velocity": {"s0": 1.0}}, {"max_velocity": dict.fromkeys(JOINTS, math.nan)}, {"rate_hz": "fast"}])
 def test_unusable_settings_are_refused(overrides):
-    with pytest.raises(SettingsError):
+    with pytest.raises(StreamerSettingsError):
         make_settings(**overrides)
 
 
@@ -74,7 +74,7 @@ def test_a_parameter_that_is_no_table_is_refused(monkeypatch):
     from baxter_traj_streamer import ros_settings
 
     monkeypatch.setattr(ros_settings.rospy, "get_param", lambda *_: 3)
-    with pytest.raises(SettingsError, match="parameter /baxter_traj_streamer is 3"):
+    with pytest.raises(StreamerSettingsError, match="parameter /baxter_traj_streamer is 3"):
         ros_settings.read_settings()
 
 
@@ -85,9 +85,9 @@ def test_poses_of_the_robot_are_known_too():
 
 
 def test_unknown_pose_and_side_are_refused():
-    with pytest.raises(SettingsError, match="pre_pose"):
+    with pytest.raises(StreamerSettingsError, match="pre_pose"):
         SETTINGS.pose("post_pose", "right")
-    with pytest.raises(SettingsError, match="right and left"):
+    with pytest.raises(StreamerSettingsError, match="right and left"):
         SETTINGS.pose("pre_pose", "up")
 
 
@@ -228,7 +228,7 @@ def test_the_way_begins_where_the_robot_is():
 @pytest.mark.parametrize("interpolation", ["fields", "linear", "quintic", "time_optimal"])
 def test_stop_keeps_to_the_way_and_decelerates_within_the_bound(interpolation):
     plan = plan_for([point(0.0, 0.0, 0.0), point(2.0, 1.5, -0.5)], interpolation=interpolation)
-    motion = Motion(plan, 10.0, SETTINGS.stop_deceleration)
+    motion = StreamedMotion(plan, 10.0, SETTINGS.stop_deceleration)
     before = motion.positions(11.0)
     motion.stop(11.0)
     assert not motion.is_at_rest(11.0)
@@ -245,7 +245,7 @@ def test_stop_keeps_to_the_way_and_decelerates_within_the_bound(interpolation):
 
 
 def test_motion_that_is_let_go_reaches_its_end():
-    motion = Motion(plan_for([point(2.0, 1.0, 0.5)]), 10.0, 2.0)
+    motion = StreamedMotion(plan_for([point(2.0, 1.0, 0.5)]), 10.0, 2.0)
     assert motion.positions(10.0) == pytest.approx([0.0, 0.0])
     assert not motion.is_at_rest(11.9) and motion.is_at_rest(12.0)
     assert motion.positions(12.0) == pytest.approx([1.0, 0.5]) and motion.percent(12.0) == 100

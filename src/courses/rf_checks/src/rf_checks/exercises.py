@@ -14,7 +14,7 @@ from rf_checks import tasks, tasks_planning, tasks_printed, tasks_steering
 if TYPE_CHECKING:
     from typing import Any
 
-    from rf_checks.tasks import Task
+    from rf_checks.tasks import ExerciseTask
 
 #: Points of 100 from which an exercise counts as done.
 PASS_MARK = 80.0
@@ -28,7 +28,7 @@ class Exercise:
     name: str
     title: str
     usage: str
-    task: Task[Any]
+    task: ExerciseTask[Any]
     words: tuple[str, ...]
     sides: tuple[str, ...] = ()
 

@@ -16,7 +16,7 @@ import rosgraph
 
 import master_calls
 from baxter_model import SIDES
-from rf_checks.recording import Changes
+from rf_checks.recording import GraphChanges
 
 #: Topics on which programs may publish. A lab with a servo or a trajectory server has nodes that command arms, too.
 SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics",
@@ -53,7 +53,7 @@ def flat(parameters: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-class Graph:
+class JudgedGraph:
     """The master at `uri`. Everything registered when `remember` is called belongs to the lab."""
 
     def __init__(self, uri: str) -> None:
@@ -82,8 +82,8 @@ class Graph:
         self.own_nodes = frozenset(node for _, _, node in self._own)
         self._processes = {node: lives for node, lives in processes.items() if node in self.own_nodes}
 
-    def changes(self, with_parameters: bool = False) -> Changes:
-        """The Changes since `remember`; parameters only on request, since that takes longer. Raises LabFailed."""
+    def changes(self, with_parameters: bool = False) -> GraphChanges:
+        """The GraphChanges since `remember`; parameters only on request, since that takes longer. Raises LabFailed."""
         now = self.state()
         topics = {name for kind, name, _ in self._own if kind == "publisher"} - SHARED_TOPICS
         intruders = {}
@@ -98,7 +98,7 @@ class Graph:
             parameters = self._parameters()
             changed = sorted(name for name, value in self._own_parameters.items()
                              if name not in parameters or parameters[name] != value)
-        return Changes(sorted(missing), intruders, sorted(withdrawn), changed)
+        return GraphChanges(sorted(missing), intruders, sorted(withdrawn), changed)
 
     def _ended(self) -> set[str]:
         return {node for node, lives in self._processes.items() if not lives()}

@@ -265,7 +265,7 @@ def told(target: Path, kept: list[str], known: dict[str, str]) -> list[str]:
 
 def leaks(workspace: Path, target: Path, kept: list[str]) -> list[str]:
     """Sentences on files of the copy that are, or hold, a solution."""
-    library = similarity.Library(workspace)
+    library = similarity.References(workspace)
     skeletons = library.handed_out[:library.skeleton_count]
     found = []
     for name in kept:

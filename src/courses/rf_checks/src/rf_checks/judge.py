@@ -15,18 +15,18 @@ from processes import isolation
 from rf_checks import diagnosis, hidden_paths, submission
 from rf_checks.exercises import meant_instead
 from rf_checks.graph import LabFailed, MasterSilent
-from rf_checks.lab import Lab, TooSlow, WhichRobot, robot_description, student_folder
+from rf_checks.lab import JudgedLab, TooSlow, WhichRobot, robot_description, student_folder
 from rf_checks.observing import Observer
-from rf_checks.pacing import Tree
-from rf_checks.recording import RECORD_S, Changes, Criterion, Fault, Recording, Run
-from rf_checks.robot import Robot
+from rf_checks.pacing import ProcessTree
+from rf_checks.recording import RECORD_S, Criterion, GraphChanges, ProgramRun, RunFault, RunRecording
+from rf_checks.robot import JudgedRobot
 from rf_checks.run_clock import RunClock
-from rf_checks.sandbox import CPU_S, Startup, Student, adopt_orphans
-from rf_checks.similarity import Library
+from rf_checks.sandbox import CPU_S, RunningProgram, Startup, adopt_orphans
+from rf_checks.similarity import References
 
 if TYPE_CHECKING:
     from rf_checks.exercises import Exercise
-    from rf_checks.tasks import Call
+    from rf_checks.tasks import ProgramCall
 
 #: A check that is not done within this time [s, wall] ends without a grade: the only limit in wall time.
 WALL_LIMIT_S = 900.0
@@ -47,14 +47,14 @@ MASTER = "/rosout and with it the ROS master"
 
 @dataclass(frozen=True)
 class RunResult:
-    """One run: the program's arguments, its Criteria, its Fault or None; end: how_it_ended, trace: the Run, both None
-    when it did not run."""
+    """One run: the program's arguments, its Criteria, its RunFault or None; end: how_it_ended, trace: the ProgramRun,
+    both None when it did not run."""
 
     arguments: tuple[str, ...]
     criteria: tuple[Criterion, ...]
-    fault: Fault | None
+    fault: RunFault | None
     end: dict[str, Any] | None = None
-    trace: Run | None = None
+    trace: ProgramRun | None = None
 
     @property
     def points(self) -> float:
@@ -84,8 +84,8 @@ class Result:
         return None if self.not_graded else float(np.mean([run.points for run in self.runs]))
 
     @property
-    def fault(self) -> Fault | None:
-        """The first Fault, or None."""
+    def fault(self) -> RunFault | None:
+        """The first RunFault, or None."""
         return None if self.not_graded else next((run.fault for run in self.runs if run.fault), None)
 
 
@@ -108,8 +108,8 @@ class Judge:
                                         % isolation.problem())
         self._which, self._hidden = which, tuple(map(str, hidden))
         self._description = robot_description(which.serial)
-        self.robot = Robot(self._description)
-        self._lab: Lab | None = None
+        self.robot = JudgedRobot(self._description)
+        self._lab: JudgedLab | None = None
         adopt_orphans()
 
     def __enter__(self) -> Judge:
@@ -160,23 +160,23 @@ class Judge:
                 not_run = (Criterion("as the run before", share, 100.0, "not run, because of the fault"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
-                      tuple(Library(hidden_paths.workspace()).notes(texts)), self._which)
+                      tuple(References(hidden_paths.workspace()).notes(texts)), self._which)
 
-    def run(self, program: Path, exercise: Exercise, call: Call, deadline: float = float("inf")) -> Run:
-        """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
+    def run(self, program: Path, exercise: Exercise, call: ProgramCall, deadline: float = float("inf")) -> ProgramRun:
+        """One run; returns a ProgramRun. Raises TooSlow at `deadline` (monotonic, s)."""
         lab = self._fresh_lab(call, deadline)
-        run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
+        run = ProgramRun(list(call.arguments), RunRecording(lab.joint_names), program=program.name)
         clock = RunClock()
         environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost"}
         for name in ("ROS_IP", "ROS_NAMESPACE"):
             environment.pop(name, None)
         lab.watch.helpers.roots = lab.helper_pids()
         began = time.monotonic()
-        student = Student(program, call.arguments, environment, self.has_walls,
-                          Startup(student_folder(), clock.environment, (clock.descriptor,), self._hidden))
+        student = RunningProgram(program, call.arguments, environment, self.has_walls,
+                                 Startup(student_folder(), clock.environment, (clock.descriptor,), self._hidden))
         observer = Observer(call, student, lambda output: self._is_satisfied(exercise, call, run, output),
                             lambda: self._look_at_graph(lab, run))
-        lab.watch.program = tree = Tree((student.pid,))
+        lab.watch.program = tree = ProcessTree((student.pid,))
         lab.watch.gives_up = lambda: time.monotonic() > deadline
         lab.run_clock, lab.is_hurried = clock, True
         lab.on_record = lambda record: observer.on_record(record, tree.used_s)
@@ -199,14 +199,14 @@ class Judge:
             tree.roots = ()
             clock.close()
         run.output, run.errors, run.survivors = student.output, student.errors, student.survivors
-        run.recording = Recording(lab.joint_names, _with_exit(observer.records))
+        run.recording = RunRecording(lab.joint_names, _with_exit(observer.records))
         if run.ended == "paused":
             self.close()
         else:
             lab.graph.forget_strangers()
         return run
 
-    def _fresh_lab(self, call: Call, deadline: float) -> Lab:
+    def _fresh_lab(self, call: ProgramCall, deadline: float) -> JudgedLab:
         # Nobody resets a move_group.
         if self._lab is not None and (call.obstacle or self._lab.obstacle or call.steered != self._lab.steered):
             self.close()
@@ -215,8 +215,8 @@ class Judge:
                 self.close()
             try:
                 if self._lab is None:
-                    self._lab = Lab(self._description, self.has_walls, self._which, call.obstacle,
-                                    call.steered)
+                    self._lab = JudgedLab(self._description, self.has_walls, self._which, call.obstacle,
+                                          call.steered)
                     self._lab.start(deadline)
                 self._lab.reset(call.posture, deadline)
                 return self._lab
@@ -227,7 +227,7 @@ class Judge:
         raise AssertionError  # the loop above returns or raises
 
     @staticmethod
-    def _watch(lab: Lab, observer: Observer, deadline: float) -> None:
+    def _watch(lab: JudgedLab, observer: Observer, deadline: float) -> None:
         """Wait for the end of a run, and end it if no more records come."""
         began = time.monotonic()
         while not observer.wait(_LOOK_S):
@@ -244,25 +244,25 @@ class Judge:
                               % (_rounded(simulated_s / wall_s), simulated_s, wall_s))
 
     @staticmethod
-    def _is_satisfied(exercise: Exercise, call: Call, run: Run, output: str) -> bool:
+    def _is_satisfied(exercise: Exercise, call: ProgramCall, run: ProgramRun, output: str) -> bool:
         run.output = output
         return exercise.task.is_satisfied(call, run)
 
     @staticmethod
-    def _look_at_graph(lab: Lab, run: Run, with_parameters: bool = False) -> bool:
+    def _look_at_graph(lab: JudgedLab, run: ProgramRun, with_parameters: bool = False) -> bool:
         """Whether a part of the lab is gone, or another node publishes its topics; sets `run.changes`."""
         try:
             run.changes = lab.graph.changes(with_parameters)
         except MasterSilent:
             # A busy master answers late; a stopped one does not answer at all.
             if lab.has_stopped_master():
-                run.changes = Changes([MASTER])
+                run.changes = GraphChanges([MASTER])
         except LabFailed:
-            run.changes = Changes([MASTER])
+            run.changes = GraphChanges([MASTER])
         return bool(run.changes)
 
 
-def how_it_ended(run: Run) -> dict[str, Any]:
+def how_it_ended(run: ProgramRun) -> dict[str, Any]:
     """How a run ended, for the report: a dict of plain values."""
     how, number = run.ended, None
     if how == "exited":

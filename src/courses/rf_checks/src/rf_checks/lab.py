@@ -30,7 +30,7 @@ from processes import isolation
 from processes.family import children_of, direct_children, is_running, with_parent
 from processes.ports import free_port
 from rf_checks import hidden_paths
-from rf_checks.graph import Graph, LabFailed
+from rf_checks.graph import JudgedGraph, LabFailed
 from rf_checks.pacing import OwnTime, Watch
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SOCKETS_VARIABLE, changes_the_world
 from world_picture.results import ready_for
@@ -80,7 +80,7 @@ class WhichRobot(NamedTuple):
         return self == WhichRobot()
 
 
-class Lab:
+class JudgedLab:
     """Start with :meth:`start`, end with :meth:`close`; a context manager."""
 
     def __init__(self, description_xml: str, walls: bool = True,
@@ -91,7 +91,7 @@ class Lab:
         left arm."""
         self._port = free_port()
         self.uri = "http://localhost:%d" % self._port
-        self.graph = Graph(self.uri)
+        self.graph = JudgedGraph(self.uri)
         #: The folder of the lab's files.
         self.folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         self.obstacle, self.steered = obstacle, steered
@@ -122,7 +122,7 @@ class Lab:
         self._is_held = False
         self._is_closed_world = False
 
-    def __enter__(self) -> Lab:
+    def __enter__(self) -> JudgedLab:
         return self
 
     def __exit__(self, *_: object) -> None:

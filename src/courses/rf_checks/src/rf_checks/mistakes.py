@@ -13,7 +13,7 @@ from rf_checks.measures import pose_error
 from urdf_model.transforms import matrix_from_quaternion, rotation_angle
 
 if TYPE_CHECKING:
-    from rf_checks.robot import Robot
+    from rf_checks.robot import JudgedRobot
 
 # Tolerance to identify a known wrong answer [m], [rad].
 NEAR_M, NEAR_RAD = 0.02, 0.06
@@ -99,7 +99,7 @@ def wrong_rotations(start: np.ndarray, axis: str, angle_rad: float) -> list[tupl
     ]
 
 
-def matrix_slip(found: np.ndarray, robot: Robot, joints: dict[str, float], pairs: list[tuple[str, str]],
+def matrix_slip(found: np.ndarray, robot: JudgedRobot, joints: dict[str, float], pairs: list[tuple[str, str]],
                 preferred: tuple[str, ...]) -> tuple[str, str] | None:
     """The mistake in a (4, 4) matrix that should be the pose of one of `pairs`: (key, sentence) or None.
 
@@ -122,7 +122,7 @@ def matrix_slip(found: np.ndarray, robot: Robot, joints: dict[str, float], pairs
     return _another_pair(found, robot, joints, pairs, preferred)
 
 
-def _another_pair(found: np.ndarray, robot: Robot, joints: dict[str, float], pairs: list[tuple[str, str]],
+def _another_pair(found: np.ndarray, robot: JudgedRobot, joints: dict[str, float], pairs: list[tuple[str, str]],
                   preferred: tuple[str, ...]) -> tuple[str, str] | None:
     """The other pair of frames that the matrix belongs to, directly or with a mistake in its rotation."""
     names = [*preferred, *(name for name in robot.frame_names if name not in preferred)]

@@ -13,8 +13,8 @@ from rf_checks import diagnosis
 from rf_checks.recording import RECORD_S
 
 if TYPE_CHECKING:
-    from rf_checks.sandbox import Student
-    from rf_checks.tasks import Call
+    from rf_checks.sandbox import RunningProgram
+    from rf_checks.tasks import ProgramCall
 
 #: A program that is almost never idle for this much processor time counts as an endless computation [s]; "almost never"
 #: is this share of the records.
@@ -31,7 +31,7 @@ _LOOK_AT_GRAPH, _LOOK_AT_FAMILY = 25, 5
 class Observer:
     """Takes the records of one run. When the run is over the world waits until :meth:`release`."""
 
-    def __init__(self, call: Call[Any], student: Student, is_satisfied: Callable[[str], bool],
+    def __init__(self, call: ProgramCall[Any], student: RunningProgram, is_satisfied: Callable[[str], bool],
                  look_at_graph: Callable[[], bool]) -> None:
         """`is_satisfied(output)`: whether the judge has seen enough; `look_at_graph()`: whether the lab was changed."""
         self.records: list[dict[str, Any]] = []

@@ -40,7 +40,7 @@ def last_process() -> bytes:
         return file.read().split()[-1]
 
 
-class Tree:
+class ProcessTree:
     """Some processes with all their descendants: states of their threads, and their processor time."""
 
     def __init__(self, roots: Collection[int] = ()) -> None:
@@ -120,7 +120,7 @@ class Watch:
 
     def __init__(self) -> None:
         #: Helpers: processes whose responses the program waits for.
-        self.program, self.helpers = Tree(), Tree()
+        self.program, self.helpers = ProcessTree(), ProcessTree()
         #: Called sometimes; True ends a wait.
         self.gives_up: Callable[[], bool] = lambda: False
 
@@ -159,7 +159,7 @@ class OwnTime:
     def __init__(self, roots: Callable[[], Iterable[int]]) -> None:
         """`roots`: function that returns process ids."""
         self._roots = roots
-        self._tree = Tree()
+        self._tree = ProcessTree()
         self.restart()
 
     def restart(self) -> None:

@@ -30,7 +30,7 @@ from rf_checks.recorder_names import RECORDS, REQUESTS, SOCKETS_VARIABLE, change
 if TYPE_CHECKING:
     from baxter_core_msgs.msg import JointCommand as JointCommandMessage
 
-    from baxter_sim_hardware.arms.joint_command import JointCommand
+    from baxter_sim_hardware.arms.joint_command import CheckedCommand
     from gazebo_ros.model_plugin import PluginContext
 
 RECORD_TICKS = 5  # 10 ms of simulation
@@ -108,7 +108,7 @@ class Recorder(ModelPlugin):
             robot.command_observers.append(self._on_command)
         self._robot = robot
 
-    def _on_command(self, side: str, message: JointCommandMessage, command: JointCommand | None) -> None:
+    def _on_command(self, side: str, message: JointCommandMessage, command: CheckedCommand | None) -> None:
         """command: the checked command, None where the robot refused it."""
         caller = (getattr(message, "_connection_header", None) or {}).get("callerid", "")
         self._counts[side] += 1

@@ -16,7 +16,7 @@ RECORD_S = 0.01
 Box = tuple[str, np.ndarray, np.ndarray]
 
 
-class Recording:
+class RunRecording:
     """The robot's motion: one record (a dict as recorder.py writes it) each RECORD_S of simulation."""
 
     def __init__(self, joint_names: Iterable[str], records: Iterable[dict[str, Any]] = ()) -> None:
@@ -95,7 +95,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Changes:
+class GraphChanges:
     """Changes of the lab's own registrations. All names sorted.
 
     missing_nodes: ended, or no longer registered. intruders: dict of the lab's topics to other nodes that publish them.
@@ -112,24 +112,24 @@ class Changes:
 
 
 @dataclass
-class Run:
+class ProgramRun:
     """One run of a program.
 
     ended: how the run ended: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
     "output", "processes", "threads", "sockets", "files", "memory", "paused", "simulator gone", "meddled", "requests".
-    changes: Changes of the lab. stuck_at: the program's line when the judge ended it. cpu_s: its processor time;
+    changes: GraphChanges of the lab. stuck_at: the program's line when the judge ended it. cpu_s: its processor time;
     wall_s: its wall time.
     """
 
     arguments: list[str]
-    recording: Recording
+    recording: RunRecording
     output: str = ""
     errors: str = ""
     exit_code: int | None = None
     ended: str = "exited"
     stuck_at: int | None = None
     survivors: int = 0
-    changes: Changes = Changes()
+    changes: GraphChanges = GraphChanges()
     program: str = ""
     cpu_s: float = 0.0
     wall_s: float = 0.0
@@ -151,7 +151,7 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class Fault:
+class RunFault:
     """A fault: a short key, and the sentence for the author. cap: largest share of all points."""
 
     key: str

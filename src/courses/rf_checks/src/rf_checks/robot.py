@@ -12,13 +12,13 @@ from baxter_model import BASE_FRAME, SIDES, poses, tip_of
 from urdf_model import parse_urdf
 
 if TYPE_CHECKING:
-    from rf_checks.recording import Recording
+    from rf_checks.recording import RunRecording
 
 # Start of inverse kinematics: the middle of the arm's usual workspace.
 _START = "neutral"
 
 
-class Robot:
+class JudgedRobot:
     """The robot's kinematics, from its description."""
 
     def __init__(self, description_xml: str) -> None:
@@ -65,11 +65,11 @@ class Robot:
         """(4, 4) pose of `source` in `target`."""
         return np.linalg.inv(self.frame(target, joints)) @ self.frame(source, joints)
 
-    def gripper_path(self, side: str, recording: Recording) -> np.ndarray:
+    def gripper_path(self, side: str, recording: RunRecording) -> np.ndarray:
         """(n, 3) positions of one gripper in `base` [m]."""
         return np.array([self._arms[side].fk(q)[:3, 3] for q in recording.arm(side)])
 
-    def gripper(self, side: str, recording: Recording, row: int = -1) -> np.ndarray:
+    def gripper(self, side: str, recording: RunRecording, row: int = -1) -> np.ndarray:
         """(4, 4) pose of one gripper in `base` at a row of the recording."""
         return self._arms[side].fk(recording.arm(side)[row])
 

@@ -78,7 +78,7 @@ class Startup:
         return os.pathsep.join(filter(None, (str(Path(rospy_fixes.__file__).parents[1]), folder, python_path)))
 
 
-class Student:
+class RunningProgram:
     """A running program. `output`, `errors`: its output so far; `wrote_too_much`: whether that exceeds the limit."""
 
     def __init__(self, program: Path, arguments: Sequence[str], environment: dict[str, str], walls: bool = True,

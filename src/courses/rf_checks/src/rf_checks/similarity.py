@@ -227,7 +227,7 @@ def _is_python(text: str) -> bool:
     return not keyword.iskeyword(text.strip())
 
 
-class Library:
+class References:
     """The references and handed-out texts of a workspace; a students' copy has no references."""
 
     def __init__(self, workspace: Path) -> None:

@@ -14,13 +14,13 @@ from baxter_model import SIDES, joint_names, poses
 from command_line.options import counted
 from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
-from rf_checks.recording import Criterion, Fault
+from rf_checks.recording import Criterion, RunFault
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from rf_checks.recording import Recording, Run
-    from rf_checks.robot import Robot
+    from rf_checks.recording import ProgramRun, RunRecording
+    from rf_checks.robot import JudgedRobot
     from rf_checks.tasks_planning import Obstacle
 
 # The lab's pose of the left gripper in `base`.
@@ -35,7 +35,7 @@ Expected = TypeVar("Expected")
 
 
 @dataclass(frozen=True)
-class Call(Generic[Expected]):
+class ProgramCall(Generic[Expected]):
     """One run of the program: its arguments, the arms' posture before {joint: rad}, the time limit [sim s], and the
     right answer.
 
@@ -51,27 +51,27 @@ class Call(Generic[Expected]):
     steered: bool = False
 
 
-class Task(ABC, Generic[Expected]):
+class ExerciseTask(ABC, Generic[Expected]):
     """The grading of one kind of exercise."""
 
     @abstractmethod
-    def calls(self, rng: Generator) -> list[Call[Expected]]:
+    def calls(self, rng: Generator) -> list[ProgramCall[Expected]]:
         """The runs of the check."""
 
     @abstractmethod
-    def criteria(self, call: Call[Expected], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[Expected], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         """The grades of one run."""
 
     @abstractmethod
-    def slip(self, call: Call[Expected], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[Expected], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         """The mistake that one run shows, or None."""
 
-    def is_satisfied(self, call: Call[Expected], run: Run) -> bool:
+    def is_satisfied(self, call: ProgramCall[Expected], run: ProgramRun) -> bool:
         """Whether the judge has seen enough of a program that does not end."""
         return False
 
-    def foremost(self, call: Call[Expected], run: Run) -> Fault | None:
-        """A Fault that explains how the program behaved, or None."""
+    def foremost(self, call: ProgramCall[Expected], run: ProgramRun) -> RunFault | None:
+        """A RunFault that explains how the program behaved, or None."""
         return None
 
 
@@ -89,7 +89,7 @@ def pose_matrix(point: Sequence[float], quaternion_xyzw: Iterable[float]) -> np.
     return matrix
 
 
-def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: Call[Expected],
+def motion_criteria(run: ProgramRun, sides: tuple[str, ...], done_share: float, call: ProgramCall[Expected],
                     weights: tuple[float, float, float], halts_allowed: int) -> list[Criterion]:
     """Smoothness, collisions, time: weighted by the solved share of the task (`done_share`)."""
     smooth, clear, quick = weights
@@ -117,27 +117,27 @@ def motion_criteria(run: Run, sides: tuple[str, ...], done_share: float, call: C
     ]
 
 
-def _duration(recording: Recording) -> float:
+def _duration(recording: RunRecording) -> float:
     arms = np.hstack([recording.arm(side) for side in SIDES]) if len(recording.times) else np.empty((0, 14))
     rows = measures.moving_rows(recording.times, arms)
     return float(recording.times[rows[1]] - recording.times[0]) if rows else 0.0
 
 
-class RotateGripper(Task[tuple[str, float]]):
+class RotateGripper(ExerciseTask[tuple[str, float]]):
     """`rotate_gripper.py AXIS DEGREES`: the left gripper to the lab's pose, then turned about its own axis."""
 
-    def calls(self, rng: Generator) -> list[Call[tuple[str, float]]]:
-        return [Call((axis, "%d" % degrees), postures(rng), 45.0, (axis, math.radians(degrees)), 22.0)
+    def calls(self, rng: Generator) -> list[ProgramCall[tuple[str, float]]]:
+        return [ProgramCall((axis, "%d" % degrees), postures(rng), 45.0, (axis, math.radians(degrees)), 22.0)
                 for axis, degrees in (("z", 90), ("x", 90), ("y", -90))]
 
-    def _target(self, call: Call[tuple[str, float]]) -> tuple[np.ndarray, np.ndarray]:
+    def _target(self, call: ProgramCall[tuple[str, float]]) -> tuple[np.ndarray, np.ndarray]:
         axis, angle = call.expected
         start = pose_matrix(LAB_POINT, LAB_QUATERNION)
         target = start.copy()
         target[:3, :3] = start[:3, :3] @ mistakes.about(axis, angle)
         return start, target
 
-    def criteria(self, call: Call[tuple[str, float]], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[tuple[str, float]], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         position = orientation = 0.0
         distance, angle = math.inf, math.inf
         recording = run.recording
@@ -153,14 +153,15 @@ class RotateGripper(Task[tuple[str, float]]):
         return [Criterion("position", position, 20.0, reached), Criterion("orientation", orientation, 40.0, turned),
                 *motion_criteria(run, ("left",), min(position, orientation), call, (10.0, 15.0, 15.0), 4)]
 
-    def slip(self, call: Call[tuple[str, float]], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[tuple[str, float]], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         axis, angle = call.expected
         start, target = self._target(call)
         requests = run.recording.ik_requests()
         for _, frame, xyz, xyzw, _ in requests:
             if frame.lstrip("/") not in ("base", "world", ""):
-                return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; the pose of this "
-                             "exercise is given in `base` (header.frame_id)" % frame)
+                return RunFault("wrong_frame",
+                                "the IK service was asked for a pose in the frame `%s`; the pose of this "
+                                "exercise is given in `base` (header.frame_id)" % frame)
             pose = pose_matrix(xyz, xyzw)
             if measures.pose_error(pose, start)[0] < mistakes.NEAR_M:
                 fault = self._rotation_fault(pose, start, target, axis, angle)
@@ -170,18 +171,18 @@ class RotateGripper(Task[tuple[str, float]]):
                 or self._missed(run, robot, start, bool(requests)))
 
     @staticmethod
-    def _missed(run: Run, robot: Robot, start: np.ndarray, has_asked: bool) -> Fault | None:
-        """A Fault for an arm that is at another place without a known mistake."""
+    def _missed(run: ProgramRun, robot: JudgedRobot, start: np.ndarray, has_asked: bool) -> RunFault | None:
+        """A RunFault for an arm that is at another place without a known mistake."""
         distance = measures.pose_error(robot.gripper("left", run.recording), start)[0]
         if distance < 0.05 or not measures.has_moved(run.recording.arm("left")):
             return None
         text = "the left gripper ended %.0f cm from the lab's pose, where it is to be turned" % (100.0 * distance)
         if not has_asked:
             text += "; the IK service was never asked for joint angles"
-        return Fault("far_off", text)
+        return RunFault("far_off", text)
 
     def _rotation_fault(self, pose: np.ndarray, start: np.ndarray, target: np.ndarray, axis: str,
-                        angle: float) -> Fault | None:
+                        angle: float) -> RunFault | None:
         rotation = pose[:3, :3]
         if mistakes.is_near(rotation, target[:3, :3]) or mistakes.is_near(rotation, start[:3, :3]):
             return None
@@ -189,11 +190,11 @@ class RotateGripper(Task[tuple[str, float]]):
             if mistakes.is_near(rotation, wrong):
                 if key == "quaternion_order":
                     sentence += "; " + mistakes.SHEET_ROTATE
-                return Fault(key, sentence)
+                return RunFault(key, sentence)
         return None
 
-    def _reached_fault(self, run: Run, robot: Robot, start: np.ndarray, target: np.ndarray, axis: str,
-                       angle: float) -> Fault | None:
+    def _reached_fault(self, run: ProgramRun, robot: JudgedRobot, start: np.ndarray, target: np.ndarray, axis: str,
+                       angle: float) -> RunFault | None:
         if not run.recording.records:
             return None
         reached = robot.gripper("left", run.recording)
@@ -203,27 +204,28 @@ class RotateGripper(Task[tuple[str, float]]):
         joints = run.recording.joints_at(-1)
         for frame in ("left_hand", "left_wrist", "left_gripper_base"):
             if measures.pose_error(robot.frame(frame, joints), target)[0] < mistakes.NEAR_M:
-                return Fault("wrong_frame", "at the end `%s` is where `left_gripper` was to be: the IK service "
-                             "commands `left_gripper`, and so must the pose be one of that frame" % frame)
+                return RunFault("wrong_frame", "at the end `%s` is where `left_gripper` was to be: the IK service "
+                                "commands `left_gripper`, and so must the pose be one of that frame" % frame)
         if distance < mistakes.NEAR_M:
             fault = self._rotation_fault(reached, start, target, axis, angle)
             if fault:
                 return fault
             if mistakes.is_near(reached[:3, :3], start[:3, :3]):
-                return Fault("not_turned", "the gripper is at the lab's pose, but it was not turned about its %s axis "
-                             "by %.0f degrees" % (axis, math.degrees(angle)))
+                return RunFault("not_turned",
+                                "the gripper is at the lab's pose, but it was not turned about its %s axis "
+                                "by %.0f degrees" % (axis, math.degrees(angle)))
         return None
 
 
-class JointCommand(Task[tuple[float, ...]]):
+class JointCommand(ExerciseTask[tuple[float, ...]]):
     """`joint_command.py Q0 ... Q6`: the right arm to seven angles, s0 to w2, by a stream of joint commands."""
 
-    def calls(self, rng: Generator) -> list[Call[tuple[float, ...]]]:
+    def calls(self, rng: Generator) -> list[ProgramCall[tuple[float, ...]]]:
         goal = [round(float(angle), 3) for angle in np.array((-0.4, -0.3, 0.5, 1.1, 0.3, 0.8, 0.7))
                 + rng.uniform(-0.15, 0.15, 7)]
-        return [Call(tuple(map(str, goal)), postures(rng), 30.0, tuple(goal), 12.0)]
+        return [ProgramCall(tuple(map(str, goal)), postures(rng), 30.0, tuple(goal), 12.0)]
 
-    def criteria(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[tuple[float, ...]], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         share, found = 0.0, "the arm did not move"
         recording = run.recording
         if measures.has_moved(recording.arm("right")):
@@ -233,29 +235,29 @@ class JointCommand(Task[tuple[float, ...]]):
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
 
-    def slip(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[tuple[float, ...]], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         recording = run.recording
         if measures.has_moved(recording.arm("right")):
             off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
             if off.max() > measures.AT_GOAL_RAD and run.exit_code == 0:
-                return Fault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
-                             "/robot/joint_states says that the arm is there"
-                             % (joint_names("right")[int(off.argmax())], off.max()))
+                return RunFault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
+                                "/robot/joint_states says that the arm is there"
+                                % (joint_names("right")[int(off.argmax())], off.max()))
         return None
 
 
-class Wave(Task[None]):
+class Wave(ExerciseTask[None]):
     """`wave.py`: both grippers to and fro along a sine path at the same time, three periods or more, then an end."""
 
-    def calls(self, rng: Generator) -> list[Call[None]]:
-        return [Call((), postures(rng), 60.0, None, 40.0)]
+    def calls(self, rng: Generator) -> list[ProgramCall[None]]:
+        return [ProgramCall((), postures(rng), 60.0, None, 40.0)]
 
-    def fits(self, run: Run, robot: Robot) -> dict[str, measures.SineFit]:
+    def fits(self, run: ProgramRun, robot: JudgedRobot) -> dict[str, measures.SineFit]:
         """The sine of each gripper's path: dict of side to SineFit."""
         recording = run.recording
         return {side: measures.fit_sine(recording.times, robot.gripper_path(side, recording)) for side in SIDES}
 
-    def criteria(self, call: Call[None], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[None], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         fits: dict[str, measures.SineFit] = dict.fromkeys(SIDES, measures.NO_SINE)
         if len(run.recording.times) > 50:
             fits = self.fits(run, robot)
@@ -286,22 +288,22 @@ class Wave(Task[None]):
         both = min(left.end, right.end) - max(left.start, right.start)
         return float(np.clip(both / min(left.end - left.start, right.end - right.start), 0.0, 1.0))
 
-    def slip(self, call: Call[None], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[None], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         if len(run.recording.times) < 50:
             return None
         fits = self.fits(run, robot)
         still = [side for side in SIDES if not measures.has_moved(run.recording.arm(side))]
         if len(still) == 1:
-            return Fault("one_arm", "only one arm moved; the %s arm stood still, and both are to wave" % still[0])
+            return RunFault("one_arm", "only one arm moved; the %s arm stood still, and both are to wave" % still[0])
         none = [side for side, fit in fits.items() if not fit.periods]
         if none and not still:
-            return Fault("no_wave", "the %s gripper moved, but nothing in its path is a sine of more than one period"
-                         % " and the ".join(none))
+            return RunFault("no_wave", "the %s gripper moved, but nothing in its path is a sine of more than one period"
+                            % " and the ".join(none))
         if all(fit.periods and fit.periods < PERIODS for fit in fits.values()):
-            return Fault("too_short", "both arms wave, but for fewer than three periods (%.1f)"
-                         % min(fit.periods for fit in fits.values()))
+            return RunFault("too_short", "both arms wave, but for fewer than three periods (%.1f)"
+                            % min(fit.periods for fit in fits.values()))
         small = [side for side, fit in fits.items() if fit.periods and fit.amplitude < AMPLITUDE_M]
         if small:
-            return Fault("too_small", "the %s gripper's wave goes %.0f mm to either side; 5 cm are due"
-                         % (small[0], 1000 * fits[small[0]].amplitude))
+            return RunFault("too_small", "the %s gripper's wave goes %.0f mm to either side; 5 cm are due"
+                            % (small[0], 1000 * fits[small[0]].amplitude))
         return None

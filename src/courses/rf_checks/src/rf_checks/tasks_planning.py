@@ -12,14 +12,14 @@ import numpy as np
 from baxter_model import joint_names, poses
 from command_line.options import counted
 from rf_checks import measures
-from rf_checks.recording import Criterion, Fault
-from rf_checks.tasks import Call, Task, motion_criteria, postures
+from rf_checks.recording import Criterion, RunFault
+from rf_checks.tasks import ExerciseTask, ProgramCall, motion_criteria, postures
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from rf_checks.recording import Box, Recording, Run
-    from rf_checks.robot import Robot
+    from rf_checks.recording import Box, ProgramRun, RunRecording
+    from rf_checks.robot import JudgedRobot
 
 ARM, STATE = "left", "left_neutral"
 # The pillar stands on the floor in front of the arm's left half, in `base` [m].
@@ -78,10 +78,10 @@ class Way(NamedTuple):
     pillar: Obstacle
 
 
-class PlanAround(Task[Way]):
+class PlanAround(ExerciseTask[Way]):
     """`plan_around.py X Y Z LX LY LZ`: the left arm to `left_neutral`, past a pillar at X Y Z with edges LX LY LZ."""
 
-    def calls(self, rng: Generator) -> list[Call[Way]]:
+    def calls(self, rng: Generator) -> list[ProgramCall[Way]]:
         x, y = (round(float(value + rng.uniform(-_SPREAD_M, _SPREAD_M)), 3) for value in _PLACE_M)
         edges = _WIDTH_M, _WIDTH_M, round(_TOP_M - _FLOOR_M, 3)
         pillar = Obstacle((x, y, round(0.5 * (_FLOOR_M + _TOP_M), 3)), edges)
@@ -89,9 +89,9 @@ class PlanAround(Task[Way]):
         posture[joint_names(ARM)[0]] = round(float(_BEGIN_RAD + rng.uniform(-_SPREAD_RAD, _SPREAD_RAD)), 4)
         words = tuple("%g" % value for value in (*pillar.middle, *pillar.edges))
         way = Way(tuple(poses().angles("neutral", ARM).values()), pillar)
-        return [Call(words, posture, 60.0, way, 25.0, pillar)]
+        return [ProgramCall(words, posture, 60.0, way, 25.0, pillar)]
 
-    def criteria(self, call: Call[Way], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[Way], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         recording = run.recording
         share, found = 0.0, "the arm did not move"
         if measures.has_moved(recording.arm(ARM)):
@@ -108,55 +108,57 @@ class PlanAround(Task[Way]):
     def _knows(pillar: Obstacle, told: list[Box]) -> bool:
         return len(told) <= MAX_BOXES and any(pillar.is_covered(pose, edges) for _, pose, edges in told)
 
-    def foremost(self, call: Call[Way], run: Run) -> Fault | None:
+    def foremost(self, call: ProgramCall[Way], run: ProgramRun) -> RunFault | None:
         return self._about_scene(call, run) if _touched(run.recording) else None
 
-    def slip(self, call: Call[Way], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[Way], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         recording = run.recording
         fault = self._about_scene(call, run)
         if fault is None and not recording.accepted_count(ARM) and recording.was_enabled():
-            fault = Fault("not_executed", "no joint command came, though the robot was enabled: plan() only looks for "
-                          "a way; go() takes it, or execute() with the second of what plan() returns")
+            fault = RunFault("not_executed",
+                             "no joint command came, though the robot was enabled: plan() only looks for "
+                             "a way; go() takes it, or execute() with the second of what plan() returns")
         if fault is None and measures.has_moved(recording.arm(ARM)):
             off = np.abs(recording.arm(ARM)[-1] - np.array(call.expected.goal))
             if off.max() > measures.AT_GOAL_RAD:
-                fault = Fault("far_off", "%s ended %.2f rad from `%s`, a state of the group `%s_arm`: "
-                              "set_named_target(\"%s\") before go()"
-                              % (joint_names(ARM)[int(off.argmax())], off.max(), STATE, ARM, STATE))
+                fault = RunFault("far_off", "%s ended %.2f rad from `%s`, a state of the group `%s_arm`: "
+                                 "set_named_target(\"%s\") before go()"
+                                 % (joint_names(ARM)[int(off.argmax())], off.max(), STATE, ARM, STATE))
         return fault
 
     @staticmethod
-    def _about_scene(call: Call[Way], run: Run) -> Fault | None:
-        """A Fault for what move_group was told of the pillar, or None."""
+    def _about_scene(call: ProgramCall[Way], run: ProgramRun) -> RunFault | None:
+        """A RunFault for what move_group was told of the pillar, or None."""
         pillar, told = call.expected.pillar, _told(run.recording)
         if PlanAround._knows(pillar, told):
             return None
         end = "; the arm ran into it" if _touched(run.recording) else ""
         if len(told) > MAX_BOXES:
-            return Fault("too_many_boxes", "move_group was told of %s%s: one stands there, with the numbers on "
-                         "the command line" % (counted(len(told), "box", "boxes"), end))
+            return RunFault("too_many_boxes", "move_group was told of %s%s: one stands there, with the numbers on "
+                            "the command line" % (counted(len(told), "box", "boxes"), end))
         if not told:
-            return Fault("no_box", "move_group was told of no box, so it plans as if nothing stood there%s: "
-                         "PlanningSceneInterface().add_box(NAME, POSE, SIZE) before you plan" % end)
+            return RunFault("no_box", "move_group was told of no box, so it plans as if nothing stood there%s: "
+                            "PlanningSceneInterface().add_box(NAME, POSE, SIZE) before you plan" % end)
         name, pose, edges = min(told, key=lambda box: np.linalg.norm(box[1][:3, 3] - np.array(pillar.middle)))
         if np.abs(edges / np.array(pillar.edges) - _HALF).max() < _HALF_TOLERANCE:
-            return Fault("half_size", "`%s` in the planning scene has edges of %s m, half of the pillar's %s%s: "
-                         "add_box takes whole edges" % (name, _words(edges), _words(pillar.edges), end))
+            return RunFault("half_size", "`%s` in the planning scene has edges of %s m, half of the pillar's %s%s: "
+                            "add_box takes whole edges" % (name, _words(edges), _words(pillar.edges), end))
         off = pose[:3, 3] - np.array(pillar.middle)
         if np.abs(off).max() > BEYOND_M:
-            return Fault("box_elsewhere", "`%s` in the planning scene is %.2f m from where the pillar stands: its "
-                         "middle is at %s in `base`, and the pillar's at %s%s. The numbers are for the frame in "
-                         "header.frame_id of the pose, and for the middle of the box"
-                         % (name, np.linalg.norm(off), _words(pose[:3, 3]), _words(pillar.middle), end))
-        return Fault("box_size", "`%s` in the planning scene has edges of %s m, and the pillar %s%s; at most %g m more "
-                     "on each side is a margin" % (name, _words(edges), _words(pillar.edges), end, BEYOND_M))
+            return RunFault("box_elsewhere", "`%s` in the planning scene is %.2f m from where the pillar stands: its "
+                            "middle is at %s in `base`, and the pillar's at %s%s. The numbers are for the frame in "
+                            "header.frame_id of the pose, and for the middle of the box"
+                            % (name, np.linalg.norm(off), _words(pose[:3, 3]), _words(pillar.middle), end))
+        return RunFault("box_size",
+                        "`%s` in the planning scene has edges of %s m, and the pillar %s%s; at most %g m more "
+                        "on each side is a margin" % (name, _words(edges), _words(pillar.edges), end, BEYOND_M))
 
 
-def _touched(recording: Recording) -> bool:
+def _touched(recording: RunRecording) -> bool:
     return any("pillar" in link for pair in recording.contacts() for link in pair)
 
 
-def _told(recording: Recording) -> list[Box]:
+def _told(recording: RunRecording) -> list[Box]:
     """The different boxes in move_group's scene until the arm came to rest."""
     rows = measures.moving_rows(recording.times, recording.arm(ARM)) if measures.has_moved(recording.arm(ARM)) else None
     last = rows[1] if rows else len(recording.records)

@@ -17,14 +17,14 @@ from baxter_model import SIDES
 from command_line.options import counted
 from rf_checks import measures, mistakes
 from rf_checks.measures import ramp
-from rf_checks.recording import Criterion, Fault
-from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, Task, pose_matrix, postures
+from rf_checks.recording import Criterion, RunFault
+from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, ExerciseTask, ProgramCall, pose_matrix, postures
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from rf_checks.recording import Run
-    from rf_checks.robot import Robot
+    from rf_checks.recording import ProgramRun
+    from rf_checks.robot import JudgedRobot
 
 SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))
 # Frames that a wrong answer is compared with first.
@@ -71,18 +71,20 @@ def last_matrices(text: str, count: int) -> list[np.ndarray]:
     return found[::-1]
 
 
-class TfListener(Task[tuple[tuple[str, str], ...]]):
+class TfListener(ExerciseTask[tuple[tuple[str, str], ...]]):
     """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three, and no other last."""
 
-    def calls(self, rng: Generator) -> list[Call[tuple[tuple[str, str], ...]]]:
+    def calls(self, rng: Generator) -> list[ProgramCall[tuple[tuple[str, str], ...]]]:
         pairs = [(a, b) for a, b in (("head", "right_hand"), ("right_hand", "head_camera"), ("left_gripper", "torso"))]
         pair = pairs[int(rng.integers(len(pairs)))]
-        return [Call((), postures(rng, 0.3), 15.0, SHEET_PAIRS), Call(pair, postures(rng, 0.3), 15.0, (pair,))]
+        return [ProgramCall((), postures(rng, 0.3), 15.0, SHEET_PAIRS),
+                ProgramCall(pair, postures(rng, 0.3), 15.0, (pair,))]
 
-    def is_satisfied(self, call: Call[tuple[tuple[str, str], ...]], run: Run) -> bool:
+    def is_satisfied(self, call: ProgramCall[tuple[tuple[str, str], ...]], run: ProgramRun) -> bool:
         return len(matrices(run.output)) >= len(call.expected)
 
-    def criteria(self, call: Call[tuple[tuple[str, str], ...]], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[tuple[tuple[str, str], ...]], run: ProgramRun,
+                 robot: JudgedRobot) -> list[Criterion]:
         found = last_matrices(run.output, len(call.expected))
         result = []
         for target, source in call.expected:
@@ -100,7 +102,8 @@ class TfListener(Task[tuple[tuple[str, str], ...]]):
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
         return result
 
-    def slip(self, call: Call[tuple[tuple[str, str], ...]], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[tuple[tuple[str, str], ...]], run: ProgramRun,
+             robot: JudgedRobot) -> RunFault | None:
         found = last_matrices(run.output, len(call.expected))
         if not run.recording.records:
             return None
@@ -110,18 +113,20 @@ class TfListener(Task[tuple[tuple[str, str], ...]]):
         missing = [pair for pair in call.expected
                    if not any(_near(matrix, robot.between(*pair, joints)) for matrix in found)]
         if missing and any(_near(matrix, robot.between(*missing[0], joints)) for matrix in matrices(run.output)):
-            return Fault("too_many", "the matrix of %s -> %s was printed, but others after it: the last %d that are "
-                         "printed count, one for each pair; print no others" % (*missing[0], len(call.expected)))
+            return RunFault("too_many", "the matrix of %s -> %s was printed, but others after it: the last %d that are "
+                            "printed count, one for each pair; print no others" % (*missing[0], len(call.expected)))
         for matrix in unused if missing else ():
             slip = mistakes.matrix_slip(matrix, robot, joints, missing, FRAMES)
             if slip:
-                return Fault(*slip)
+                return RunFault(*slip)
         if missing and unused:
-            return Fault("wrong_numbers", "a matrix was printed that is not a pose of this robot's frames as its arms "
-                         "stand now: the arms stand elsewhere in each check, so numbers from another run do not fit")
+            return RunFault("wrong_numbers",
+                            "a matrix was printed that is not a pose of this robot's frames as its arms "
+                            "stand now: the arms stand elsewhere in each check, so numbers from another run do not fit")
         if missing and not found:
-            return Fault("no_matrix", "no 4 by 4 matrix was printed for %s -> %s: print the whole matrix, row by row, "
-                         "the last row 0 0 0 1" % missing[0])
+            return RunFault("no_matrix",
+                            "no 4 by 4 matrix was printed for %s -> %s: print the whole matrix, row by row, "
+                            "the last row 0 0 0 1" % missing[0])
         return None
 
 
@@ -134,10 +139,10 @@ VERDICTS = ("SOLVED", "OUT_OF_REACH", "JOINT_LIMIT", "NOT_CONVERGED", "SELF_COLL
 _VERDICT = re.compile("|".join(VERDICTS))
 
 
-class Unreachable(Task[tuple[float, ...]]):
+class Unreachable(ExerciseTask[tuple[float, ...]]):
     """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict on that pose, and its reason."""
 
-    def calls(self, rng: Generator) -> list[Call[tuple[float, ...]]]:
+    def calls(self, rng: Generator) -> list[ProgramCall[tuple[float, ...]]]:
         down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
         turned = mistakes.quaternion_of(down @ mistakes.about("y", -np.pi / 2))
         kinds = ((LAB_POINT, LAB_QUATERNION), ((1.5, 0.6, 0.2), (0.0, 1.0, 0.0, 0.0)), ((0.6, 0.3, 0.3), turned))
@@ -145,15 +150,15 @@ class Unreachable(Task[tuple[float, ...]]):
         for point, quaternion in kinds:
             point = np.array(point) + rng.uniform(-0.004, 0.004, 3)
             words = tuple("%.4f" % value for value in (*point, *quaternion))
-            calls.append(Call(words, postures(rng), 12.0, tuple(float(word) for word in words)))
+            calls.append(ProgramCall(words, postures(rng), 12.0, tuple(float(word) for word in words)))
         return calls
 
     @staticmethod
-    def _truth(call: Call[tuple[float, ...]], robot: Robot) -> NoSolution | None:
+    def _truth(call: ProgramCall[tuple[float, ...]], robot: JudgedRobot) -> NoSolution | None:
         answer = robot.solve("left", call.expected[:3], call.expected[3:])
         return answer if isinstance(answer, NoSolution) else None
 
-    def criteria(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[tuple[float, ...]], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         failure = self._truth(call, robot)
         verdict = failure.reason.name if failure else "SOLVED"
         lines = [line for line in run.output.splitlines() if _VERDICT.search(line)]
@@ -182,33 +187,37 @@ class Unreachable(Task[tuple[float, ...]]):
         return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m)
                    for number in numbers[:MAX_NUMBERS])
 
-    def slip(self, call: Call[tuple[float, ...]], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[tuple[float, ...]], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         requests = run.recording.ik_requests()
         for _, frame, xyz, xyzw, _ in requests:
             if frame.lstrip("/") not in ("base", "world", ""):
-                return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; these poses are in "
-                             "`base`" % frame)
+                return RunFault("wrong_frame",
+                                "the IK service was asked for a pose in the frame `%s`; these poses are in "
+                                "`base`" % frame)
             wanted = np.array(call.expected[3:])
             if np.allclose(xyz, call.expected[:3], atol=1e-3) and not mistakes.is_near(
                     pose_matrix(xyz, xyzw)[:3, :3], pose_matrix(xyz, wanted)[:3, :3]):
-                return Fault("quaternion_order", "the IK service was asked for another orientation than the one given: "
-                             "the arguments are x y z w, as in ROS")
+                return RunFault("quaternion_order",
+                                "the IK service was asked for another orientation than the one given: "
+                                "the arguments are x y z w, as in ROS")
         if not any(np.allclose(request[2], call.expected[:3], atol=1e-3) for request in requests):
             if _VERDICT.search(run.output):
-                return Fault("made_up", "a verdict was printed although the IK service was never asked for this pose")
-            return Fault("not_asked", "the IK service of the left arm was never asked for the pose on the command line")
+                return RunFault("made_up",
+                                "a verdict was printed although the IK service was never asked for this pose")
+            return RunFault("not_asked",
+                            "the IK service of the left arm was never asked for the pose on the command line")
         if not _VERDICT.search(run.output):
-            return Fault("no_verdict", "the IK service was asked, but no verdict was printed: one of %s, from the "
-                         "topic /ExternalTools/left/PositionKinematicsNode/IKReport" % ", ".join(VERDICTS[:3]))
+            return RunFault("no_verdict", "the IK service was asked, but no verdict was printed: one of %s, from the "
+                            "topic /ExternalTools/left/PositionKinematicsNode/IKReport" % ", ".join(VERDICTS[:3]))
         return None
 
 
-class IkFrame(Task[None]):
+class IkFrame(ExerciseTask[None]):
     """`ik_frame.py`: finds out by an experiment the reference frame of poses and the frame that is moved there; prints
     both."""
 
-    def calls(self, rng: Generator) -> list[Call[None]]:
-        return [Call((), postures(rng), 40.0, None, 20.0)]
+    def calls(self, rng: Generator) -> list[ProgramCall[None]]:
+        return [ProgramCall((), postures(rng), 40.0, None, 20.0)]
 
     @staticmethod
     def answers(text: str) -> tuple[str, str]:
@@ -220,7 +229,7 @@ class IkFrame(Task[None]):
         reference, commanded = found
         return reference, commanded
 
-    def criteria(self, call: Call[None], run: Run, robot: Robot) -> list[Criterion]:
+    def criteria(self, call: ProgramCall[None], run: ProgramRun, robot: JudgedRobot) -> list[Criterion]:
         reference, commanded = self.answers(run.output)
         asked, arrived, found = self._experiment(run, robot)
         return [
@@ -234,7 +243,7 @@ class IkFrame(Task[None]):
         ]
 
     @staticmethod
-    def _experiment(run: Run, robot: Robot) -> tuple[bool, float, str]:
+    def _experiment(run: ProgramRun, robot: JudgedRobot) -> tuple[bool, float, str]:
         recording = run.recording
         solved = [request for request in recording.ik_requests() if request[4] == 0]
         best: tuple[float, str] = 0.0, "no arm moved to a pose that the service had solved"
@@ -252,22 +261,25 @@ class IkFrame(Task[None]):
             best = max(best, (share, found))
         return bool(solved), best[0], best[1]
 
-    def slip(self, call: Call[None], run: Run, robot: Robot) -> Fault | None:
+    def slip(self, call: ProgramCall[None], run: ProgramRun, robot: JudgedRobot) -> RunFault | None:
         reference, commanded = self.answers(run.output)
         if not reference or not commanded:
-            return Fault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "
-                         "`commanded frame: NAME`")
+            return RunFault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "
+                            "`commanded frame: NAME`")
         for name, said in (("reference", reference), ("commanded", commanded)):
             if " " in said:
-                return Fault("several_answers", "several %s frames were printed, %s: print the one that you have found"
-                             % (name, said))
+                return RunFault("several_answers",
+                                "several %s frames were printed, %s: print the one that you have found"
+                                % (name, said))
         if reference not in ("base", "world"):
-            return Fault("wrong_frame", "the reference frame is not `%s`: it is the one that a pose's numbers are "
-                         "measured from; ask for one pose with two values of header.frame_id and compare" % reference)
+            return RunFault("wrong_frame", "the reference frame is not `%s`: it is the one that a pose's numbers are "
+                            "measured from; ask for one pose with two values of header.frame_id and compare"
+                            % reference)
         if commanded not in ["%s_gripper" % side for side in SIDES]:
-            return Fault("wrong_frame", "the commanded frame is not `%s`: move to a solution and look in tf which "
-                         "frame then stands at the pose that was asked for" % commanded)
+            return RunFault("wrong_frame", "the commanded frame is not `%s`: move to a solution and look in tf which "
+                            "frame then stands at the pose that was asked for" % commanded)
         if not self._experiment(run, robot)[1]:
-            return Fault("made_up", "the answers were printed, but no arm moved to a pose that the service had solved: "
-                         "an answer without its experiment")
+            return RunFault("made_up",
+                            "the answers were printed, but no arm moved to a pose that the service had solved: "
+                            "an answer without its experiment")
         return None

@@ -21,12 +21,12 @@ isolation.try_to_enter_network()  # before any library starts threads
 from rf_checks import handout, report  # noqa: E402
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose  # noqa: E402
 from rf_checks.judge import Judge  # noqa: E402
-from rf_checks.lab import Lab, robot_description  # noqa: E402
+from rf_checks.lab import JudgedLab, robot_description  # noqa: E402
 
 PACKAGE = Path(__file__).resolve().parents[2]
 WORKSPACE = PACKAGE.parents[2]
 sys.path.insert(0, str(WORKSPACE / "tools"))
-from lab_tests.quota import Quota, QuotaError  # noqa: E402
+from lab_tests.quota import ProcessorQuota, QuotaError  # noqa: E402
 
 EXERCISE_OF = {exercise.name: exercise for exercise in EXERCISES}
 # Keys of a report that hold times.
@@ -151,7 +151,7 @@ def other_labs(count):
     """Run this many other labs, in real time."""
     with contextlib.ExitStack() as stack:
         for _ in range(count):
-            stack.enter_context(Lab(robot_description())).start()
+            stack.enter_context(JudgedLab(robot_description())).start()
         yield
 
 
@@ -160,7 +160,7 @@ class Slow(Loaded):
 
     def test_a_slow_machine_changes_no_points(self):
         self.compare([("exercises/solutions", "joint_command"), ("test/wrong", "exits_early")],
-                     {"20 %": lambda: Quota(20)})
+                     {"20 %": lambda: ProcessorQuota(20)})
 
 
 class Busy(Loaded):
@@ -173,10 +173,10 @@ class Busy(Loaded):
         self.compare(self.PROGRAMS, {"full speed": contextlib.nullcontext})
 
     def test_40_percent(self):
-        self.compare(self.PROGRAMS, {"40 %": lambda: Quota(40)}, times=2)
+        self.compare(self.PROGRAMS, {"40 %": lambda: ProcessorQuota(40)}, times=2)
 
     def test_20_percent(self):
-        self.compare(self.PROGRAMS, {"20 %": lambda: Quota(20)}, times=2)
+        self.compare(self.PROGRAMS, {"20 %": lambda: ProcessorQuota(20)}, times=2)
 
     def test_eight_other_labs(self):
         self.compare(self.PROGRAMS, {"eight labs": lambda: other_labs(8)}, times=2)

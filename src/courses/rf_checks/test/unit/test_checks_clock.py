@@ -143,7 +143,7 @@ def test_own_time_is_wall_time_at_rest_and_processor_time_in_computing():
 def test_own_time_does_not_pass_while_waiting_for_a_processor(monkeypatch):
     # As the kernel shows it: runnable, without processor time.
     with subprocess.Popen(["sleep", "1000"]) as sleeper:
-        monkeypatch.setattr(pacing.Tree, "runs", lambda self: True)
+        monkeypatch.setattr(pacing.ProcessTree, "runs", lambda self: True)
         own_time = pacing.OwnTime(lambda: [sleeper.pid])
         began = time.monotonic()
         wait_until(lambda: own_time.passed_s() is not None and time.monotonic() > began + 0.3, "0.3 s on the wall")

@@ -12,7 +12,7 @@ from lab_web.exercises import shown_of
 from rf_checks import command
 from rf_checks.exercises import EXERCISES
 from rf_checks.judge import Result, RunResult
-from rf_checks.recording import Criterion, Fault
+from rf_checks.recording import Criterion, RunFault
 
 EXERCISE_FOLDERS = Path(__file__).resolve().parents[2] / "exercises"
 NAMES = [exercise.name for exercise in EXERCISES]
@@ -118,7 +118,7 @@ class CalmJudge:
         pass
 
     def check(self, exercise, program, seed):
-        run = RunResult((), (Criterion("path", 0.5, 40.0, "1.5 periods"),), Fault("short", "the sine is too short"))
+        run = RunResult((), (Criterion("path", 0.5, 40.0, "1.5 periods"),), RunFault("short", "the sine is too short"))
         return Result(exercise, str(program), seed, (run,), "none", 3.0)
 
 

@@ -14,7 +14,7 @@ from rf_checks import diagnosis, report
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose, meant_instead
 from rf_checks.judge import Result, RunResult, how_it_ended
 from rf_checks.lab import WhichRobot
-from rf_checks.recording import Changes, Criterion, Fault, Recording, Run
+from rf_checks.recording import Criterion, GraphChanges, ProgramRun, RunFault, RunRecording
 from rf_checks.tasks_printed import IkFrame, matrices
 
 JOINTS = (*joint_names("left"), *joint_names("right"))
@@ -38,7 +38,7 @@ def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JO
                        "accepted": {"left": k if left else 0, "right": k if right else 0}})
     if exited is not None:
         result[-1]["exited"] = exited
-    return Recording(JOINTS, result)
+    return RunRecording(JOINTS, result)
 
 
 def pushed():
@@ -50,16 +50,17 @@ def pushed():
 
 
 def run(recording, **fields):
-    return Run([], recording, program="me.py", **{"exit_code": 0, **fields})
+    return ProgramRun([], recording, program="me.py", **{"exit_code": 0, **fields})
 
 
 @pytest.mark.parametrize(("case", "key", "words"), [
     (run(records(), ended="simulator gone"), "killed_simulator", ["rosnode kill"]),
     (run(records(), ended="paused"), "paused", ["pause_physics"]),
-    (run(records(), changes=Changes(missing_nodes=["/rosout"])), "killed_nodes", ["/rosout"]),
-    (run(records(), changes=Changes(intruders={"/clock": ["/me"]})), "intruder", ["/me", "/clock"]),
-    (run(records(), changes=Changes(withdrawn=["/IKService"])), "withdrawn", ["/IKService"]),
-    (run(records(), changes=Changes(parameters=["/a", "/b", "/c", "/d"])), "parameters", ["/a, /b, /c and 1 more"]),
+    (run(records(), changes=GraphChanges(missing_nodes=["/rosout"])), "killed_nodes", ["/rosout"]),
+    (run(records(), changes=GraphChanges(intruders={"/clock": ["/me"]})), "intruder", ["/me", "/clock"]),
+    (run(records(), changes=GraphChanges(withdrawn=["/IKService"])), "withdrawn", ["/IKService"]),
+    (run(records(), changes=GraphChanges(parameters=["/a", "/b", "/c", "/d"])), "parameters",
+     ["/a, /b, /c and 1 more"]),
     (run(records(seconds=0.05, left=3.0)), "teleport", ["set_model_configuration"]),
     (run(records(left=0.4, placed=60)), "teleport", ["set_model_configuration"]),
     (run(pushed()), "moved_otherwise", ["0.40 rad", "joint command"]),
@@ -265,7 +266,7 @@ def test_a_program_for_another_exercise_is_told_so(file_name, text, other):
     found = meant_instead(ROTATE, file_name, text)
     assert (found.name if found else None) == other
     if found:
-        fault = diagnosis.of_another(Fault("not_enabled", "it was not enabled", 0.9), ROTATE, found, file_name)
+        fault = diagnosis.of_another(RunFault("not_enabled", "it was not enabled", 0.9), ROTATE, found, file_name)
         assert "./baxter.sh check %s %s %s" % (found.lab, other, file_name) in fault.sentence and fault.cap == 0.9
 
 
@@ -278,11 +279,11 @@ def result(share, fault=None, which=WhichRobot()):  # noqa: B008 (a tuple)
 def test_points_are_the_mean_of_the_runs_and_a_fault_caps_them():
     assert result(1.0).points == pytest.approx(100.0)
     assert result(0.5).points == pytest.approx(50.0)
-    assert result(1.0, Fault("flood", "too fast", 0.4)).points == pytest.approx(70.0)
+    assert result(1.0, RunFault("flood", "too fast", 0.4)).points == pytest.approx(70.0)
 
 
 def test_reports_say_the_same_in_three_ways():
-    bad = result(1.0, Fault("flood", "too fast", 0.4))
+    bad = result(1.0, RunFault("flood", "too fast", 0.4))
     text = report.text(bad)
     assert "not passed: 70 of 100" in text
     assert text.splitlines()[-1] == "Hint: too fast."
@@ -320,7 +321,7 @@ def test_the_report_says_how_a_run_ended(fields, how, code, number):
 
 
 def test_what_is_not_graded_loses_no_points_and_blames_nobody():
-    fault = Fault("flood", "too fast", 0.4)
+    fault = RunFault("flood", "too fast", 0.4)
     slow = dataclasses.replace(result(1.0, fault), not_graded="the machine reached 0.2 of real time")
     assert slow.points is None
     text = report.text(slow)

@@ -6,7 +6,7 @@ from rosmaster.master import Master
 import master_calls
 from processes.ports import free_port
 from rf_checks import graph as graph_module
-from rf_checks.graph import Graph, LabFailed, flat
+from rf_checks.graph import JudgedGraph, LabFailed, flat
 
 PARAMETERS = {"use_sim_time": True, "gazebo": {"pose": "neutral", "none": {}}}
 
@@ -73,7 +73,7 @@ def living():
 
 @pytest.fixture
 def graph(ik, uri, living):
-    graph = Graph(uri)
+    graph = JudgedGraph(uri)
     graph.remember({node: lambda node=node: node in living for node in ("/gazebo", "/ik")})
     return graph
 
@@ -102,7 +102,7 @@ def test_who_else_publishes_the_labs_topics_is_an_intruder(graph, me):
 def test_who_commands_an_arm_beside_a_node_of_the_lab_is_none(uri, me):
     servo = Node("/servo", uri)
     servo.publish("/robot/limb/left/joint_command")
-    graph = Graph(uri)
+    graph = JudgedGraph(uri)
     graph.remember({})
     me.publish("/robot/limb/left/joint_command")
     assert not graph.changes()
@@ -156,7 +156,7 @@ def test_a_branch_of_parameters_in_the_place_of_a_value_is_told(graph, me):
 
 def test_a_master_that_is_gone_is_named():
     with pytest.raises(LabFailed, match="the ROS master is gone"):
-        Graph("http://127.0.0.1:%d" % free_port()).nodes()
+        JudgedGraph("http://127.0.0.1:%d" % free_port()).nodes()
 
 
 def test_parameters_have_one_name_each():

@@ -65,7 +65,7 @@ def test_the_copy_has_everything_but_what_solves(workspace, tmp_path):
     assert [one["source"] for one in cells[1:]] == [["a = 1"], [handout._YOUR_TURN]]
     assert [one["outputs"] for one in cells[1:]] == [[], []]
     # In it, the judge finds no reference and says nothing of copies.
-    assert similarity.Library(target).notes({"mine.py": SOLUTION}) == []
+    assert similarity.References(target).notes({"mine.py": SOLUTION}) == []
 
 
 ROSTER = "First name,Last name,Email address\nAnna,Groß,anna.gross@example.edu\nLi,Wei,lw7@example.edu\n"

@@ -13,7 +13,7 @@ import pytest
 
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
-from rf_checks.lab import Lab, LabFailed, TooSlow
+from rf_checks.lab import JudgedLab, LabFailed, TooSlow
 from rf_checks.recorder import Recorder
 from rf_checks.recorder_names import RECORDS, SOCKETS_VARIABLE
 from world_picture.results import READY
@@ -23,7 +23,7 @@ from world_picture.results import READY
 def lab(tmp_path, monkeypatch):
     """A lab that is a process which does nothing."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    lab = Lab("<robot/>", walls=False)
+    lab = JudgedLab("<robot/>", walls=False)
     lab._run([sys.executable, "-c", "import signal; signal.pause()"], None)
     lab._own_time.restart()
     yield lab
@@ -53,14 +53,14 @@ def test_a_lab_in_a_sandbox_sees_what_set_up_has_made_ready_for_pictures(tmp_pat
     ready.mkdir(parents=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(ready.parent))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    lab = Lab("<robot/>", walls=True)
+    lab = JudgedLab("<robot/>", walls=True)
     lab._run(["true"], {"A": "1"})
     (command, environment), = started
     assert environment == {"A": "1", READY: command[command.index(str(ready)) + 1]}
 
 
 def test_a_lab_ends_with_its_judge(tmp_path):
-    text = ("import sys\nfrom rf_checks.lab import Lab\nlab = Lab('<robot/>', walls=False)\n"
+    text = ("import sys\nfrom rf_checks.lab import JudgedLab\nlab = JudgedLab('<robot/>', walls=False)\n"
             "lab._run([sys.executable, '-c', 'import signal; print(1, flush=True); "
             "signal.pause()'], None)\n"
             "print(lab._processes[0].pid, lab.folder / 'output.txt', flush=True)\nsys.stdin.read()\n")

@@ -9,7 +9,7 @@ import pytest
 from lab_testing.waiting import wait_until
 from rf_checks import observing
 from rf_checks.observing import Observer
-from rf_checks.tasks import Call
+from rf_checks.tasks import ProgramCall
 
 
 def student(**fields):
@@ -29,7 +29,7 @@ def observe():
 
     def run(the_student, make_record=record, cpu_s=lambda k: 0.0, limit_s=2.0, is_satisfied=lambda output: False,
             is_meddled=lambda: False):
-        observer = Observer(Call((), {}, limit_s, None), the_student, is_satisfied, is_meddled)
+        observer = Observer(ProgramCall((), {}, limit_s, None), the_student, is_satisfied, is_meddled)
         observers.append(observer)
         threading.Thread(target=lambda: [observer.on_record(make_record(k), cpu_s(k)) for k in range(3000)],
                          daemon=True).start()
@@ -51,14 +51,14 @@ def test_the_wall_has_no_say(observe, monkeypatch):
     days = iter(range(10**6))
     monkeypatch.setattr(time, "monotonic", lambda: 86400.0 * next(days))
     monkeypatch.setattr(time, "time", time.monotonic)
-    observer = Observer(Call((), {}, 2.0, None), student(), lambda output: False, lambda: False)
+    observer = Observer(ProgramCall((), {}, 2.0, None), student(), lambda output: False, lambda: False)
     for k in range(200):
         observer.on_record(record(k), 0.01 * k)
     assert observer.ended == ""
 
 
 def test_the_world_stands_still_from_the_end_of_a_run_on():
-    observer = Observer(Call((), {}, 2.0, None), student(), lambda output: False, lambda: False)
+    observer = Observer(ProgramCall((), {}, 2.0, None), student(), lambda output: False, lambda: False)
     held = []
     observer._released = SimpleNamespace(wait=lambda: held.append(len(observer.records)))
     for k in range(203):
@@ -107,7 +107,7 @@ def test_an_end_from_outside_is_not_lost_on_a_record_that_comes_at_the_same_time
         go_on.wait(60.0)
         return False
 
-    observer = Observer(Call((), {}, 2.0, None), student(), look, lambda: False)
+    observer = Observer(ProgramCall((), {}, 2.0, None), student(), look, lambda: False)
     records = threading.Thread(target=observer.on_record, args=(record(0), 0.0))
     records.start()
     inside.wait(60.0)

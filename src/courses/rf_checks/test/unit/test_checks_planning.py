@@ -6,7 +6,7 @@ import pytest
 from baxter_model import SIDES, joint_names
 from rf_checks import diagnosis
 from rf_checks.exercises import EXERCISES
-from rf_checks.recording import Recording, Run
+from rf_checks.recording import ProgramRun, RunRecording
 from rf_checks.tasks_planning import PlanAround
 from urdf_model.transforms import rpy_matrix
 
@@ -21,7 +21,8 @@ def call():
 
 
 def run_of(call, boxes=(), moves=True, end=None, contacts=()):
-    """A Run whose left arm goes smoothly to `end`, or stays; boxes: (pose, edges) that move_group was told of."""
+    """A ProgramRun whose left arm goes smoothly to `end`, or stays; boxes: (pose, edges) that move_group was told
+    of."""
     begin = np.array([call.posture[name] for name in JOINTS])
     goal = begin.copy()
     if moves:
@@ -34,7 +35,7 @@ def run_of(call, boxes=(), moves=True, end=None, contacts=()):
                         "accepted": dict.fromkeys(SIDES, k * moves), "placed": 0})
     records[0]["scene"] = [["thing", pose.ravel().tolist(), list(edges)] for pose, edges in boxes]
     records[150]["contacts"] = [list(pair) for pair in contacts]
-    return Run(list(call.arguments), Recording(JOINTS, records), exit_code=0)
+    return ProgramRun(list(call.arguments), RunRecording(JOINTS, records), exit_code=0)
 
 
 def box_of(pillar, offset=(0.0, 0.0, 0.0), scale=1.0, margin=0.0):
@@ -99,7 +100,7 @@ def test_a_box_that_is_told_after_the_motion_counts_for_nothing(call):
     late = run.recording.records + [{**run.recording.records[-1], "t": 2.0 + 0.01 * k} for k in range(10)]
     pose, edges = box_of(call.obstacle)
     late[-1] = {**late[-1], "scene": [["thing", pose.ravel().tolist(), edges.tolist()]]}
-    run.recording = Recording(JOINTS, late)
+    run.recording = RunRecording(JOINTS, late)
     assert graded(call, run)[1] == "no_box"
 
 
@@ -115,9 +116,9 @@ def test_a_box_may_be_turned_if_it_covers_the_same(call):
 def test_the_straight_way_leads_through_the_pillar(call):
     """Otherwise the exercise asks for nothing."""
     from rf_checks.lab import robot_description
-    from rf_checks.robot import Robot
+    from rf_checks.robot import JudgedRobot
 
-    robot = Robot(robot_description())
+    robot = JudgedRobot(robot_description())
     begin = np.array([call.posture[name] for name in joint_names("left")])
     way = [begin + share * (np.array(call.expected.goal) - begin) for share in np.linspace(0.0, 1.0, 100)]
     points = np.array([robot.frame("left_gripper", dict(zip(joint_names("left"), q, strict=True)))[:3, 3] for q in way])

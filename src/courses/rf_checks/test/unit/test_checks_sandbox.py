@@ -10,7 +10,7 @@ import pytest
 from lab_testing.waiting import wait_until
 from processes import family, isolation
 from rf_checks import hidden_paths, pacing, sandbox
-from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
+from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, RunningProgram, Startup, adopt_orphans
 
 # What a sandbox's home has where the workspace is below a folder of the same name.
 BELOW_HOME = [os.path.relpath(root, isolation.HOME).split("/")[0] for root in isolation.workspaces(os.environ)
@@ -39,7 +39,7 @@ def starter(tmp_path, monkeypatch):
         folder = tmp_path / ("submission_%d" % len(students))
         folder.mkdir()
         (folder / "program.py").write_text(text)
-        students.append(Student(folder / "program.py", words, dict(os.environ), run.has_walls))
+        students.append(RunningProgram(folder / "program.py", words, dict(os.environ), run.has_walls))
         return students[-1]
 
     run.workspace = workspace
@@ -215,7 +215,7 @@ def test_modules_beside_the_program_come_along_and_nothing_else(start, tmp_path)
     (tmp_path / "another_students.py").write_text("NAME = 'secret'")
     (tmp_path / "program.py").write_text(program)
     assert not folder.exists()
-    student = finished(Student(tmp_path / "program.py", [], dict(os.environ), start.has_walls))
+    student = finished(RunningProgram(tmp_path / "program.py", [], dict(os.environ), start.has_walls))
     beside = ["helper.py", "hub.py", "parts", "program.py", *(BELOW_HOME if start.has_walls else [])]
     assert student.output == "hub wheel %s\n" % sorted(beside), student.errors
 
@@ -253,7 +253,7 @@ def test_other_submissions_in_the_workspace_are_out_of_sight(walled, tmp_path):
         "    except OSError as error:\n"
         "        print(type(error).__name__)\n")
     startup = Startup(folder, {}, hidden=(str(submissions), str(archive), str(tmp_path / "elsewhere")))
-    student = finished(Student(folder / "program.py", [], dict(os.environ), True, startup))
+    student = finished(RunningProgram(folder / "program.py", [], dict(os.environ), True, startup))
     assert student.output.splitlines() == ["FileNotFoundError", "[]", "PermissionError", "42"], student.errors
     student.end()
 
@@ -383,8 +383,9 @@ def test_a_process_that_got_the_number_of_an_ended_program_is_a_stranger(start):
 
 
 def test_a_walled_program_does_not_outlive_a_judge_that_is_killed(walled):
-    code = "import os, sys\nfrom rf_checks.sandbox import Student\n" \
-           "s = Student(sys.argv[1], [], dict(os.environ))\nprint(s.pid, flush=True)\nimport signal; signal.pause()"
+    code = "import os, sys\nfrom rf_checks.sandbox import RunningProgram\n" \
+           "s = RunningProgram(sys.argv[1], [], dict(os.environ))\n" \
+           "print(s.pid, flush=True)\nimport signal; signal.pause()"
     program = walled.workspace / "sleeps.py"
     program.write_text("import signal\nsignal.pause()")
     # The killed judge leaves its folder.

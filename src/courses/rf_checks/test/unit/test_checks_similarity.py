@@ -11,7 +11,7 @@ from rf_checks import similarity, submission
 WORKSPACE = Path(__file__).resolve().parents[5]
 EXERCISES = WORKSPACE / "src/courses/rf_checks/exercises"
 NAMES = sorted(path.name for path in (EXERCISES / "solutions").glob("*.py"))
-LIBRARY = similarity.Library(WORKSPACE)
+LIBRARY = similarity.References(WORKSPACE)
 
 
 def notes(text):

@@ -7,8 +7,8 @@ from arm_kinematics import Chain, solve
 from baxter_model import SIDES, joint_names, tip_of
 from rf_checks.exercises import EXERCISES
 from rf_checks.lab import robot_description
-from rf_checks.recording import Recording, Run
-from rf_checks.robot import Robot
+from rf_checks.recording import ProgramRun, RunRecording
+from rf_checks.robot import JudgedRobot
 from rf_checks.tasks_steering import ARM, SERVO, SteerTo
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation
@@ -19,7 +19,7 @@ TASK = SteerTo()
 
 @pytest.fixture(scope="module")
 def robot():
-    return Robot(robot_description())
+    return JudgedRobot(robot_description())
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +33,8 @@ def call(request):
 
 
 def run_of(chain, call, short=0.0, turn=0.0, node=SERVO, moves=True, enabled=True):
-    """A Run in which the left gripper goes straight to its goal but for ``short`` [m], and turns about z by ``turn``
-    [rad]; ``node`` commands it."""
+    """A ProgramRun in which the left gripper goes straight to its goal but for ``short`` [m], and turns about z by
+    ``turn`` [rad]; ``node`` commands it."""
     q = np.array([call.posture[name] for name in JOINTS])
     pose = chain.fk(q[:7])
     way = np.array(call.expected) - pose[:3, 3]
@@ -52,7 +52,7 @@ def run_of(chain, call, short=0.0, turn=0.0, node=SERVO, moves=True, enabled=Tru
     records = [{"t": 0.01 * k, "q": row.tolist(), "enabled": enabled, "contacts": [], "held": {}, "ik": [],
                 "commands": [command] if moves and k else [], "counts": dict.fromkeys(SIDES, k * moves),
                 "accepted": dict.fromkeys(SIDES, k * moves), "placed": 0} for k, row in enumerate(rows)]
-    return Run(list(call.arguments), Recording(JOINTS, records), exit_code=0)
+    return ProgramRun(list(call.arguments), RunRecording(JOINTS, records), exit_code=0)
 
 
 def graded(call, run, robot):

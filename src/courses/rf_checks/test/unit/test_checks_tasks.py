@@ -10,8 +10,8 @@ from baxter_model import SIDES, joint_names, poses
 from rf_checks import mistakes, tasks, tasks_printed
 from rf_checks.exercises import EXERCISES
 from rf_checks.lab import robot_description
-from rf_checks.recording import Recording, Run
-from rf_checks.robot import Robot
+from rf_checks.recording import ProgramRun, RunRecording
+from rf_checks.robot import JudgedRobot
 
 # All joints that the simulated robot has.
 OTHERS = ("head_pan", *("%s_gripper_%s_finger_joint" % pair for pair in itertools.product("lr", "lr")))
@@ -23,11 +23,11 @@ POINT, QUATERNION = tasks.LAB_POINT, tasks.LAB_QUATERNION
 
 @pytest.fixture(scope="module")
 def robot():
-    return Robot(robot_description())
+    return JudgedRobot(robot_description())
 
 
 def trace(left=((NEUTRAL,)), right=((NEUTRAL,)), seconds=2.0, ik=(), contacts=()):
-    """A Recording in which each arm goes smoothly from posture to posture; requests and contacts come at the end."""
+    """A RunRecording in which each arm goes smoothly from posture to posture; requests and contacts come at the end."""
     count = round(seconds / 0.01)
     columns = [np.zeros((count, len(OTHERS)))]
     for postures in (left, right):
@@ -38,7 +38,7 @@ def trace(left=((NEUTRAL,)), right=((NEUTRAL,)), seconds=2.0, ik=(), contacts=()
     records = [{"t": 0.01 * k, "q": row.tolist(), "enabled": True, "contacts": [], "held": {}, "commands": [], "ik": [],
                 "counts": dict.fromkeys(SIDES, k)} for k, row in enumerate(rows)]
     records[-1]["ik"], records[-1]["contacts"] = list(ik), list(contacts)
-    return Recording(JOINTS, records)
+    return RunRecording(JOINTS, records)
 
 
 def graded(task, call, run, robot):
@@ -63,19 +63,19 @@ def test_a_gripper_that_is_turned_gets_all_points(robot, index):
     call = calls(task)[index]
     axis, angle = call.expected
     target = tasks.pose_matrix(POINT, QUATERNION)[:3, :3] @ mistakes.about(axis, angle)
-    run = Run(list(call.arguments), trace(left=rotated(robot, target)), exit_code=0)
+    run = ProgramRun(list(call.arguments), trace(left=rotated(robot, target)), exit_code=0)
     assert graded(task, call, run, robot) == (pytest.approx(100.0), None)
 
 
 def test_a_gripper_that_stays_gets_nothing(robot):
     task = tasks.RotateGripper()
-    assert graded(task, calls(task)[0], Run([], trace(), exit_code=0), robot)[0] == 0.0
+    assert graded(task, calls(task)[0], ProgramRun([], trace(), exit_code=0), robot)[0] == 0.0
 
 
 def test_a_gripper_at_its_place_but_not_turned_gets_the_place(robot):
     task = tasks.RotateGripper()
     start = tasks.pose_matrix(POINT, QUATERNION)[:3, :3]
-    run = Run([], trace(left=rotated(robot, start)), exit_code=0)
+    run = ProgramRun([], trace(left=rotated(robot, start)), exit_code=0)
     assert graded(task, calls(task)[0], run, robot) == (pytest.approx(20.0), "not_turned")
 
 
@@ -86,20 +86,20 @@ def test_a_request_for_a_wrong_rotation_is_told_though_the_arm_cannot_follow(rob
     start = tasks.pose_matrix(POINT, QUATERNION)[:3, :3]
     wrong = next(rotation for found, _, rotation in mistakes.wrong_rotations(start, *call.expected) if found == key)
     ik = [["left", "base", list(POINT), mistakes.quaternion_of(wrong).tolist(), 1]]
-    run = Run([], trace(left=rotated(robot, start), ik=ik), exit_code=0)
+    run = ProgramRun([], trace(left=rotated(robot, start), ik=ik), exit_code=0)
     assert graded(task, call, run, robot)[1] == key
 
 
 def test_a_pose_in_another_frame_is_told(robot):
     task = tasks.RotateGripper()
     ik = [["left", "left_hand", list(POINT), list(QUATERNION), 0]]
-    assert task.slip(calls(task)[0], Run([], trace(ik=ik)), robot).key == "wrong_frame"
+    assert task.slip(calls(task)[0], ProgramRun([], trace(ik=ik)), robot).key == "wrong_frame"
 
 
 def test_collisions_cost_their_points_and_no_others(robot):
     task = tasks.JointCommand()
     call = calls(task)[0]
-    run = Run([], trace(right=(NEUTRAL, call.expected), contacts=[["right_hand", "torso"]]), exit_code=0)
+    run = ProgramRun([], trace(right=(NEUTRAL, call.expected), contacts=[["right_hand", "torso"]]), exit_code=0)
     assert graded(task, call, run, robot)[0] == pytest.approx(85.0)
 
 
@@ -121,12 +121,13 @@ def waving(robot, side, periods=3, amplitude=0.08):
 def test_waves_are_graded(robot, sides, periods, amplitude, key):
     task = tasks.Wave()
     arms = {side: waving(robot, side, periods, amplitude) if side in sides else [NEUTRAL] for side in SIDES}
-    points, found = graded(task, calls(task)[0], Run([], trace(**arms, seconds=4.0 * periods), exit_code=0), robot)
+    points, found = graded(task, calls(task)[0], ProgramRun([], trace(**arms, seconds=4.0 * periods), exit_code=0),
+                           robot)
     assert found == key
     assert points == pytest.approx(100.0, abs=1.0) if key is None else points < 95.0
 
 
-PAIR = tasks.Call(("base", "left_hand"), {}, 10.0, (("base", "left_hand"),))
+PAIR = tasks.ProgramCall(("base", "left_hand"), {}, 10.0, (("base", "left_hand"),))
 
 
 @pytest.mark.parametrize(("change", "points", "key"), [
@@ -142,7 +143,7 @@ def test_printed_matrices_are_graded(robot, change, points, key):
     task = tasks_printed.TfListener()
     recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
     true = robot.between("base", "left_hand", recording.joints_at(-1))
-    run = Run([], recording, output=str(change(true).tolist()))
+    run = ProgramRun([], recording, output=str(change(true).tolist()))
     assert graded(task, PAIR, run, robot) == (pytest.approx(points), key)
 
 
@@ -151,7 +152,7 @@ def test_another_pairs_matrix_with_the_sheets_slip_is_told_both(robot, pair):
     recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
     matrix = robot.between(*pair, recording.joints_at(-1))
     matrix[:3, :3] = mistakes.rotation_of(*mistakes.quaternion_of(matrix[:3, :3]))
-    fault = tasks_printed.TfListener().slip(PAIR, Run([], recording, output=str(matrix.tolist())), robot)
+    fault = tasks_printed.TfListener().slip(PAIR, ProgramRun([], recording, output=str(matrix.tolist())), robot)
     assert fault.key == "quaternion_order"
     assert all(words in fault.sentence for words in ("%s -> %s" % pair, "base -> left_hand", "quat = (q.x")), fault
 
@@ -169,7 +170,8 @@ def test_another_pairs_matrix_is_named(robot):
     task = tasks_printed.TfListener()
     recording = trace()
     other = robot.between("base", "left_gripper", recording.joints_at(-1))
-    assert "base -> left_gripper" in task.slip(PAIR, Run([], recording, output=str(other.tolist())), robot).sentence
+    assert "base -> left_gripper" in task.slip(PAIR, ProgramRun([], recording, output=str(other.tolist())),
+                                               robot).sentence
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -191,7 +193,7 @@ def test_verdicts_are_graded(robot, output, asked, points, key):
     task = tasks_printed.Unreachable()
     call = calls(task)[2]
     ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 2]] if asked else []
-    run = Run([], trace(ik=ik), output=output)
+    run = ProgramRun([], trace(ik=ik), output=output)
     assert graded(task, call, run, robot) == (pytest.approx(points), key)
 
 
@@ -206,7 +208,7 @@ def test_answers_about_frames_need_their_experiment(robot, output, moves, points
     task = tasks_printed.IkFrame()
     there = robot.solve("left", POINT, QUATERNION)
     left = (NEUTRAL, there) if moves else (NEUTRAL,)
-    run = Run([], trace(left=left, ik=[["left", "base", list(POINT), list(QUATERNION), 0]]), output=output)
+    run = ProgramRun([], trace(left=left, ik=[["left", "base", list(POINT), list(QUATERNION), 0]]), output=output)
     assert graded(task, calls(task)[0], run, robot) == (pytest.approx(points, abs=1.0), key)
 
 
@@ -220,7 +222,7 @@ def test_how_far_short_a_pose_is_is_one_number(robot, line, points):
     call = calls(task)[1]
     failure = robot.solve("left", call.expected[:3], call.expected[3:])
     ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 1]]
-    run = Run([], trace(ik=ik), output=line % failure.residual_m)
+    run = ProgramRun([], trace(ik=ik), output=line % failure.residual_m)
     assert graded(task, call, run, robot)[0] == pytest.approx(points)
 
 
@@ -244,7 +246,7 @@ def test_a_program_that_prints_everything_answers_nothing(robot, exercise):
         if isinstance(exercise.task, tasks_printed.Unreachable):
             ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 1]]
             recording = trace(ik=ik)
-        criteria = exercise.task.criteria(call, Run(list(call.arguments), recording, output=output), robot)
+        criteria = exercise.task.criteria(call, ProgramRun(list(call.arguments), recording, output=output), robot)
         points = {one.name: one.share * one.weight for one in criteria}
         # One verdict of three is right by chance, without its reason.
         assert all(value == 0.0 for name, value in points.items() if name != "verdict"), (call.arguments, points)
@@ -255,12 +257,12 @@ def test_what_is_printed_again_and_again_is_one_answer(robot):
     recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
     found = [str(robot.between(*pair, recording.joints_at(-1)).tolist()) for pair in tasks_printed.SHEET_PAIRS]
     call, one = calls(tasks_printed.TfListener())
-    run = Run([], recording, output="\n".join([*found, *found, *found[:2]]))
+    run = ProgramRun([], recording, output="\n".join([*found, *found, *found[:2]]))
     assert graded(tasks_printed.TfListener(), call, run, robot) == (pytest.approx(100.0), None)
     # The others came first, the asked one last; then the other way round.
     right = str(robot.between(*one.expected[0], recording.joints_at(-1)).tolist())
     for output, expected in (([*found, right], (pytest.approx(100.0), None)), ([right, *found], (0.0, "too_many"))):
-        run = Run([], recording, output="\n".join(output))
+        run = ProgramRun([], recording, output="\n".join(output))
         assert graded(tasks_printed.TfListener(), one, run, robot) == expected
 
 
@@ -277,6 +279,6 @@ def test_full_points_for_smoothness_come_without_a_reproach(robot, halts, words)
     for part in np.linspace(0.0, 1.0, halts + 2)[1:]:
         step = np.array(NEUTRAL) + part * (np.array(call.expected) - NEUTRAL)
         path += [step, step]
-    smooth = next(one for one in task.criteria(call, Run([], trace(right=path, seconds=6.0), exit_code=0), robot)
+    smooth = next(one for one in task.criteria(call, ProgramRun([], trace(right=path, seconds=6.0), exit_code=0), robot)
                   if one.name == "smoothness")
     assert words in smooth.found and (smooth.share == 1.0) == (halts < 2), smooth

@@ -26,7 +26,7 @@ def test_ctrl_c_ends_a_program_without_a_word(error, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("kind", [programs.ProgramFailed, ValueError, rospy.ROSException])
+@pytest.mark.parametrize("kind", [programs.LabProgramFailed, ValueError, rospy.ROSException])
 def test_a_failure_is_one_line(kind, capsys):
     assert programs.run("wave", raising(kind("no arm"))) == 1
     said = capsys.readouterr().err

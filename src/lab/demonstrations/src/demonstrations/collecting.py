@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lab_batch import Job, Spec
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 
 from .card import write_card
 from .environment import Conditions, core_of, expert_of, record, schema_of
@@ -58,7 +58,7 @@ class Collected(NamedTuple):
     frames: int
 
 
-class Work(NamedTuple):
+class CollectingWork(NamedTuple):
     """Processes at a time, and a function of each line that tells how far they are."""
 
     workers: int = 1
@@ -73,7 +73,7 @@ class Views(NamedTuple):
 
 
 def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0,
-            work: Work = Work(), spec: Spec | None = None,  # noqa: B008 (tuples)
+            work: CollectingWork = CollectingWork(), spec: Spec | None = None,  # noqa: B008 (tuples)
             conditions: Conditions = Conditions()) -> Collected:  # noqa: B008
     """Append the expert's successful episodes of all seeds to a set, in the order of the seeds. spec: of another job
     with the parameters and results of `Demonstrate`, and with the expert's own actions; it gets the conditions as well.
@@ -92,7 +92,7 @@ def collect(task: str, folder: Path, seeds: Iterable[int], noise: float = 0.0,
         core.close()
     kept = failed = frames = 0
     waiting: dict[int, dict | None] = {}
-    limits = Limits(min(work.workers, max(len(seeds), 1)), _EPISODE_S, None)
+    limits = BatchLimits(min(work.workers, max(len(seeds), 1)), _EPISODE_S, None)
     with SetWriter(folder, schema) as writer:
         order = iter(seeds)
         following = next(order, None)

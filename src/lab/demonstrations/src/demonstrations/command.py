@@ -14,7 +14,7 @@ from lab_batch import JobError
 
 from . import robomimic
 from .card import write_card
-from .collecting import Views, Work, collect, film
+from .collecting import CollectingWork, Views, collect, film
 from .environment import PROFILES, Conditions, core_for, replay
 from .experts import EXPERTS
 from .frames import DemonstrationError
@@ -68,7 +68,7 @@ def _record(options):
         found = film(options.task, options.folder, seeds, Views(tuple(dict.fromkeys(options.cameras)), options.size),
                      options.noise, say, conditions)
     else:
-        found = collect(options.task, options.folder, seeds, options.noise, Work(options.workers, say),
+        found = collect(options.task, options.folder, seeds, options.noise, CollectingWork(options.workers, say),
                         conditions=conditions)
     print("%s of %s are in %s; the expert failed %s" % (
         counted(found.kept, "demonstration"), options.task, options.folder, counted(found.failed, "time")))

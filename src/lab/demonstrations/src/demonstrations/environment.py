@@ -45,7 +45,7 @@ PROFILES = ("sim", "robot")
 RANDOMISED = {"mass": 0.5, "friction": 0.5}
 
 
-class Student(Protocol):
+class CorrectedPolicy(Protocol):
     """A policy for an expert to correct: it acts on (n,) numbers, the robot's and those of the things."""
 
     def begin(self) -> None:
@@ -159,7 +159,7 @@ class Disturbance:
 
 
 def record(core: Core, expert: Expert, seed: int, noise: float = 0.0, sink: Any = None,
-           student: Student | None = None) -> Episode:
+           student: CorrectedPolicy | None = None) -> Episode:
     """One episode of an expert. noise: 0 to 1, of `Disturbance`; student: acts first, and the expert ends what it began
     (Ross et al., *A Reduction of Imitation Learning and Structured Prediction to No-Regret Online Learning*, 2011);
     with either, `expert.action` has what the expert wanted. sink: gets each frame as well, `SetWriter.frame` for

@@ -40,7 +40,7 @@ _AWAY = np.array((-1.0, 0.0, 0.0))
 TaskT = TypeVar("TaskT", bound=Task[Any])
 
 
-class Pace(NamedTuple):
+class ExpertPace(NamedTuple):
     """gain: share of the remaining way of one action; drives follow with some lag, and more overshoots; speed_m,
     speed_rad: most of one action [m], [rad]; least_m: the same where a hand begins [m]; steps: actions that are enough,
     a try with more has failed; noise: share of the disturbance for learning that is corrected as far as the whole one
@@ -59,13 +59,13 @@ class Pace(NamedTuple):
 
 
 #: With ideal drives.
-_PACE = Pace(0.25, 0.016, 0.06, 0.004, 300, 1.0)
+_PACE = ExpertPace(0.25, 0.016, 0.06, 0.004, 300, 1.0)
 #: With the effect `lag`, shoulders are 0.2 s behind. At the gain above they swing, and a hand that comes down at that
 #: speed goes 6 cm on: it hits things, and the robot's collision detection stops the arm.
-_GENTLE = Pace(0.1, 0.008, 0.03, 0.002, 400, 0.4)
+_GENTLE = ExpertPace(0.1, 0.008, 0.03, 0.002, 400, 0.4)
 
 
-class Hand(NamedTuple):
+class HandGoal(NamedTuple):
     """Where a hand should go: place (3,) [m], rotation (3, 3), its gripper -1 (opens) to 1 (closes); share of the
     full speed."""
 
@@ -157,11 +157,11 @@ class Expert(Generic[TaskT]):
         return np.concatenate([self._action(self.arms[side], hands[side]) if side in hands else _STAYS
                                for side in self.core.sides])
 
-    def hands(self) -> dict[str, Hand]:
+    def hands(self) -> dict[str, HandGoal]:
         """{side: where it should go now} of the arms in MOVED."""
         raise NotImplementedError
 
-    def _action(self, arm: Arm, hand: Hand):
+    def _action(self, arm: Arm, hand: HandGoal):
         pose = arm.pose
         most = self.pace.eased(float(np.linalg.norm(pose[:3, 3] - self._rest[arm.side][:3, 3])))
         gain = self.pace.gain
@@ -178,7 +178,7 @@ class Expert(Generic[TaskT]):
         """A hand that comes to its place along its own axis, and closes there."""
         height = _funnel(self._beside(side, place, rotation))
         closes = self._is_at(side, place, rotation, self._patience(side))
-        return Hand(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
+        return HandGoal(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
 
     def _beside(self, side, place, rotation):
         """How far a hand is beside its way to a place [m]; turns count as well."""
@@ -199,7 +199,7 @@ class ReachExpert(Expert[Reach]):
 
     def hands(self):
         """The left hand at the goal."""
-        return {"left": Hand(self.task.goal, self._rest["left"][:3, :3], OPEN)}
+        return {"left": HandGoal(self.task.goal, self._rest["left"][:3, :3], OPEN)}
 
 
 class PickPlaceExpert(Expert[PickPlace]):
@@ -218,7 +218,7 @@ class PickPlaceExpert(Expert[PickPlace]):
         holds = self.arms["left"].gripper.holds
         near, low = (_BESIDE_M, self._LOW_M) if holds else (self.task.WITHIN_M, 2.0 * self._LOW_M)
         if left < near and place[2] - goal[2] < low:
-            return {"left": Hand(hand, self.arms["left"].pose[:3, :3], OPEN)}  # it stands there
+            return {"left": HandGoal(hand, self.arms["left"].pose[:3, :3], OPEN)}  # it stands there
         if not holds:
             return {"left": self._approach("left", place, rotation)}
         # What it holds hangs as it was taken.
@@ -226,7 +226,7 @@ class PickPlaceExpert(Expert[PickPlace]):
         to = hand + (goal - place) + (0.0, 0.0, wanted)
         if height < wanted:  # first up
             to[:2] = hand[:2] + _risen(height) * (to[:2] - hand[:2])
-        return {"left": Hand(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
+        return {"left": HandGoal(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
 
 
 class TwoArmLiftExpert(Expert[TwoArmLift]):
@@ -242,12 +242,12 @@ class TwoArmLiftExpert(Expert[TwoArmLift]):
         rotation = down(_nearest(_yaw(self.task.pot.pose), 0.0, math.pi))
         if all(self.arms[side].gripper.holds for side in SIDES):
             raised = self._HIGH_M - self.task._lift()
-            return {side: Hand(self.arms[side].pose[:3, 3] + (0.0, 0.0, raised), rotation, CLOSED, 0.5)
+            return {side: HandGoal(self.arms[side].pose[:3, 3] + (0.0, 0.0, raised), rotation, CLOSED, 0.5)
                     for side in SIDES}
         height = _funnel(max(self._beside(side, place, rotation) for side, place in handles.items()))
         times = self._patience(*SIDES)
         closes = all(self._is_at(side, place, rotation, times) for side, place in handles.items())
-        return {side: Hand(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
+        return {side: HandGoal(place - height * rotation[:, 2], rotation, CLOSED if closes else OPEN)
                 for side, place in handles.items()}
 
 
@@ -289,7 +289,7 @@ class TwoArmHandoverExpert(Expert[TwoArmHandover]):
         right, risen = self.arms["right"].pose, _share(height, 0.02, self.task.LIFTED_M)
         rotation = self._leaning("right", _between(axis, _AWAY, risen), risen)
         to = right[:3, 3] + risen * (self._MEETING - right[:3, 3]) + (1.0 - risen) * np.array((0.0, 0.0, 0.1))
-        found = {"right": Hand(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
+        found = {"right": HandGoal(to, rotation, CLOSED, self.pace.eased(height) / self.pace.speed_m)}
         # Where the left hand will take it, and, as the right one arrives, where that is now.
         off = float(np.linalg.norm(self._MEETING - right[:3, 3])) + 0.1 * float(np.linalg.norm(
             rotation_vector(self._leaning("right", _AWAY) @ right[:3, :3].T)))
@@ -308,17 +308,17 @@ class TwoArmHandoverExpert(Expert[TwoArmHandover]):
         return bool(arm.gripper.position < most
                     and np.linalg.norm(place - arm.pose[:3, 3]) < self._ON_HANDLE_M[side])
 
-    def _stays(self, side: str, grip: float) -> Hand:
-        return Hand(self.arms[side].pose[:3, 3], self.arms[side].pose[:3, :3], grip)
+    def _stays(self, side: str, grip: float) -> HandGoal:
+        return HandGoal(self.arms[side].pose[:3, 3], self.arms[side].pose[:3, :3], grip)
 
-    def _withdraws(self, side: str) -> Hand:
+    def _withdraws(self, side: str) -> HandGoal:
         pose, opened = self.arms[side].pose, _share(self.arms[side].gripper.position, self._ON_HANDLE[side], 100.0)
-        return Hand(pose[:3, 3] - opened * self._BACK_M * pose[:3, 2], pose[:3, :3], OPEN)
+        return HandGoal(pose[:3, 3] - opened * self._BACK_M * pose[:3, 2], pose[:3, :3], OPEN)
 
-    def _waits(self, place: np.ndarray, axis: np.ndarray) -> Hand:
+    def _waits(self, place: np.ndarray, axis: np.ndarray) -> HandGoal:
         """The left hand before a place (3,) [m]."""
         rotation = self._leaning("left", axis)
-        return Hand(place - self._WAITING_M * rotation[:, 2], rotation, OPEN)
+        return HandGoal(place - self._WAITING_M * rotation[:, 2], rotation, OPEN)
 
     def _leaning(self, side: str, axis: np.ndarray, share: float = 1.0) -> np.ndarray:
         """(3, 3) of a hand with its first axis along `axis` (3,), which points down and, by `share` of the whole tilt,

@@ -18,7 +18,7 @@ _OF_ARM = len(JOINTS) + 1
 
 
 @dataclass(frozen=True)
-class Limits:
+class ReplayLimits:
     """speed_rad_s: of joints on the way to the episode's start; off_rad: of a joint from its set-point, more means that
     something is in the way; seen_s: age of the joint states [s]."""
 
@@ -27,7 +27,7 @@ class Limits:
     seen_s: float = 0.5
 
 
-def reason_to_stop(limits: Limits, enabled: bool, stopped: bool, seen_s: float, off_rad: float) -> str:
+def reason_to_stop(limits: ReplayLimits, enabled: bool, stopped: bool, seen_s: float, off_rad: float) -> str:
     """Why the replay ends now, "" if it goes on."""
     if stopped:
         return readiness.STOPPED
@@ -45,7 +45,7 @@ class Replay:
     the first action at a limited speed, and then as recorded. Attributes: `begins_s`, when the episode begins;
     `ends_s`."""
 
-    def __init__(self, actions: np.ndarray, rate_hz: int, start: np.ndarray, limits: Limits):
+    def __init__(self, actions: np.ndarray, rate_hz: int, start: np.ndarray, limits: ReplayLimits):
         self._actions, self._rate_hz, self._start = np.asarray(actions, dtype=float), rate_hz, np.asarray(start)
         furthest = float(np.abs(self._joints(0) - self._start).max())
         self.begins_s = furthest / limits.speed_rad_s

@@ -16,8 +16,8 @@ from baxter_model import JOINTS, SIDES
 from .frames import ACTION, ENVIRONMENT, MARKS, PICTURES, STATE, DemonstrationError, Feature, Schema, numbers, picture
 from .writing import SetWriter
 
-#: What `Recorder.take` takes: (14,) joints [rad], left before right; (14,) their set-points; of each side how far its
-#: gripper is open and was told to be, 0 closed to 100 open.
+#: What `WatchingRecorder.take` takes: (14,) joints [rad], left before right; (14,) their set-points; of each side how
+#: far its gripper is open and was told to be, 0 closed to 100 open.
 JOINT_ANGLES, SET_POINTS, OPENING, TOLD = "joints", "set_points", "%s_opening", "%s_told"
 #: A model's pose, (7,) place [m] and quaternion x y z w.
 MODEL = "model %s"
@@ -38,7 +38,7 @@ def schema_of(rate_hz: int, cameras: Mapping[str, tuple[int, int]], models: Sequ
     return Schema(rate_hz, features, about={"task": "on the robot", "control": "positions"})
 
 
-class Recorder:
+class WatchingRecorder:
     """Takes what a robot says, and writes episodes; a mark ends one, and the next begins. writer: of a set with
     `schema_of`; task: in words; seen_s: age of what a frame has at most [s]; say: hears what is kept, dropped, and
     waited for."""

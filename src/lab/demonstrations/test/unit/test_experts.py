@@ -6,7 +6,7 @@ import pytest
 from baxter_lab import Options
 from baxter_lab.robot import Gripper
 from demonstrations.card import card
-from demonstrations.collecting import Views, Work, collect, film
+from demonstrations.collecting import CollectingWork, Views, collect, film
 from demonstrations.environment import RANDOMISED, Conditions, core_for, core_of, expert_of, record, replay, schema_of
 from demonstrations.experts import EXPERTS, down, rotation_vector
 from demonstrations.frames import ACTION, EXPERT_ACTION, STATE, DemonstrationError
@@ -123,7 +123,7 @@ def test_what_an_expert_wants_is_beside_what_was_done():
 def test_a_set_is_the_same_with_any_number_of_workers(tmp_path):
     sets = []
     for workers in (1, 2):
-        found = collect("Reach", tmp_path / str(workers), range(2), work=Work(workers))
+        found = collect("Reach", tmp_path / str(workers), range(2), work=CollectingWork(workers))
         assert (found.kept, found.failed) == (2, 0)
         sets.append([DataSet(tmp_path / str(workers)).episode(number) for number in range(2)])
     for one, other in zip(*sets, strict=True):

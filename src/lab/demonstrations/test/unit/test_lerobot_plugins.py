@@ -17,7 +17,7 @@ lerobot_stand_ins.install()
 
 from lerobot_env_baxter import BaxterEnvConfig  # noqa: E402
 from lerobot_robot_baxter import Baxter, BaxterConfig, cameras, wire  # noqa: E402
-from lerobot_robot_baxter.rosbridge import Bridge, BridgeError  # noqa: E402
+from lerobot_robot_baxter.rosbridge import RosbridgeClient, RosbridgeError  # noqa: E402
 from lerobot_teleoperator_baxter import BaxterTeleop, BaxterTeleopConfig  # noqa: E402
 
 from baxter_model import SIDES, joint_names  # noqa: E402
@@ -203,13 +203,13 @@ def test_a_bridge_that_ends_is_an_error_and_no_bridge_is_one_with_its_address(br
     robot = Baxter(BaxterConfig(address=bridge.address))
     robot.connect()
     bridge.close()
-    with pytest.raises(BridgeError, match="ended"):
+    with pytest.raises(RosbridgeError, match="ended"):
         robot._require().wait(lambda: False, WAIT_S)
     with pytest.raises(ConnectionError, match="ended"):
         robot.send_action(there())
     assert not robot.is_connected
     with pytest.raises(ConnectionError, match="no rosbridge at %s" % bridge.address):
-        Bridge(bridge.address)
+        RosbridgeClient(bridge.address)
 
 
 def test_the_device_says_what_arms_and_grippers_are_told(bridge):
@@ -255,7 +255,7 @@ def test_a_stream_is_taken_apart_and_ends_quietly_when_it_is_cut_off():
 
 
 def test_a_camera_without_a_server_is_an_error_with_its_address(bridge):
-    stream = cameras.Stream("http://127.0.0.1:1", "/cameras/head_camera/image", 20, 32)
+    stream = cameras.CameraStream("http://127.0.0.1:1", "/cameras/head_camera/image", 20, 32)
     with pytest.raises(ConnectionError, match="127.0.0.1:1/stream"):
         stream.picture(1.0, 0.2)
     stream.close()

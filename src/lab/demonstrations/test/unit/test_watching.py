@@ -15,8 +15,8 @@ from demonstrations.frames import ACTION, ENVIRONMENT, PICTURES, STATE, Demonstr
 from demonstrations.needed import need
 from demonstrations.over_ros import messages, recording
 from demonstrations.reading import DataSet
-from demonstrations.replaying import Limits, Replay, actions_of, reason_to_stop
-from demonstrations.watching import JOINT_ANGLES, MODEL, NAMED, OPENING, SET_POINTS, TOLD, Recorder, schema_of
+from demonstrations.replaying import Replay, ReplayLimits, actions_of, reason_to_stop
+from demonstrations.watching import JOINT_ANGLES, MODEL, NAMED, OPENING, SET_POINTS, TOLD, WatchingRecorder, schema_of
 from demonstrations.writing import SetWriter
 
 ARMS = [name for side in SIDES for name in joint_names(side)]
@@ -37,7 +37,7 @@ def robot(tmp_path):
         def __init__(self):
             self.said, self.folder = Told(), tmp_path / "set"
             self.writer = SetWriter(self.folder, schema_of(20, {"head": (4, 6)}, ["block"]))
-            self.recorder = Recorder(self.writer, "Show it.", 0.3, self.said)
+            self.recorder = WatchingRecorder(self.writer, "Show it.", 0.3, self.said)
             self.tick = 0
 
         def goes(self, seconds, without=()):
@@ -176,7 +176,7 @@ def test_a_replay_goes_to_the_start_and_then_as_recorded():
     actions = np.zeros((5, 16))
     actions[:, 0] = (0.5, 0.6, 0.7, 0.7, 0.7)
     actions[3:, 7] = 100.0
-    replay = Replay(actions, 10, np.array([0.2, *[0.0] * 13]), Limits(speed_rad_s=0.3))
+    replay = Replay(actions, 10, np.array([0.2, *[0.0] * 13]), ReplayLimits(speed_rad_s=0.3))
     assert replay.begins_s == pytest.approx(1.0) and replay.ends_s == pytest.approx(1.4)
     places = [replay.joints(time_s)[0] for time_s in (0.0, 0.5, 1.0, 1.05, 1.1, 1.4, 9.0)]
     assert places == pytest.approx([0.2, 0.35, 0.5, 0.55, 0.6, 0.7, 0.7])
@@ -187,8 +187,8 @@ def test_a_replay_goes_to_the_start_and_then_as_recorded():
     ((False, False, 0.0, 0.0), "enabled"), ((True, True, 0.0, 0.0), "stop"), ((True, False, 0.6, 0.0), "0.6 s old"),
     ((True, False, 0.0, 0.7), "0.70 rad")])
 def test_a_replay_ends_where_the_robot_cannot_follow(found, text):
-    assert text in reason_to_stop(Limits(), *found)
-    assert reason_to_stop(Limits(), True, False, 0.1, 0.1) == ""
+    assert text in reason_to_stop(ReplayLimits(), *found)
+    assert reason_to_stop(ReplayLimits(), True, False, 0.1, 0.1) == ""
 
 
 def test_a_set_of_other_actions_is_not_replayed_on_a_robot(tmp_path):

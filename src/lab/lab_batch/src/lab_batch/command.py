@@ -248,8 +248,8 @@ def changes(earlier: dict[str, str], now: dict[str, str]) -> str:
 
 def _run_left(options: argparse.Namespace, spec: Spec, left: list[int], records: Records) -> None:
     progress = Progress(len(left))
-    limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle,
-                              memory_bytes_of(options))
+    limits = processes.BatchLimits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle,
+                                   memory_bytes_of(options))
     extra = {"address": options.address} if options.engine == "ray" else {}
     done = threading.Event()
     if options.time_limit is None:

@@ -32,7 +32,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 
 @dataclass(frozen=True)
-class Limits:
+class BatchLimits:
     """workers: processes at a time. episode_s: longest wall time of an episode, None: no limit. episodes: how many a
     worker runs before a new one takes its place (physics engines keep memory), None: no limit. memory_bytes: of each
     process, and of a worker and its processes together, None: no limit."""
@@ -43,7 +43,7 @@ class Limits:
     memory_bytes: int | None = None
 
 
-def map_seeds(spec: Spec, seeds: range | list[int], limits: Limits) -> Generator[Outcome, None, None]:
+def map_seeds(spec: Spec, seeds: range | list[int], limits: BatchLimits) -> Generator[Outcome, None, None]:
     """Yield an Outcome for each seed, in the order in which they end. spec: Spec, seeds: iterable of int.
 
     Raises JobError where the job cannot start. When the caller closes the generator, the workers are stopped.
@@ -56,7 +56,7 @@ def map_seeds(spec: Spec, seeds: range | list[int], limits: Limits) -> Generator
 
 
 class _Pool:
-    def __init__(self, spec: Spec, seeds: range | list[int], limits: Limits) -> None:
+    def __init__(self, spec: Spec, seeds: range | list[int], limits: BatchLimits) -> None:
         self._spec, self._limits = spec, limits
         self._seeds, self._again = iter(seeds), deque()
         self._tries = {}  # of seeds whose worker died
@@ -177,7 +177,7 @@ def _cause(code: int | None) -> str:
 
 
 class _Worker:
-    def __init__(self, spec: Spec, limits: Limits) -> None:
+    def __init__(self, spec: Spec, limits: BatchLimits) -> None:
         context = multiprocessing.get_context("spawn")
         self.link, theirs = context.Pipe()
         given = (spec, theirs, os.getpid(), limits.memory_bytes)
@@ -195,10 +195,10 @@ class _Worker:
         except OSError:
             pass  # it has died: its end of the link says so to the next wait
 
-    def is_worn(self, limits: Limits) -> bool:
+    def is_worn(self, limits: BatchLimits) -> bool:
         return limits.episodes is not None and self.count + len(self.seeds) >= limits.episodes
 
-    def deadline(self, limits: Limits) -> float:
+    def deadline(self, limits: BatchLimits) -> float:
         """When the episode that runs must have ended, on the monotonic clock [s]."""
         if self.began is None or limits.episode_s is None:
             return float("inf")

@@ -21,7 +21,7 @@ from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
 
 if TYPE_CHECKING:
     from lab_batch.job import Spec
-    from lab_batch.processes import Limits
+    from lab_batch.processes import BatchLimits
 
 REQUIREMENTS = Path(__file__).with_name("requirements-ray.txt")
 # Ray's own limits for the start of its processes (15 to 30 s) are too short for a busy machine. Usage is not reported,
@@ -64,7 +64,7 @@ class _Episodes:
         return run_episode(self._job, seed)
 
 
-def map_seeds(spec: Spec, seeds: range, limits: Limits, address: str | None = None) -> Iterator[Outcome]:
+def map_seeds(spec: Spec, seeds: range, limits: BatchLimits, address: str | None = None) -> Iterator[Outcome]:
     """Yield an Outcome for each seed, as processes.map_seeds.
 
     address: HOST:PORT of a cluster's head; None: a Ray of its own on this machine. limits.workers is the number of
@@ -86,7 +86,7 @@ def map_seeds(spec: Spec, seeds: range, limits: Limits, address: str | None = No
         yield from _Actors(ray, spec, seeds, limits).outcomes()
 
 
-def _start(ray: ModuleType, limits: Limits, address: str | None, ending: contextlib.ExitStack) -> None:
+def _start(ray: ModuleType, limits: BatchLimits, address: str | None, ending: contextlib.ExitStack) -> None:
     """Connect to a cluster, or start a Ray here; `ending` (contextlib.ExitStack) ends it. Raises JobError."""
     options: dict[str, Any] = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
     tries, folder = STARTS, None
@@ -139,7 +139,7 @@ class _Actor:
     def __init__(self, handle: Any) -> None:
         self.handle, self.began = handle, None
 
-    def deadline(self, limits: Limits) -> float:
+    def deadline(self, limits: BatchLimits) -> float:
         """When the episode that runs must have ended, on the monotonic clock [s]."""
         if self.began is None or limits.episode_s is None:
             return float("inf")
@@ -150,7 +150,7 @@ class _Actors:
     """Actors, each with up to SEEDS_AHEAD seeds. Where one dies, it is not known which of its seeds has killed it: the
     outcome of a seed that is done may be lost as well. From then on its seeds run one by one."""
 
-    def __init__(self, ray: ModuleType, spec: Spec, seeds: range, limits: Limits) -> None:
+    def __init__(self, ray: ModuleType, spec: Spec, seeds: range, limits: BatchLimits) -> None:
         self._ray, self._spec, self._limits = ray, spec, limits
         self._seeds, self._again, self._deaths = iter(seeds), [], {}
         self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)

@@ -81,12 +81,12 @@ class Planning(Job):
         import numpy as np
 
         from motion_planning.planners.errors import NoPath
-        from motion_planning.planners.planning import Search, plan_path
+        from motion_planning.planners.planning import SearchOptions, plan_path
 
         rng = np.random.default_rng(seed)
         scene, group = self._scene(rng), self._model.groups[self._group]
         start, goal = (self._free_posture(scene, group, rng) for _ in range(2))
-        search = Search(self._exact, seed, self._limit_s, time.process_time)
+        search = SearchOptions(self._exact, seed, self._limit_s, time.process_time)
         try:
             path = plan_path(scene, self._group, start, goal[None], search)
         except NoPath as failure:

@@ -15,7 +15,7 @@ import pytest
 
 from lab_batch import JobError, Outcome, Spec, command, load, on_first_use, parquet, ray_engine, ray_node
 from lab_batch.job import ResultError, plain
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 from lab_batch.records import Records, RecordsError, summary
 from lab_testing.waiting import wait_until
 
@@ -31,20 +31,20 @@ def jobs_can_be_imported(monkeypatch):
 
 
 def outcomes(name, seeds, limits=None, **parameters):
-    found = list(map_seeds(Spec(name, parameters), seeds, limits or Limits(2)))
+    found = list(map_seeds(Spec(name, parameters), seeds, limits or BatchLimits(2)))
     assert sorted(one.seed for one in found) == sorted(seeds)
     return {one.seed: one for one in found}
 
 
 def test_results_are_the_same_with_one_worker_and_with_three():
-    alone, together = outcomes(SQUARE, range(9), Limits(1)), outcomes(SQUARE, range(9), Limits(3))
+    alone, together = outcomes(SQUARE, range(9), BatchLimits(1)), outcomes(SQUARE, range(9), BatchLimits(3))
     assert [alone[seed].result for seed in range(9)] == [together[seed].result for seed in range(9)]
     assert alone[4].result["square"] == 16.0
     assert alone[4].result["threads"] == "1"
 
 
 def test_workers_end_the_job_and_are_replaced(tmp_path):
-    outcomes(SQUARE, range(7), Limits(1, episodes=3), folder=str(tmp_path))
+    outcomes(SQUARE, range(7), BatchLimits(1, episodes=3), folder=str(tmp_path))
     started, ended = ({path.name.split("-")[1] for path in tmp_path.glob(kind + "-*")} for kind in ("started", "ended"))
     assert len(started) == 3
     assert ended == started
@@ -116,7 +116,7 @@ def is_alive(pid):
 
 
 def test_an_episode_over_its_time_is_stopped_with_its_children(tmp_path):
-    found = outcomes(TROUBLE, range(3), Limits(1, episode_s=8.0), hangs=(1,), folder=str(tmp_path))
+    found = outcomes(TROUBLE, range(3), BatchLimits(1, episode_s=8.0), hangs=(1,), folder=str(tmp_path))
     assert found[1].error == "took more than the limit of 8 s"
     assert found[0].is_done and found[2].is_done
     child = int((tmp_path / "child").read_text())
@@ -125,14 +125,14 @@ def test_an_episode_over_its_time_is_stopped_with_its_children(tmp_path):
 
 def test_processes_in_sessions_of_their_own_end_with_their_worker(tmp_path):
     """One worker ends by itself, one is stopped; a child of each has left its group, and its parent."""
-    found = outcomes("small_jobs:Leaves", range(2), Limits(2, episode_s=4.0), hangs=(1,), folder=str(tmp_path))
+    found = outcomes("small_jobs:Leaves", range(2), BatchLimits(2, episode_s=4.0), hangs=(1,), folder=str(tmp_path))
     assert found[0].is_done and "limit of 4 s" in found[1].error
     children = [int((tmp_path / ("left-%d" % seed)).read_text()) for seed in range(2)]
     wait_until(lambda: not any(map(is_alive, children)), "the processes that episodes left have ended")
 
 
 def test_closing_the_iterator_stops_the_workers(tmp_path):
-    iterator = map_seeds(Spec(TROUBLE, {"hangs": (1,), "folder": str(tmp_path)}), range(2), Limits(1))
+    iterator = map_seeds(Spec(TROUBLE, {"hangs": (1,), "folder": str(tmp_path)}), range(2), BatchLimits(1))
     assert next(iterator).seed == 0
     wait_until((tmp_path / "child").exists, "the second episode runs")
     wait_until((tmp_path / "child").read_text, "its process has a number")
@@ -158,7 +158,7 @@ def test_wrong_jobs_are_refused(name, parameters, text):
                                         ("small_jobs:DiesAtStart", "2 workers in a row died at the start: signal SIG")])
 def test_a_job_that_cannot_start_ends_the_batch(name, text):
     with pytest.raises(JobError, match=text):
-        list(map_seeds(Spec(name), range(100), Limits(2)))
+        list(map_seeds(Spec(name), range(100), BatchLimits(2)))
 
 
 # -- records

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lab_batch import JobError, Spec, command, keeping
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 from lab_testing.waiting import wait_until
 from processes.family import is_running
 
@@ -27,7 +27,7 @@ def jobs_can_be_imported(monkeypatch):
 def test_too_much_memory_costs_its_episode_only(tmp_path):
     """Taken at once, taken and kept, and taken by three programs none of which exceeds the limit."""
     spec = Spec("small_jobs:Hog", {"at_once": [1], "keeps": [3], "programs": [5], "folder": str(tmp_path)})
-    found = {one.seed: one for one in map_seeds(spec, range(8), Limits(1, memory_bytes=500_000_000))}
+    found = {one.seed: one for one in map_seeds(spec, range(8), BatchLimits(1, memory_bytes=500_000_000))}
     assert sorted(found) == list(range(8))
     assert sorted(seed for seed, one in found.items() if not one.is_done) == [1, 3, 5], found
     for seed in (1, 3):
@@ -39,7 +39,7 @@ def test_too_much_memory_costs_its_episode_only(tmp_path):
 
 def test_a_job_that_takes_too_much_when_it_starts_cannot_start():
     with pytest.raises(JobError, match="cannot start: .*MemoryError.*; the limit of memory is 0.2 GB"):
-        list(map_seeds(Spec("small_jobs:HogAtStart"), [0], Limits(1, memory_bytes=200_000_000)))
+        list(map_seeds(Spec("small_jobs:HogAtStart"), [0], BatchLimits(1, memory_bytes=200_000_000)))
 
 
 def test_by_default_workers_share_what_the_machine_has(tmp_path):

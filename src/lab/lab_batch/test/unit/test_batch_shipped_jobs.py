@@ -10,7 +10,7 @@ import pytest
 
 from baxter_sim_kinematics import reach_commands
 from lab_batch import JobError, Spec, load
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 from lab_batch.shipped import JOBS, Command
 
 
@@ -51,7 +51,7 @@ def test_results_of_a_launch_file_stand_before_the_words_of_roslaunch(tmp_path):
 
 
 def test_inverse_kinematics_solves_reachable_poses():
-    found, = map_seeds(Spec("lab_batch.shipped:InverseKinematics", {"poses": 20}), [5], Limits(1))
+    found, = map_seeds(Spec("lab_batch.shipped:InverseKinematics", {"poses": 20}), [5], BatchLimits(1))
     assert found.result["all_solved"], found
     assert found.result["farthest_off_m"] < 1e-4
 

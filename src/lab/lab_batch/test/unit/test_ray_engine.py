@@ -15,7 +15,7 @@ import pytest
 
 from lab_batch import Spec, ray_engine
 from lab_batch.job import Outcome
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).parent
@@ -27,11 +27,11 @@ PROGRAM = """
 import contextlib, json, os, psutil, sys
 from lab_batch import Spec, ray_engine
 from lab_batch.job import Outcome
-from lab_batch.processes import Limits
+from lab_batch.processes import BatchLimits
 def say(value):
     os.write(1, b"\\n%s\\n" % json.dumps(value).encode())
 spec, addresses = Spec(sys.argv[1], json.loads(sys.argv[2])), set()
-for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), Limits(2)):
+for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), BatchLimits(2)):
     say([one.seed, one.result, one.error])
     for child in psutil.Process().children(recursive=True):
         with contextlib.suppress(psutil.Error):
@@ -137,7 +137,7 @@ def test_ray_gives_what_processes_give_and_a_killed_worker_costs_its_episode_onl
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]))
     spec = Spec("small_jobs:Trouble", {"raises": [3], "folder": str(tmp_path)})
-    plain = {one.seed: one.result for one in map_seeds(spec, range(8), Limits(2))}
+    plain = {one.seed: one.result for one in map_seeds(spec, range(8), BatchLimits(2))}
     assert {seed: result for seed, (result, _) in found.items() if seed != 5} == {
         seed: result for seed, result in plain.items() if seed != 5}
 
@@ -145,7 +145,7 @@ def test_ray_gives_what_processes_give_and_a_killed_worker_costs_its_episode_onl
 @pytest.mark.parametrize("death", ["RayActorError", "OutOfMemoryError"])
 @pytest.mark.parametrize("first", [0, -1])
 def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(first, death):
-    outcomes = ray_engine._Actors(LateRay(5, first, death=death), Spec("any:Job"), range(8), Limits(2)).outcomes()
+    outcomes = ray_engine._Actors(LateRay(5, first, death=death), Spec("any:Job"), range(8), BatchLimits(2)).outcomes()
     errors = {one.seed: one.error for one in outcomes}
     assert sorted(errors) == list(range(8))
     assert [seed for seed, error in errors.items() if error] == [5] and "died twice" in errors[5]
@@ -154,7 +154,7 @@ def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(firs
 def test_a_start_is_no_part_of_an_episode_and_a_late_one_fails_alone():
     """Meanwhile other actors go on, so something always ends within the limit."""
     ray = LateRay(hanging=2, start_s=0.3)
-    outcomes = list(ray_engine._Actors(ray, Spec("any:Job"), range(200), Limits(2, episode_s=0.2)).outcomes())
+    outcomes = list(ray_engine._Actors(ray, Spec("any:Job"), range(200), BatchLimits(2, episode_s=0.2)).outcomes())
     assert sorted(one.seed for one in outcomes) == list(range(200))
     assert [one.error for one in outcomes if one.error] == ["took more than the limit of 0.2 s"]
     assert len(ray.killed) == 1
@@ -165,7 +165,7 @@ def test_other_users_cannot_open_the_folder_of_a_ray():
     options = {}
     ray = SimpleNamespace(init=options.update, shutdown=lambda: None)
     with contextlib.ExitStack() as ending:
-        ray_engine._start(ray, Limits(1), None, ending)
+        ray_engine._start(ray, BatchLimits(1), None, ending)
         around = Path(options["_temp_dir"]).parent
         assert around.stat().st_mode & 0o077 == 0 and around.name.startswith("ray-")
     assert not around.exists()
@@ -191,7 +191,7 @@ def test_a_start_ends_and_removes_what_a_killed_batch_has_left(monkeypatch, tmp_
         holder.kill()
         holder.wait()
         with contextlib.ExitStack() as own:
-            ray_engine._start(ray, Limits(1), None, own)
+            ray_engine._start(ray, BatchLimits(1), None, own)
             assert len(list(tmp_path.iterdir())) == 3
         assert not options["left"].exists() and users["left"].poll() is not None
         assert options["living"].is_dir() and users["living"].poll() is None

@@ -21,7 +21,7 @@ from sensor_msgs.msg import Image, JointState
 
 from baxter_interface import startup
 from baxter_interface.waiting import Condition, wait_in_order
-from live_plot.recording import Recording
+from live_plot.recording import PlotRecording
 from urdf_model import Robot, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
 from world_picture.snapshot import SnapshotError
@@ -30,7 +30,7 @@ from . import joint_plot
 from .matrices import FrameMatrix
 from .outside import Outside
 from .picture import Picture
-from .trees import Tree
+from .trees import FrameTree
 
 # Longest wait for a message or a picture [s, wall].
 TIMEOUT_S = 30.0
@@ -82,7 +82,7 @@ class JointLog:
 
     def __init__(self, topic: str, joints: Sequence[str] | None) -> None:
         self._topic, self._joints = topic, joints
-        self._recording = Recording()
+        self._recording = PlotRecording()
         self._subscriber: rospy.Subscriber | None = None
         self._arrived = threading.Event()
 
@@ -141,14 +141,15 @@ def robot(parameter: str = "robot_description") -> Robot:
         raise ShowError("the parameter %s is not set: is a robot running?" % parameter) from error
 
 
-def urdf_tree(parameter: str = "robot_description", below: str | None = None) -> Tree:
-    """Links and joints of the robot's description, as a Tree: print it, or draw() it. `below`: from that link down."""
-    tree = Tree.of_urdf(robot(parameter))
+def urdf_tree(parameter: str = "robot_description", below: str | None = None) -> FrameTree:
+    """Links and joints of the robot's description, as a FrameTree: print it, or draw() it. `below`: from that link
+    down."""
+    tree = FrameTree.of_urdf(robot(parameter))
     return tree if below is None else tree.below(below)
 
 
-def tf_tree(below: str | None = None) -> Tree:
-    """Frames that tf knows, as a Tree. The robot's description tells which joints move."""
+def tf_tree(below: str | None = None) -> FrameTree:
+    """Frames that tf knows, as a FrameTree. The robot's description tells which joints move."""
     description = robot()
     moving = {joint.child: joint.name for joint in description.joints.values() if joint.type != "fixed"}
     with _transforms() as buffer:
@@ -156,8 +157,8 @@ def tf_tree(below: str | None = None) -> Tree:
             return set(description.links) <= {*_frames(buffer), *(parent for parent in _frames(buffer).values())}
 
         _wait("tf to name every link of the robot", is_complete, "robot_state_publisher has not sent all of them")
-        tree = Tree({child: (parent, moving.get(child, ""), child in moving)
-                     for child, parent in sorted(_frames(buffer).items())})
+        tree = FrameTree({child: (parent, moving.get(child, ""), child in moving)
+                          for child, parent in sorted(_frames(buffer).items())})
     return tree if below is None else tree.below(below)
 
 

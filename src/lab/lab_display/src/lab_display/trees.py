@@ -20,13 +20,13 @@ class TreeError(ValueError):
 
 
 @dataclass
-class Tree:
+class FrameTree:
     """Frames below their parents. `edges`: child -> (parent, label, whether the child moves in it)."""
 
     edges: dict = field(default_factory=dict)
 
     @classmethod
-    def of_urdf(cls, robot: Robot) -> Tree:
+    def of_urdf(cls, robot: Robot) -> FrameTree:
         """Of a `urdf_model.Robot`: links, by their joints."""
         return cls({joint.child: (joint.parent, joint.name, joint.type != "fixed") for joint in robot.joints.values()})
 
@@ -39,7 +39,7 @@ class Tree:
         """Names of the direct children of a frame, in their given order."""
         return [child for child, (parent, _, _) in self.edges.items() if parent == name]
 
-    def below(self, name: str) -> Tree:
+    def below(self, name: str) -> FrameTree:
         """The tree from one frame down. Raises TreeError for an unknown frame."""
         if name not in self.edges and name not in self.roots:
             names = sorted({*self.edges, *self.roots})
@@ -49,7 +49,7 @@ class Tree:
             for child in self.children(todo.pop()):
                 chosen[child] = self.edges[child]
                 todo.append(child)
-        return Tree({child: edge for child, edge in self.edges.items() if child in chosen})
+        return FrameTree({child: edge for child, edge in self.edges.items() if child in chosen})
 
     def rows(self) -> list[tuple[int, str, str, bool]]:
         """List of (depth, name, label, moves), depth first. Raises TreeError if parents form rings."""

@@ -11,7 +11,7 @@ from lab_display import joint_plot, outside
 from lab_display.command import picture_path
 from lab_display.matrices import FrameMatrix, angle_and_axis
 from lab_display.picture import Picture
-from lab_display.trees import Tree, TreeError
+from lab_display.trees import FrameTree, TreeError
 from sensor_renderer.pinhole import Pinhole
 from sensor_renderer.viewpoint import looking_at
 from urdf_model import parse_urdf
@@ -32,11 +32,11 @@ def test_cores_load_without_ros():
 
 
 def test_tree_of_a_urdf_as_text():
-    assert str(Tree.of_urdf(parse_urdf(ARM))) == "foot\n  [turn] upper\n    tool\n  lamp"
+    assert str(FrameTree.of_urdf(parse_urdf(ARM))) == "foot\n  [turn] upper\n    tool\n  lamp"
 
 
 def test_tree_from_a_frame_down_and_an_unknown_one():
-    tree = Tree.of_urdf(parse_urdf(ARM))
+    tree = FrameTree.of_urdf(parse_urdf(ARM))
     assert str(tree.below("upper")) == "upper\n  tool"
     with pytest.raises(TreeError, match="no frame 'leg'; there are: foot, lamp, tool, upper"):
         tree.below("leg")
@@ -44,13 +44,13 @@ def test_tree_from_a_frame_down_and_an_unknown_one():
 
 def test_frames_in_a_ring_are_named():
     with pytest.raises(TreeError, match="a, b"):
-        Tree({"a": ("b", "", False), "b": ("a", "", False), "d": ("c", "", False)}).draw()
+        FrameTree({"a": ("b", "", False), "b": ("a", "", False), "d": ("c", "", False)}).draw()
 
 
 def test_picture_of_a_tree_has_moving_frames_in_red():
-    pixels = Tree.of_urdf(parse_urdf(ARM)).draw().array().astype(int)
+    pixels = FrameTree.of_urdf(parse_urdf(ARM)).draw().array().astype(int)
     assert (pixels[:, :, 0] > pixels[:, :, 1] + 80).sum() > 50
-    still = Tree({"b": ("a", "", False)}).draw().array().astype(int)
+    still = FrameTree({"b": ("a", "", False)}).draw().array().astype(int)
     # The title alone has no colour.
     assert (still[:, :, 0] > still[:, :, 1] + 80).sum() == 0
 

@@ -2,6 +2,6 @@
 """The simulator that a notebook works with: found, or started and ended with the notebook."""
 
 from .labs import LABS
-from .session import Lab, LabError, connect
+from .session import NoLab, RunningLab, connect
 
-__all__ = ["LABS", "Lab", "LabError", "connect"]
+__all__ = ["LABS", "RunningLab", "NoLab", "connect"]

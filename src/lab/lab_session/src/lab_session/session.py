@@ -38,11 +38,11 @@ PAGE = ("rosrun", "lab_web", "lab_web")
 PAGE_TIMEOUT_S = 300.0
 
 
-class LabError(Exception):
+class NoLab(Exception):
     """No lab is available; the text says why and what to do."""
 
 
-class Lab:
+class RunningLab:
     """The result of :func:`connect`. Printing it shows what runs and how to stop it."""
 
     def __init__(self, command: Sequence[str], topic: str) -> None:
@@ -86,7 +86,7 @@ class Lab:
     def page(self) -> str:
         """The address of the lab's page in a browser, with its token; starts the page's server where none runs.
 
-        Raises LabError where it does not start.
+        Raises NoLab where it does not start.
         """
         found = page_files.address(rosgraph.get_master_uri())
         if found is None:
@@ -94,7 +94,7 @@ class Lab:
             deadline = time.monotonic() + PAGE_TIMEOUT_S
             while found is None:
                 if self._programs[PAGE].poll() is not None or time.monotonic() > deadline:
-                    raise LabError("the page did not start. Its output (%s) ends with:\n%s" % (log, _last_lines(log)))
+                    raise NoLab("the page did not start. Its output (%s) ends with:\n%s" % (log, _last_lines(log)))
                 time.sleep(0.2)
                 found = page_files.address(rosgraph.get_master_uri())
         return found
@@ -158,7 +158,7 @@ class Lab:
         self._wait(START_TIMEOUT_S)
 
     def _wait(self, timeout_s: float) -> None:
-        """Wait for the robot's topic; raises OSError, or LabError when a simulator of ours has died."""
+        """Wait for the robot's topic; raises OSError, or NoLab when a simulator of ours has died."""
         ours = self._keeper
         condition = startup.topic_published(self._topic)
         met = Condition(condition.what, lambda: condition.is_met() or (ours is not None and ours.poll() is not None),
@@ -168,28 +168,29 @@ class Lab:
         if ours and ours.poll() is not None:
             lines = _last_lines(self._log)
             self.close()
-            raise LabError("roslaunch %s has ended. Its output (%s) ends with:\n%s"
-                           % (" ".join(self._command), self._log, lines))
+            raise NoLab("roslaunch %s has ended. Its output (%s) ends with:\n%s"
+                        % (" ".join(self._command), self._log, lines))
 
 
 _labs = {}
 _run_id = None
 
 
-def connect(name: str, *arguments: str) -> Lab:
-    """Return the :class:`Lab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS node.
+def connect(name: str, *arguments: str) -> RunningLab:
+    """Return the :class:`RunningLab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS
+    node.
 
     Uses the simulator on the master that ROS_MASTER_URI names; if there is none, starts one there, with further launch
     `arguments` such as "gui:=false"; if another robot runs there, starts one on a separate port and sets
     ROS_MASTER_URI. Calling it again is safe: it finds the lab of the first call, or starts it again with the present
     arguments.
 
-    Raises :class:`LabError` when no lab can be found or started.
+    Raises :class:`NoLab` when no lab can be found or started.
     """
     if name not in LABS:
-        raise LabError("there is no lab '%s'; there are: %s" % (name, ", ".join(LABS)))
+        raise NoLab("there is no lab '%s'; there are: %s" % (name, ", ".join(LABS)))
     start = LABS[name]
-    lab = _labs.setdefault(name, Lab(start.command, start.topic))
+    lab = _labs.setdefault(name, RunningLab(start.command, start.topic))
     lab._ask_for([*start.command, *arguments])
     try:
         with _only_one():
@@ -197,12 +198,12 @@ def connect(name: str, *arguments: str) -> Lab:
         _become_node("notebook")
         startup.wait_for_start([], START_TIMEOUT_S)
     except (OSError, rosgraph.MasterException) as error:
-        raise LabError(getattr(error, "strerror", None) or str(error)) from error
+        raise NoLab(getattr(error, "strerror", None) or str(error)) from error
     print(lab)
     return lab
 
 
-def _find_or_start(lab: Lab) -> None:
+def _find_or_start(lab: RunningLab) -> None:
     if lab.is_ours:
         lab._wait(START_TIMEOUT_S)
         return
@@ -220,8 +221,8 @@ def _find_or_start(lab: Lab) -> None:
             return
         except OSError as error:
             if not is_local or rospy.core.is_initialized():
-                raise LabError("the lab at %s has no %s: %s. Stop it, or restart this notebook's kernel to work beside "
-                               "it." % (rosgraph.get_master_uri(), lab._topic, error.strerror)) from error
+                raise NoLab("the lab at %s has no %s: %s. Stop it, or restart this notebook's kernel to work beside "
+                            "it." % (rosgraph.get_master_uri(), lab._topic, error.strerror)) from error
         _say("the simulator at %s has no %s; starting another one beside it" % (rosgraph.get_master_uri(), lab._topic))
         port = free_port(FURTHER_PORTS)
         os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % port
@@ -230,7 +231,7 @@ def _find_or_start(lab: Lab) -> None:
     lab._start(port, has_master=bool(lab.nodes))
 
 
-def _holds(state: Path, lab: Lab) -> bool:
+def _holds(state: Path, lab: RunningLab) -> bool:
     return keeper.is_held(state) and " ".join(lab._command) in state.read_text()
 
 
@@ -242,8 +243,8 @@ def _become_node(name: str) -> None:
         rospy.init_node(name, anonymous=True, disable_signals=True)
         _run_id = run_id
     elif run_id != _run_id:
-        raise LabError("the master at %s is not the one that this notebook has worked with; restart the notebook's "
-                       "kernel (Kernel > Restart Kernel)" % rosgraph.get_master_uri())
+        raise NoLab("the master at %s is not the one that this notebook has worked with; restart the notebook's "
+                    "kernel (Kernel > Restart Kernel)" % rosgraph.get_master_uri())
 
 
 def _published_topics() -> list[str]:
@@ -292,7 +293,7 @@ def _master_port() -> int:
     except ValueError:
         port = None
     if port is None:
-        raise LabError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
+        raise NoLab("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
     return port
 
 

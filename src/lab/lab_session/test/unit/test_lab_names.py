@@ -9,20 +9,20 @@ from lab_session import session
 
 
 def test_unknown_lab_is_answered_with_the_known_ones():
-    with pytest.raises(lab_session.LabError, match="no lab 'nao'; there are: baxter, case_western, probot"):
+    with pytest.raises(lab_session.NoLab, match="no lab 'nao'; there are: baxter, case_western, probot"):
         lab_session.connect("nao")
 
 
 @pytest.mark.parametrize("uri", ["http://localhost", "http://localhost:ros"])
 def test_master_without_a_port_is_named(monkeypatch, uri):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
-    with pytest.raises(lab_session.LabError, match="should look like http://localhost:11311"):
+    with pytest.raises(lab_session.NoLab, match="should look like http://localhost:11311"):
         lab_session.connect("baxter")
 
 
 def test_no_master_is_said(monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:9")
-    assert "No master answers at http://127.0.0.1:9" in repr(lab_session.Lab(["p", "f.launch"], "/topic"))
+    assert "No master answers at http://127.0.0.1:9" in repr(lab_session.RunningLab(["p", "f.launch"], "/topic"))
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def asked(monkeypatch):
     def find_or_start(lab):
         commands.append(lab._command)
         if len(commands) == 1:
-            raise lab_session.LabError("roslaunch has ended")
+            raise lab_session.NoLab("roslaunch has ended")
 
     monkeypatch.setattr(session, "_labs", {})
     monkeypatch.setattr(session, "_only_one", contextlib.nullcontext)
@@ -45,7 +45,7 @@ def asked(monkeypatch):
 
 
 def test_a_start_that_failed_is_not_what_the_next_call_gets(asked):
-    with pytest.raises(lab_session.LabError, match="has ended"):
+    with pytest.raises(lab_session.NoLab, match="has ended"):
         lab_session.connect("baxter", "gui=false")
     lab_session.connect("baxter", "gui:=false")
     lab_session.connect("baxter")
@@ -53,9 +53,9 @@ def test_a_start_that_failed_is_not_what_the_next_call_gets(asked):
 
 
 def test_what_runs_goes_on_and_other_arguments_are_told_how_they_come_to_count(asked, monkeypatch, capsys):
-    with pytest.raises(lab_session.LabError):
+    with pytest.raises(lab_session.NoLab):
         lab_session.connect("baxter", "gui:=false")
-    monkeypatch.setattr(session.Lab, "is_ours", True)
+    monkeypatch.setattr(session.RunningLab, "is_ours", True)
     lab_session.connect("baxter", "gui:=false")
     assert "lab.stop() stops it, and" not in capsys.readouterr().err
     lab_session.connect("baxter", "gui:=true")

@@ -4,14 +4,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab_session import LabError, session
+from lab_session import NoLab, session
 
 ADDRESS = "http://localhost:8090/?token=drive"
 
 
 @pytest.fixture
 def lab(monkeypatch, tmp_path):
-    made = session.Lab(["roslaunch"], "/topic")
+    made = session.RunningLab(["roslaunch"], "/topic")
     made.started = []
 
     def run(*command):
@@ -38,5 +38,5 @@ def test_without_a_page_its_server_is_started(lab, monkeypatch):
 def test_a_server_that_ends_at_once_is_an_error_with_its_last_lines(lab, monkeypatch):
     monkeypatch.setattr(session.page_files, "address", lambda _uri: None)
     lab.ended = 2
-    with pytest.raises(LabError, match="no lab runs"):
+    with pytest.raises(NoLab, match="no lab runs"):
         lab.page()

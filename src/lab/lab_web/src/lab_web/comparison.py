@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from baxter_conformance.comparison import Finding, Seen
+    from baxter_conformance.comparison import ConformanceFinding, SeenInterface
     from baxter_model.interface import Interface
     from lab_web.task_queue import TaskQueue
 
@@ -24,7 +24,7 @@ class Comparison:
     [s since 1970].
     """
 
-    def __init__(self, findings: Callable[[], list[Finding]], tasks: TaskQueue,
+    def __init__(self, findings: Callable[[], list[ConformanceFinding]], tasks: TaskQueue,
                  changed: Callable[[dict[str, Any]], object], clock: Callable[[], float]) -> None:
         self._findings = findings
         self._tasks = tasks
@@ -51,7 +51,7 @@ class Comparison:
         self._changed(self._state)
 
 
-def shown_of(findings: list[Finding]) -> dict[str, Any]:
+def shown_of(findings: list[ConformanceFinding]) -> dict[str, Any]:
     """Findings as pages show them: ``met`` and ``of`` (numbers of items), ``groups`` [{name, met, of}], ``others``
     [{name, verdict, reason}] of all that is missing or other than expected.
     """
@@ -62,10 +62,10 @@ def shown_of(findings: list[Finding]) -> dict[str, Any]:
                        for one in findings if one.is_public and one.verdict is not Verdict.MET]}
 
 
-def findings_of(robot: Interface, read: Callable[[Interface], Seen], is_there: Callable[[], bool],
-                no_answer: type[BaseException] | tuple[type[BaseException], ...]) -> list[Finding]:
-    """Findings about the robot on the master, from ``read(robot)``, a baxter_conformance.comparison.Seen. Raises
-    RobotError where the master ends meanwhile.
+def findings_of(robot: Interface, read: Callable[[Interface], SeenInterface], is_there: Callable[[], bool],
+                no_answer: type[BaseException] | tuple[type[BaseException], ...]) -> list[ConformanceFinding]:
+    """Findings about the robot on the master, from ``read(robot)``, a baxter_conformance.comparison.SeenInterface.
+    Raises RobotError where the master ends meanwhile.
 
     ``robot``: baxter_model.interface.Interface; ``is_there()``: does the master answer? ``no_answer``: the errors of
     one that does not.

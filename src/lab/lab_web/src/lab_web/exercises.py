@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _LARGEST_BYTES = 1 << 20
 
 
-class Results:
+class ExerciseResults:
     """``path``: the file. What is there at first belongs to an earlier lab and is not shown."""
 
     def __init__(self, path: Path) -> None:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from lab_web.scene import Picture
-    from sensor_renderer.mirror import Body
+    from lab_web.scene import SceneText
+    from sensor_renderer.mirror import DrawnModel
     from urdf_model import Robot
 
 # The nearest of 16 postures: 1 ms, and a hand that is dragged steadily does not make the elbow jump.
@@ -24,7 +24,7 @@ _BUDGET = Budget(candidates=16)
 _LONGEST_REASON = 300
 
 
-class Hands:
+class HandAnswers:
     """Answers the newest question of each page about each hand, one after the other in a thread (``run``).
 
     ``measured()``: {joint: [rad]}; ``ghost(chain, joints)``: what the page draws, or None; ``answer(client,
@@ -57,7 +57,7 @@ class Hands:
                 warn("the page cannot move the %s hand: %s" % (side, error))
         self._chains = chains
 
-    def base(self, picture: Picture | None) -> np.ndarray | None:
+    def base(self, picture: SceneText | None) -> np.ndarray | None:
         """The pose of the arms' base frame in the scene ``picture`` (4 x 4), or None."""
         measured = self._measured()
         for chain in self._chains.values():
@@ -119,8 +119,8 @@ class Hands:
                 "orientation": quaternion_from_matrix(pose[:3, :3]).tolist(), "ghost": self._ghost(chain, joints)}
 
 
-def ghost(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) -> dict[str, Any] | None:
-    """Drawing of an arm of the scene ``picture`` (:class:`lab_web.scene.Picture`, or None) at other ``joints``:
+def ghost(picture: SceneText | None, chain: Chain, joints: Mapping[str, float]) -> dict[str, Any] | None:
+    """Drawing of an arm of the scene ``picture`` (:class:`lab_web.scene.SceneText`, or None) at other ``joints``:
     ``revision``; ``base``, the pose of the chain's base in the world, and ``links`` {number in the scene: pose}, as the
     upper three rows, 12 numbers. None where the scene has no such arm.
     """
@@ -133,13 +133,13 @@ def ghost(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) ->
             "links": {first + number: _rows(pose) for number, pose in moved.items()}}
 
 
-def base_of(picture: Picture | None, chain: Chain, joints: Mapping[str, float]) -> np.ndarray | None:
+def base_of(picture: SceneText | None, chain: Chain, joints: Mapping[str, float]) -> np.ndarray | None:
     """The pose of the chain's base in the scene ``picture`` (4 x 4), or None where the scene has no such arm."""
     found = _body_of(picture, joints)
     return None if found is None else _base(found[1], {}, chain, joints)
 
 
-def _body_of(picture: Picture | None, joints: Mapping[str, float]) -> tuple[int, Body] | None:
+def _body_of(picture: SceneText | None, joints: Mapping[str, float]) -> tuple[int, DrawnModel] | None:
     """(number of its first link in the scene, body) of the robot with these joints, or None."""
     first = 0
     for body in picture.bodies.values() if picture else ():
@@ -149,7 +149,7 @@ def _body_of(picture: Picture | None, joints: Mapping[str, float]) -> tuple[int,
     return None
 
 
-def _base(body: Body, moved: Mapping[int, np.ndarray], chain: Chain, joints: Mapping[str, float]) -> np.ndarray:
+def _base(body: DrawnModel, moved: Mapping[int, np.ndarray], chain: Chain, joints: Mapping[str, float]) -> np.ndarray:
     frames = chain.link_frames([joints[name] for name in chain.joint_names])
     # The one that is nearest to the base.
     link = next(name for name in chain.link_names if name in body.link_names)

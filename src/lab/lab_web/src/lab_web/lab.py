@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Control of the robot by pages: one holds the control, everybody may stop. No ROS: the robot is an argument, with
 
-- ``limits``: {joint: motion.Limits}, empty until the robot is known; ``poses``: {name: {joint: angle [rad]}}
+- ``limits``: {joint: motion.PageJointLimits}, empty until the robot is known; ``poses``: {name: {joint: angle [rad]}}
 - ``measured()``: {joint: position [rad]}, of ``time_s`` in the robot's time; ``why_not_ready()``: "" or a sentence
 - ``explain(joint, tell)``: calls ``tell(sentence)`` soon, on any thread: what keeps a joint from moving
 - ``command(setpoints)``: {joint: [rad], of a recording also SIDE_gripper: [%]}; ``stop()``, ``enable()``,
@@ -15,16 +15,16 @@ import time
 from typing import TYPE_CHECKING
 
 from lab_web.control import SILENCE_S, Control, NotInControl
-from lab_web.motion import Motion, MotionError, Standstill, held
+from lab_web.motion import JointStandstill, MotionError, PageMotion, held
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from lab_web.motion import Limits
-    from lab_web.playback import Playback
-    from lab_web.robot import Baxter
-    from lab_web.steering import Steering
+    from lab_web.motion import PageJointLimits
+    from lab_web.playback import RecordingPlayback
+    from lab_web.robot import BaxterTopics
+    from lab_web.steering import SteeredMotion
 
 #: Period of commands to the robot while it moves [s].
 TICK_S = 0.01
@@ -36,14 +36,15 @@ class RobotError(Exception):
     """The robot cannot do that; the text says why."""
 
 
-class Lab:
+class PageLab:
     """All pages share one. Operations come from any thread; ``changed()`` is called after the control has changed,
     ``told(client, code, text)`` tells one page (None: all) something, ``rested(client)`` that its motion is over.
 
     A motion is a stream, which follows a slider, or what one click has begun: a page may be silent for longer then.
     """
 
-    def __init__(self, robot: Baxter, changed: Callable[[], object], told: Callable[[int | None, str, str], object],
+    def __init__(self, robot: BaxterTopics, changed: Callable[[], object],
+                 told: Callable[[int | None, str, str], object],
                  silence_s: float = SILENCE_S, clock: Callable[[], float] = time.monotonic,
                  rested: Callable[[int | None], object] = lambda client: None) -> None:
         self._robot = robot
@@ -53,9 +54,9 @@ class Lab:
         self._clock = clock
         self._lock = threading.Lock()
         self._control = Control(silence_s)
-        self._motion: Motion | Playback | Steering = Motion({})
+        self._motion: PageMotion | RecordingPlayback | SteeredMotion = PageMotion({})
         self._is_stream = True
-        self._standstill = Standstill()
+        self._standstill = JointStandstill()
         # Of the last step of the motion.
         self._setpoints = {}
         self._moving = threading.Event()
@@ -225,9 +226,10 @@ class Lab:
             raise MotionError("there is no pose %r; there are %s" % (name, ", ".join(self._robot.poses)))
         self._aim(client, targets, is_stream=False)
 
-    def start(self, client: int, make: Callable[[dict[str, Limits], dict[str, float]], Motion | Playback | Steering],
+    def start(self, client: int, make: Callable[[dict[str, PageJointLimits], dict[str, float]],
+                                                PageMotion | RecordingPlayback | SteeredMotion],
               is_stream: bool = False) -> None:
-        """Move by ``make(limits, measured)``, which has what Motion has, in place of what is under way. Raises
+        """Move by ``make(limits, measured)``, which has what PageMotion has, in place of what is under way. Raises
         NotInControl, MotionError.
         """
         with self._lock:
@@ -235,13 +237,13 @@ class Lab:
             self._replace(make(self._robot.limits, self._measured()))
             self._begin(is_stream)
 
-    def let_go(self, client: int, motion: Motion | Playback | Steering) -> None:
+    def let_go(self, client: int, motion: PageMotion | RecordingPlayback | SteeredMotion) -> None:
         """End ``motion`` where it is that of this page."""
         with self._lock:
             if self._control.holder == client and self._motion is motion:
                 motion.stop()
 
-    def _replace(self, motion: Motion | Playback | Steering) -> None:
+    def _replace(self, motion: PageMotion | RecordingPlayback | SteeredMotion) -> None:
         if motion is not self._motion:
             self._motion.stop()
             self._setpoints = {}
@@ -249,7 +251,7 @@ class Lab:
 
     def _begin(self, is_stream: bool) -> None:
         if not (is_stream and self._moving.is_set()):
-            self._standstill = Standstill()
+            self._standstill = JointStandstill()
         self._is_stream = is_stream
         self._moving.set()
 
@@ -257,8 +259,8 @@ class Lab:
         with self._lock:
             self._require_ready(client, is_stream)
             motion = self._motion
-            if not isinstance(motion, Motion) or motion.limits != self._robot.limits:
-                motion = Motion(self._robot.limits)
+            if not isinstance(motion, PageMotion) or motion.limits != self._robot.limits:
+                motion = PageMotion(self._robot.limits)
                 self._replace(motion)
             motion.aim(targets, self._measured())
             self._begin(is_stream)
@@ -299,5 +301,5 @@ def _joints_of(operation: dict[str, Any]) -> dict[str, Any]:
     return targets
 
 
-_OPERATIONS = {"take": Lab._take, "release": Lab._release, "move": Lab._move, "go": Lab._go, "pose": Lab._pose,
-               "enable": Lab._enable, "disable": Lab._disable, "grip": Lab._grip}
+_OPERATIONS = {"take": PageLab._take, "release": PageLab._release, "move": PageLab._move, "go": PageLab._go,
+               "pose": PageLab._pose, "enable": PageLab._enable, "disable": PageLab._disable, "grip": PageLab._grip}

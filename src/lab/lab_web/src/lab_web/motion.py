@@ -35,7 +35,7 @@ STILL_RAD, STILL_S = 0.01, 1.5
 NEAR_RAD = 1e-4
 
 
-class Limits(NamedTuple):
+class PageJointLimits(NamedTuple):
     """Of one joint: ``lower``, ``upper`` [rad], ``velocity`` [rad/s]."""
 
     lower: float
@@ -43,12 +43,12 @@ class Limits(NamedTuple):
     velocity: float
 
 
-def limits_of(joints: Mapping[str, Joint], names: Iterable[str]) -> dict[str, Limits]:
-    """{name: Limits} of those ``names`` in ``joints`` {name: urdf_model.Joint} that have bounds and a speed; others
-    cannot be moved.
+def limits_of(joints: Mapping[str, Joint], names: Iterable[str]) -> dict[str, PageJointLimits]:
+    """{name: PageJointLimits} of those ``names`` in ``joints`` {name: urdf_model.Joint} that have bounds and a speed;
+    others cannot be moved.
     """
     limits = {name: joints[name].limit for name in names if name in joints}
-    return {name: Limits(limit.lower, limit.upper, limit.velocity) for name, limit in limits.items()
+    return {name: PageJointLimits(limit.lower, limit.upper, limit.velocity) for name, limit in limits.items()
             if limit is not None and limit.lower is not None and limit.upper is not None and limit.velocity}
 
 
@@ -64,7 +64,7 @@ def check_not_lost(setpoints: Mapping[str, float], measured: Mapping[str, float]
                               % (joint, measured[joint], position))
 
 
-class Standstill:
+class JointStandstill:
     """Notices a joint that does not follow its set-points."""
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class _Course:
         # A slow course after a fast one still brakes as quickly as the fast one would have.
         self.rate = max(speed, abs(self.velocity)) / RAMP_S
 
-    def step(self, dt: float, limits: Limits) -> bool:
+    def step(self, dt: float, limits: PageJointLimits) -> bool:
         """Advance by ``dt`` [s]; returns whether the target is reached."""
         rate = self.rate
         away = self.target - self.position
@@ -125,10 +125,10 @@ class _Course:
         return False
 
 
-class Motion:
-    """``limits`` {joint: Limits}. Not safe for threads."""
+class PageMotion:
+    """``limits`` {joint: PageJointLimits}. Not safe for threads."""
 
-    def __init__(self, limits: Mapping[str, Limits]) -> None:
+    def __init__(self, limits: Mapping[str, PageJointLimits]) -> None:
         self.limits = dict(limits)
         self._courses = {}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plans of a move_group for :class:`lab_web.planning.Planning`, in rospy."""
+"""Plans of a move_group for :class:`lab_web.planning.PagePlanning`, in rospy."""
 from __future__ import annotations
 
 import threading
@@ -13,7 +13,7 @@ from moveit_msgs.msg import Constraints, JointConstraint, MoveGroupAction, MoveG
 
 from baxter_model import SIDES, joint_names
 from lab_web.motion import SPEED_SHARE
-from lab_web.planning import Plan, PlanFailed
+from lab_web.planning import PagePlan, PlanFailed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,15 +34,15 @@ _CODES = {value: name.lower() for name, value in vars(MoveItErrorCodes).items()
           if name.isupper() and isinstance(value, int)}
 
 
-class MoveGroup:
+class MoveGroupPlanner:
     """One goal at a time."""
 
     def __init__(self) -> None:
         self._client: actionlib.SimpleActionClient | None = None
         self._cancelled = threading.Event()
 
-    def plan(self, targets: Mapping[str, float]) -> Plan:
-        """The Plan to ``targets`` {joint: [rad]} of the arms. Waits. Raises PlanFailed."""
+    def plan(self, targets: Mapping[str, float]) -> PagePlan:
+        """The PagePlan to ``targets`` {joint: [rad]} of the arms. Waits. Raises PlanFailed."""
         self._cancelled.clear()
         goal = goal_of(targets)
         client = self._client = self._client or actionlib.SimpleActionClient(ACTION, MoveGroupAction)
@@ -91,8 +91,8 @@ def goal_of(targets: Mapping[str, float]) -> MoveGroupGoal:
     return goal
 
 
-def plan_of(state: int, result: MoveGroupResult | None, text: str) -> Plan:
-    """The Plan in a result of the action. Raises PlanFailed."""
+def plan_of(state: int, result: MoveGroupResult | None, text: str) -> PagePlan:
+    """The PagePlan in a result of the action. Raises PlanFailed."""
     code = result.error_code.val if result is not None else MoveItErrorCodes.FAILURE
     if result is None or state != GoalStatus.SUCCEEDED or code != MoveItErrorCodes.SUCCESS:
         name = _CODES.get(code, "failure")
@@ -102,5 +102,5 @@ def plan_of(state: int, result: MoveGroupResult | None, text: str) -> Plan:
     if len(points) < 2:
         raise PlanFailed("already_there", "the arms are there")
     velocities = [point.velocities for point in points]
-    return Plan(list(trajectory.joint_names), [point.time_from_start.to_sec() for point in points],
-                [point.positions for point in points], velocities if all(velocities) else None)
+    return PagePlan(list(trajectory.joint_names), [point.time_from_start.to_sec() for point in points],
+                    [point.positions for point in points], velocities if all(velocities) else None)

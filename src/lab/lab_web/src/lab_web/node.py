@@ -30,26 +30,26 @@ from lab_web.buttons import Buttons
 from lab_web.certificate import CertificateError, certificate
 from lab_web.comparison import Comparison, findings_of
 from lab_web.episodes import Episodes, of_workspace
-from lab_web.exercises import Results
-from lab_web.hands import Hands, ghost
-from lab_web.lab import Lab
+from lab_web.exercises import ExerciseResults
+from lab_web.hands import HandAnswers, ghost
+from lab_web.lab import PageLab
 from lab_web.libraries import LibrariesError, fetched, kept_in
 from lab_web.loops import attended
-from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
-from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
-from lab_web.overlay import Overlay
+from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroupPlanner
+from lab_web.notebooks import PATH, NotebookDoor, NotebookHandler, Notebooks, labs_notebooks
+from lab_web.overlay import PageOverlay
 from lab_web.overlay_topics import OverlayTopics
-from lab_web.planning import Planning
-from lab_web.playback import Recorder, play
+from lab_web.planning import PagePlanning
+from lab_web.playback import MotionRecorder, play
 from lab_web.release_guard import ReleaseGuard
-from lab_web.robot import ARM_LINKS, Baxter
-from lab_web.robot_parts import SCREEN_TOPIC, Parts
+from lab_web.robot import ARM_LINKS, BaxterTopics
+from lab_web.robot_parts import SCREEN_TOPIC, PartPublishers
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, episode_routes, routes, upload_routes
 from lab_web.servos import Servos
 from lab_web.sim_clock import LINGER_S, SimClock
-from lab_web.simulation import Simulation
-from lab_web.steering import Steering
+from lab_web.simulation import SimulationControls
+from lab_web.steering import SteeredMotion
 from lab_web.steering import operation as steer_operation
 from lab_web.task_queue import TaskQueue
 from lab_web.tokens import TOKEN, VIEW_TOKEN
@@ -75,7 +75,7 @@ from world_picture.snapshot import SnapshotError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from baxter_conformance.comparison import Finding
+    from baxter_conformance.comparison import ConformanceFinding
 
 FIRST_PORT = 8090
 _LARGEST_PORT = 65535
@@ -94,7 +94,7 @@ _SNAPSHOT = "/gazebo/snapshot"
 _COMPRESSED = "sensor_msgs/CompressedImage"
 
 
-class Failure(Exception):
+class PageFailure(Exception):
     """The page cannot be served; the text says why, and what helps."""
 
 
@@ -111,7 +111,7 @@ def main() -> int:
             return 0
         page = Path(rospkg.RosPack().get_path("lab_web")) / "page"
         serve(options, page, fetched(page))
-    except (Failure, LibrariesError) as error:
+    except (PageFailure, LibrariesError) as error:
         print("lab_web: %s" % error, flush=True)
         return 2
     return 0
@@ -158,15 +158,15 @@ def _below(text: str) -> str:
 
 def _require_lab() -> None:
     if not rosgraph.is_master_online():
-        raise Failure("no lab runs at %s. Start one in another terminal: "
-                      "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch" % rosgraph.get_master_uri())
+        raise PageFailure("no lab runs at %s. Start one in another terminal: "
+                          "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch" % rosgraph.get_master_uri())
 
 
 def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
-    """Serve until the node or the lab ends. Raises Failure."""
+    """Serve until the node or the lab ends. Raises PageFailure."""
     tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
     if tokens[0] == tokens[1]:
-        raise Failure("--token and --view-token are the same; pages that only watch need another one")
+        raise PageFailure("--token and --view-token are the same; pages that only watch need another one")
     port, network = _port(options), "" if options.public else "127.0.0.1"
     # Before the node, whose name ends the page that has the port.
     _require_free(port, network)
@@ -177,8 +177,8 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
     loop_thread = LoopThread("lab_web")
     forwarded = forwarded_address(os.environ, port)
     access = Access({tokens[0]: True, tokens[1]: False}, [forwarded] if forwarded else ())
-    robot = Baxter(lambda text: pages.tell(None, "refused", text))
-    pages = Pages(access, loop_thread, Lab(
+    robot = BaxterTopics(lambda text: pages.tell(None, "refused", text))
+    pages = Pages(access, loop_thread, PageLab(
         robot, lambda: pages.control_changed(), lambda client, code, text: pages.tell(client, code, text),
         rested=lambda client: pages.answer(client, {"op": "rested"})))
     faults = Faults(_Log())
@@ -255,7 +255,7 @@ def _workspace() -> Path:
 
 
 def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
-    """The Notebooks of the page, or None where it offers none. Raises Failure."""
+    """The Notebooks of the page, or None where it offers none. Raises PageFailure."""
     offered = not options.public if options.notebook is None else options.notebook
     if not offered or importlib.util.find_spec("jupyterlab") is None:
         return None
@@ -270,8 +270,8 @@ def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
             folders = {name: Path(packages.get_path(name)) / "notebooks" for name in packages.list()}
             files = labs_notebooks({name: path for name, path in folders.items() if path.is_dir()}, root)
     except OSError as error:
-        raise Failure("the notebooks cannot be put into %s: %s; name another folder by --notebook-root, or add "
-                      "--no-notebook" % (root, error.strerror)) from None
+        raise PageFailure("the notebooks cannot be put into %s: %s; name another folder by --notebook-root, or add "
+                          "--no-notebook" % (root, error.strerror)) from None
     if (workspace / "baxter.sh").is_file():
         # Cells and terminals find the check there.
         os.environ.setdefault("LAB_ROOT", str(workspace))
@@ -282,7 +282,7 @@ def _notebooks(options: argparse.Namespace, pages: Pages) -> Notebooks | None:
 
 
 def _notebook_routes(notebooks: Notebooks | None, access: Access) -> list[tuple[str, type, dict[str, Any]]]:
-    return [] if notebooks is None else [(PATH + ".*", NotebookHandler, {"door": Door(access, notebooks)})]
+    return [] if notebooks is None else [(PATH + ".*", NotebookHandler, {"door": NotebookDoor(access, notebooks)})]
 
 
 class _Log:
@@ -295,9 +295,9 @@ class _Log:
 class _Equipment(NamedTuple):
     """Services of pages beside the arms; ``loops``: {name: function of ``ends``}, for a thread each."""
 
-    hands: Hands
-    simulation: Simulation
-    recorder: Recorder
+    hands: HandAnswers
+    simulation: SimulationControls
+    recorder: MotionRecorder
     guard: ReleaseGuard
     overlay_topics: OverlayTopics
     servos: Servos
@@ -305,33 +305,33 @@ class _Equipment(NamedTuple):
     loops: dict[str, Callable[[Callable[[], bool]], object]]
 
 
-def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
+def _equip(pages: Pages, robot: BaxterTopics, faults: Faults) -> _Equipment:
     """Add the operations of all parts to the lab."""
     lab = pages.lab
-    hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
+    hands = HandAnswers(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
     lab.add("reach", hands.ask, needs_control=False)
     overlay_topics = OverlayTopics(lambda: hands.base(pages.picture))
-    overlay = Overlay(overlay_topics, pages.show, pages.answer, pages.tell)
+    overlay = PageOverlay(overlay_topics, pages.show, pages.answer, pages.tell)
     lab.add("watch", overlay.watch, needs_control=False, for_viewers=True)
     pages.when_closed = overlay.forget
-    parts = Parts()
+    parts = PartPublishers()
     tasks, switches, plans, comparisons, edits = (TaskQueue(pages.tell, faults) for _ in range(5))
     guard = ReleaseGuard()
     buttons = Buttons(parts.switch, switches, guard.pressed)
-    simulation = Simulation(tasks, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
-                            lambda state: pages.share("simulation", state))
+    simulation = SimulationControls(tasks, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
+                                    lambda state: pages.share("simulation", state))
     lab.when_lost(buttons.release_all)
-    planning = Planning(lab, robot, MoveGroup(), plans, pages.answer)
+    planning = PagePlanning(lab, robot, MoveGroupPlanner(), plans, pages.answer)
     lab.add("plan", planning.plan)
     # A page that is silent for a moment still gets its plan; to move, it must be there.
     lab.when_lost(planning.cancel, when_silent=False)
-    recorder = Recorder(lambda recording: pages.share("recording", recording))
+    recorder = MotionRecorder(lambda recording: pages.share("recording", recording))
     robot.heard = recorder.take
     lab.add("record", recorder.record, needs_control=False)
     lab.add("load", recorder.load, needs_control=False)
     lab.add("play", lambda client, _operation: play(lab, client, recorder))
     servos = Servos()
-    steering = Steering(lambda: servos.hands, lambda side: robot.explain(
+    steering = SteeredMotion(lambda: servos.hands, lambda side: robot.explain(
         side + "_s0", lambda why: pages.tell(lab.holder, "held", "the %s arm: %s" % (side, why))), hands.pose)
     lab.add("steer", steer_operation(lab, steering, lambda: servos.hands))
     lab.add("mark", servos.mark)
@@ -352,7 +352,7 @@ def _equip(pages: Pages, robot: Baxter, faults: Faults) -> _Equipment:
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
 
-def _findings() -> list[Finding]:
+def _findings() -> list[ConformanceFinding]:
     return findings_of(physical_robot(), lambda robot: read(robot, _MESSAGES_S), rosgraph.is_master_online, NO_ANSWER)
 
 
@@ -362,11 +362,11 @@ def _port(options: argparse.Namespace) -> int:
     try:
         return ports.free_port(range(FIRST_PORT, FIRST_PORT + 100))
     except OSError as error:
-        raise Failure(error.strerror) from None
+        raise PageFailure(error.strerror) from None
 
 
 def _require_free(port: int, network: str) -> None:
-    """Raises Failure where the port is taken."""
+    """Raises PageFailure where the port is taken."""
     try:
         for opened in netutil.bind_sockets(port, network):
             opened.close()
@@ -374,8 +374,8 @@ def _require_free(port: int, network: str) -> None:
         raise _no_port(port, error) from None
 
 
-def _no_port(port: int, error: OSError) -> Failure:
-    return Failure("port %d cannot be opened: %s; name another one by --port" % (port, error))
+def _no_port(port: int, error: OSError) -> PageFailure:
+    return PageFailure("port %d cannot be opened: %s; name another one by --port" % (port, error))
 
 
 def forwarded_address(variables: Mapping[str, str], port: int) -> str:
@@ -446,11 +446,11 @@ def _print_when_started(text: str) -> None:
         print(text, flush=True)
 
 
-def _watch(robot: Baxter, equipment: _Equipment, pages: Pages, is_needed: Callable[[], bool],
+def _watch(robot: BaxterTopics, equipment: _Equipment, pages: Pages, is_needed: Callable[[], bool],
            ends: Callable[[], bool]) -> None:
     """Look after what changes rarely, until the node or the lab ends; at once when somebody needs it (``is_needed``)
     after a time without."""
-    told, types, results = None, {}, Results(page_files.result_file())
+    told, types, results = None, {}, ExerciseResults(page_files.result_file())
     while not ends():
         if not rosgraph.is_master_online():
             print("The lab has ended, and the page with it.", flush=True)
@@ -480,7 +480,7 @@ def _watch(robot: Baxter, equipment: _Equipment, pages: Pages, is_needed: Callab
             pages.present.wait(_UNSEEN_S)
 
 
-def _described(robot: Baxter, equipment: _Equipment, published: Mapping[str, str]) -> dict[str, Any]:
+def _described(robot: BaxterTopics, equipment: _Equipment, published: Mapping[str, str]) -> dict[str, Any]:
     """Description of the robot for pages: the operation "robot". ``published``: {topic: type}."""
     return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
                        for name, limits in robot.limits.items()],
@@ -488,7 +488,7 @@ def _described(robot: Baxter, equipment: _Equipment, published: Mapping[str, str
             "grippers": robot.grippers,
             "cameras": sorted(topic for topic, kind in published.items() if kind == _COMPRESSED),
             "can_plan": published.get(RESULT_TOPIC) == RESULT_TYPE,
-            "can_press": Parts.can_press(), "has_screen": SCREEN_TOPIC in published,
+            "can_press": PartPublishers.can_press(), "has_screen": SCREEN_TOPIC in published,
             "has_scene": isinstance(rospy.get_param(_SNAPSHOT, None), str), "things": equipment.simulation.things}
 
 

@@ -17,7 +17,7 @@ from urllib.parse import unquote, urlencode
 
 from lab_web import jupyter
 from web_bridge import http_text
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.passing import PassingHandler
 from web_bridge.websocket import token_of
 
@@ -116,7 +116,7 @@ class Notebooks:
         self._changed({"state": state, "why": why, "number": number, "files": self._files})
 
 
-class Door:
+class NotebookDoor:
     """Access control of the notebooks. ``access``: web_bridge.access.Access."""
 
     def __init__(self, access: Access, notebooks: Notebooks) -> None:
@@ -131,7 +131,7 @@ class Door:
         if token:
             try:
                 return "" if self._access.may_act(token) else "this address only watches; notebooks run any code"
-            except Refused as error:
+            except RequestForbidden as error:
                 return str(error)
         known = hmac.compare_digest(cookie.encode("utf-8", "surrogateescape"), self.secret.encode())
         return "" if known else "Open the notebook on the lab's page, whose address ./baxter.sh web has printed."
@@ -142,7 +142,7 @@ class NotebookHandler(PassingHandler):
 
     SERVER = "JupyterLab"
 
-    def initialize(self, door: Door) -> None:
+    def initialize(self, door: NotebookDoor) -> None:
         super().initialize()
         self._door = door
         self.OWN_COOKIE = door.cookie

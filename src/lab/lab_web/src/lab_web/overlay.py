@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FRAMES_S, CLOUD_S = 0.2, 0.2
 
 
-class Overlay:
+class PageOverlay:
     """``show(client, data)`` sends bytes, ``answer(client, operation)`` an operation, ``told(client, code, text)`` an
     error to a page.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The graph of :class:`lab_web.overlay.Overlay`, in rospy."""
+"""The graph of :class:`lab_web.overlay.PageOverlay`, in rospy."""
 from __future__ import annotations
 
 import re

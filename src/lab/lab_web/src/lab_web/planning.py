@@ -11,17 +11,17 @@ import numpy as np
 from joint_trajectory.segment import CUBIC, LINEAR, splines
 from lab_web.control import NotInControl
 from lab_web.lab import RobotError
-from lab_web.motion import Motion, MotionError
-from lab_web.playback import Playback, Tape
+from lab_web.motion import MotionError, PageMotion
+from lab_web.playback import RecordingPlayback, Tape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from typing import Any
 
-    from lab_web.lab import Lab
-    from lab_web.motion import Limits
-    from lab_web.move_group import MoveGroup
-    from lab_web.robot import Baxter
+    from lab_web.lab import PageLab
+    from lab_web.motion import PageJointLimits
+    from lab_web.move_group import MoveGroupPlanner
+    from lab_web.robot import BaxterTopics
     from lab_web.task_queue import TaskQueue
 
 #: A plan is played from samples so far apart [s].
@@ -38,7 +38,7 @@ class PlanFailed(Exception):
         self.code = code
 
 
-class Plan(NamedTuple):
+class PagePlan(NamedTuple):
     """``names`` of k joints; m points: ``times_s`` (m,) [s], ``positions`` (m, k) [rad], ``velocities`` (m, k) [rad/s]
     or None.
     """
@@ -49,7 +49,7 @@ class Plan(NamedTuple):
     velocities: list | None
 
 
-def tape_of(plan: Plan) -> Tape:
+def tape_of(plan: PagePlan) -> Tape:
     """The plan as a recording, sampled. Raises PlanFailed where it is none."""
     try:
         times_s, positions = np.array(plan.times_s, float), np.array(plan.positions, float)
@@ -71,13 +71,13 @@ def tape_of(plan: Plan) -> Tape:
                 [dict(zip(plan.names, row, strict=True)) for row in rows.tolist()])
 
 
-class Planning:
-    """``planner``: ``plan(targets)`` waits for a Plan to ``targets`` {joint: [rad]}, and raises PlanFailed;
+class PagePlanning:
+    """``planner``: ``plan(targets)`` waits for a PagePlan to ``targets`` {joint: [rad]}, and raises PlanFailed;
     ``cancel()`` ends that, from any thread. ``tasks``: :class:`lab_web.task_queue.TaskQueue` for this alone;
     ``answer(client, operation)``.
     """
 
-    def __init__(self, lab: Lab, robot: Baxter, planner: MoveGroup, tasks: TaskQueue,
+    def __init__(self, lab: PageLab, robot: BaxterTopics, planner: MoveGroupPlanner, tasks: TaskQueue,
                  answer: Callable[[int, dict[str, Any]], object]) -> None:
         self._lab = lab
         self._robot = robot
@@ -98,7 +98,7 @@ class Planning:
             raise RobotError("a plan needs \"joints\", an object of joints and angles, or the \"name\" of a pose: %s"
                              % ", ".join(self._robot.poses))
         # What no motion could do is refused before anything is planned.
-        Motion(self._robot.limits).aim(targets, self._robot.measured())
+        PageMotion(self._robot.limits).aim(targets, self._robot.measured())
         self.cancel()
         self._wanted = wanted = object()
         self._tasks.add(client, self._plan_and_go, client, dict(targets), wanted)
@@ -127,15 +127,15 @@ class Planning:
             if wanted is self._wanted:
                 self._wanted = None
 
-    def _played(self, wanted: object, limits: Mapping[str, Limits], tape: Tape,
-                measured: Mapping[str, float]) -> Playback:
+    def _played(self, wanted: object, limits: Mapping[str, PageJointLimits], tape: Tape,
+                measured: Mapping[str, float]) -> RecordingPlayback:
         # Here the lab lets nobody stop it: what was stopped before does not move now.
         if wanted is not self._wanted:
             raise PlanFailed("preempted", "the planning was stopped")
         for name, angle in tape.rows[0].items():
             if name not in measured or abs(measured[name] - angle) > START_RAD:
                 raise MotionError("%s is not where the plan begins, at %.2f rad; plan again" % (name, angle))
-        return Playback(limits, tape, measured)
+        return RecordingPlayback(limits, tape, measured)
 
     def _tell(self, client: int, why: str, text: str = "", **values: Any) -> None:
         self._answer(client, {"op": "plan", "why": why, "text": text, **values})

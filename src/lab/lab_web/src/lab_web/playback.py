@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 from baxter_examples.recording import COLUMNS, BadRecording, Recording, parse, write_row
 from lab_web.lab import RobotError
-from lab_web.motion import LEAD_RAD, Motion, MotionError, check_not_lost
+from lab_web.motion import LEAD_RAD, MotionError, PageMotion, check_not_lost
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from typing import Any
 
-    from lab_web.lab import Lab
-    from lab_web.motion import Limits
+    from lab_web.lab import PageLab
+    from lab_web.motion import PageJointLimits
 
 #: The longest recording [s].
 LONGEST_S = 600.0
@@ -36,7 +36,7 @@ class Tape(Recording):
                          for values in [[(row[name], time_s) for time_s, row in zip(times_s, rows, strict=True)]]}
 
 
-class Recorder:
+class MotionRecorder:
     """One recording for all pages; for any thread. ``changed({"running", "seconds"})``: seconds [s] of what is kept,
     None where there is nothing.
     """
@@ -123,13 +123,13 @@ def recording_of(content: bytes) -> Tape:
     return Tape(found.names, found.times_s, found.rows)
 
 
-class Playback:
+class RecordingPlayback:
     """First to the recording's start, slowly, then as recorded; slower where a joint would exceed its speed limit.
 
-    Used as a :class:`lab_web.motion.Motion`; values of grippers come out as they are.
+    Used as a :class:`lab_web.motion.PageMotion`; values of grippers come out as they are.
     """
 
-    def __init__(self, limits: Mapping[str, Limits], recording: Tape, measured: Mapping[str, float]) -> None:
+    def __init__(self, limits: Mapping[str, PageJointLimits], recording: Tape, measured: Mapping[str, float]) -> None:
         """Raises MotionError for a recording that leaves the limits."""
         self.limits = dict(limits)
         self._recording = recording
@@ -142,7 +142,7 @@ class Playback:
                                       % (joint, value, time_s, lower, upper))
         self._time_s = recording.times_s[0]
         self._now = self._at(self._time_s)
-        self._approach = Motion(limits)
+        self._approach = PageMotion(limits)
         self._approach.aim({joint: self._now[joint] for joint in self._joints}, measured)
         self.is_moving = True
 
@@ -183,9 +183,9 @@ class Playback:
         return values
 
 
-def play(lab: Lab, client: int, recorder: Recorder) -> None:
-    """Play the recording for a page of a :class:`lab_web.lab.Lab`. Raises RobotError, MotionError, NotInControl."""
+def play(lab: PageLab, client: int, recorder: MotionRecorder) -> None:
+    """Play the recording for a page of a :class:`lab_web.lab.PageLab`. Raises RobotError, MotionError, NotInControl."""
     recording = recorder.recording
     if recording is None:
         raise RobotError("there is no recording; record one, or load a file of joint_recorder")
-    lab.start(client, lambda limits, measured: Playback(limits, recording, measured))
+    lab.start(client, lambda limits, measured: RecordingPlayback(limits, recording, measured))

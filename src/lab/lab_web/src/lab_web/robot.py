@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter for :class:`lab_web.lab.Lab`, in rospy."""
+"""Baxter for :class:`lab_web.lab.PageLab`, in rospy."""
 from __future__ import annotations
 
 import json
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 #: Poses that both arms can go to from each other on a straight line between joint angles.
 SAFE_POSES = ("neutral", "untucked")
-#: Base and tip of the arms, for :class:`lab_web.hands.Hands`.
+#: Base and tip of the arms, for :class:`lab_web.hands.HandAnswers`.
 ARM_LINKS = {side: (BASE_FRAME, tip_of(side)) for side in SIDES}
 _ACTIONS = {"open": ("go", {"position": EndEffectorState.POSITION_OPEN}),
             "close": ("go", {"position": EndEffectorState.POSITION_CLOSED}), "calibrate": ("calibrate", {})}
@@ -46,7 +46,7 @@ _SENDER = "lab_web"
 GRIPPER_STEP_PERCENT = 1.0
 
 
-class Baxter:
+class BaxterTopics:
     """Advertises at once, subscribes with :meth:`listen`; what is not known yet is empty. ``told(text)``: an error of a
     switch."""
 

@@ -27,7 +27,7 @@ _SONARS = (1 << 12) - 1
 _LARGEST_ANALOG = 65535
 
 
-class Parts:
+class PartPublishers:
     """Publishers of all parts; what they show, pages read from the robot's topics."""
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class Parts:
         self._screen = rospy.Publisher("/robot/xdisplay", Image, queue_size=1, latch=True)
 
     def operations(self) -> dict[str, Callable[[int, dict[str, Any]], None]]:
-        """{operation: method} of those that need no power, for :meth:`lab_web.lab.Lab.add`."""
+        """{operation: method} of those that need no power, for :meth:`lab_web.lab.PageLab.add`."""
         return {"output": self.output, "sonars": self.sonars, "screen": self.screen}
 
     @staticmethod

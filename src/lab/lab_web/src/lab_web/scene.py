@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
     from os import PathLike
 
-    from sensor_renderer.mirror import Body, Mirror
+    from sensor_renderer.mirror import DrawnModel, Mirror
 
 # How far the triangles that a browser gets may be from the mesh [m].
 _WITHIN_M = 0.003
@@ -27,15 +27,15 @@ _WITHIN_M = 0.003
 _REST = 1e-4
 
 
-class Picture:
+class SceneText:
     """One scene. ``text``: JSON with ``revision``, ``light``, ``bodies`` [{name, links: [[{shape, colour}]], joints:
     their number, names: of each link and of the joint that moves it}];
     ``shapes``: {name: bytes of float32, three rows x y z nx ny nz [m] for each triangle}; names belong to contents;
-    ``bodies``: {name: sensor_renderer.mirror.Body} in the scene's order.
+    ``bodies``: {name: sensor_renderer.mirror.DrawnModel} in the scene's order.
     """
 
     def __init__(self, revision: int, text: str, shapes: dict[str, bytes],
-                 bodies: dict[str, Body] | None = None) -> None:
+                 bodies: dict[str, DrawnModel] | None = None) -> None:
         self.revision = revision
         self.text = text
         self.shapes = shapes
@@ -49,8 +49,8 @@ class SceneFollower(WorldFollower):
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         super().__init__(folder, warn)
         self._shown = np.empty((0, 3, 4))  # poses that follow() told of
-        #: The newest :class:`Picture`, or None.
-        self.picture: Picture | None = None
+        #: The newest :class:`SceneText`, or None.
+        self.picture: SceneText | None = None
 
     def follow(self) -> bool:
         """Read the newest state. Returns whether there is anything new to see. Raises SnapshotError."""
@@ -74,8 +74,8 @@ class SceneFollower(WorldFollower):
         return np.concatenate([np.empty((0, 3, 4)), *(body.matrices[:, :3, :] for body in self.mirror.bodies.values())])
 
 
-def picture_of(mirror: Mirror, revision: int) -> Picture:
-    """The Picture of all bodies; equal triangles are one shape, floors are left out."""
+def picture_of(mirror: Mirror, revision: int) -> SceneText:
+    """The SceneText of all bodies; equal triangles are one shape, floors are left out."""
     names, shapes, bodies = {}, {}, []
     for name, body in mirror.bodies.items():
         links = []
@@ -94,11 +94,11 @@ def picture_of(mirror: Mirror, revision: int) -> Picture:
         parts = [[link, joint] for link, joint in zip(body.link_names, ["", *body.joint_names], strict=True)]
         bodies.append({"name": name, "links": links, "joints": len(body.joint_names), "names": parts})
     light = {key: [float(value) for value in getattr(mirror.light, key)] for key in ("ambient", "to_sun", "sun")}
-    return Picture(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
-                   dict(mirror.bodies))
+    return SceneText(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
+                     dict(mirror.bodies))
 
 
-def bodies_of(picture: Picture | None, joints: Collection[str]) -> dict[str, bool]:
+def bodies_of(picture: SceneText | None, joints: Collection[str]) -> dict[str, bool]:
     """{name of a body of ``picture`` (or of None) that is more than a floor: whether it has one of the ``joints``}."""
     return {name: not set(joints).isdisjoint(body.joint_names)
             for name, body in (picture.bodies.items() if picture else ())

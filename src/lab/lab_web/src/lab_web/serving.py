@@ -18,7 +18,7 @@ from demonstrations.frames import DemonstrationError
 from lab_web.control import HEARTBEAT_S, PAGE_HANGS_S
 from lab_web.motion import MotionError
 from lab_web.playback import recording_of, text_of
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.websocket import BufferedSocket, token_of
 
 if TYPE_CHECKING:
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from lab_web import scene
     from lab_web.episodes import Episodes
-    from lab_web.lab import Lab
-    from lab_web.playback import Recorder
+    from lab_web.lab import PageLab
+    from lab_web.playback import MotionRecorder
     from web_bridge.access import Access
     from web_bridge.loop_thread import LoopThread
     from web_bridge.outgoing import OutgoingBuffer
@@ -57,14 +57,14 @@ def policy(page_text: str = "") -> str:
 
 
 class Pages:
-    """The connected pages of a Lab. ``access``: web_bridge.access.Access."""
+    """The connected pages of a PageLab. ``access``: web_bridge.access.Access."""
 
-    def __init__(self, access: Access, loop_thread: LoopThread, lab: Lab) -> None:
+    def __init__(self, access: Access, loop_thread: LoopThread, lab: PageLab) -> None:
         self.access = access
         self.loop_thread = loop_thread
         self.lab = lab
-        #: The scene of now (:class:`lab_web.scene.Picture`) and its newest poses, or None.
-        self.picture: scene.Picture | None = None
+        #: The scene of now (:class:`lab_web.scene.SceneText`) and its newest poses, or None.
+        self.picture: scene.SceneText | None = None
         self.poses: bytes | None = None
         #: Called with the number of a page that has gone, in the loop; does not wait.
         self.when_closed: Callable[[int], object] = lambda number: None
@@ -117,7 +117,7 @@ class Pages:
         self._shared[name] = operation
         self.loop_thread.soon(self._send_all, operation)
 
-    def show_poses(self, picture: scene.Picture, poses: bytes) -> None:
+    def show_poses(self, picture: scene.SceneText, poses: bytes) -> None:
         """New poses of the scene ``picture``."""
         self.picture, self.poses = picture, poses
         for socket in list(self._sockets.values()):
@@ -162,7 +162,7 @@ class _WithToken(web.RequestHandler):
     def prepare(self) -> None:
         try:
             self.pages.access.may_act(token_of(self.request))
-        except Refused:
+        except RequestForbidden:
             self.set_status(403)
             self.finish("This address needs the token that ./baxter.sh web printed: …/?token=…\n")
 
@@ -184,7 +184,7 @@ class Index(_WithToken):
         self.finish(self._text)
 
 
-class Scene(_WithToken):
+class SceneHandler(_WithToken):
     """Which shapes there are, as JSON."""
 
     def get(self) -> None:
@@ -195,7 +195,7 @@ class Scene(_WithToken):
         self.finish(self.pages.picture.text)
 
 
-class Shape(_WithToken):
+class ShapeHandler(_WithToken):
     """The triangles of one shape of the scene."""
 
     def get(self, name: str) -> None:
@@ -227,7 +227,7 @@ class Upload(_WithToken):
         try:
             self.pages.access.check_origin(self.request.headers.get("Origin"), self.request.host)
             may_act = self.pages.access.may_act(token_of(self.request))
-        except Refused as error:
+        except RequestForbidden as error:
             self.set_status(403)
             self.finish(str(error) + "\n")
             return
@@ -333,7 +333,7 @@ class Files(web.StaticFileHandler):
 
 
 class PageSocket(BufferedSocket):
-    """One page: operations of :class:`lab_web.lab.Lab` and heartbeats come in; control, robot and poses go out."""
+    """One page: operations of :class:`lab_web.lab.PageLab` and heartbeats come in; control, robot and poses go out."""
 
     #: Its outgoing frames, once it is open.
     out: OutgoingBuffer
@@ -385,8 +385,8 @@ class PageSocket(BufferedSocket):
         self._pages.lab.gone(self.number)
 
 
-def upload_routes(pages: Pages, recorder: Recorder) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:
-    """The routes of files to and from pages; ``recorder``: :class:`lab_web.playback.Recorder`."""
+def upload_routes(pages: Pages, recorder: MotionRecorder) -> list[tuple[str, type[web.RequestHandler], dict[str, Any]]]:
+    """The routes of files to and from pages; ``recorder``: :class:`lab_web.playback.MotionRecorder`."""
     def text():
         recording = recorder.recording
         return None if recording is None else text_of(recording)
@@ -405,6 +405,6 @@ def routes(pages: Pages, page: Path, libraries: Path) -> list[tuple[str, type[we
     """The routes of the page; ``page``: the folder of its files, ``libraries``: of node_modules [pathlib.Path]."""
     text = (page / "index.html").read_text(encoding="utf-8")
     return [(r"/", Index, {"pages": pages, "text": text}), (r"/lab", PageSocket, {"pages": pages}),
-            (r"/scene", Scene, {"pages": pages}), (r"/scene/([0-9a-f]{24})", Shape, {"pages": pages}),
+            (r"/scene", SceneHandler, {"pages": pages}), (r"/scene/([0-9a-f]{24})", ShapeHandler, {"pages": pages}),
             (r"/page/(.*)", Files, {"path": str(page)}),
             (r"/three/(.*)", Files, {"path": str(libraries / "three")})]

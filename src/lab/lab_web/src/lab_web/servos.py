@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The servos of Baxter's arms for :class:`lab_web.steering.Steering`, in rospy."""
+"""The servos of Baxter's arms for :class:`lab_web.steering.SteeredMotion`, in rospy."""
 import rospy
 from std_msgs.msg import String
 

@@ -30,7 +30,7 @@ _SERVICES = {"pause": "pause_physics", "go_on": "unpause_physics", "reset": "res
 _NOT_OFFERED = ("ground_plane", "sun")
 
 
-class Simulation:
+class SimulationControls:
     """``tasks``: :class:`lab_web.task_queue.TaskQueue`; ``bodies()``: {name: whether it is a robot}; ``answer(client,
     operation)``; ``changed({"paused": ...})``.
     """
@@ -49,7 +49,7 @@ class Simulation:
                              if path.parent.name not in _NOT_OFFERED)
 
     def operations(self) -> dict[str, Callable[[int, dict[str, Any]], None]]:
-        """{operation: method}, for :meth:`lab_web.lab.Lab.add`."""
+        """{operation: method}, for :meth:`lab_web.lab.PageLab.add`."""
         return {"simulation": self.simulation, "spawn": self.spawn, "delete": self.delete, "grab": self.grab,
                 "put": self.put}
 

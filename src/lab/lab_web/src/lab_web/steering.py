@@ -6,6 +6,8 @@
 - ``speeds``: what 1 means [m/s, rad/s]
 - ``reason``: why it holds the arm back, or ""
 """
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
@@ -13,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from arm_kinematics import KinematicsError, pose_from_quaternion
-from lab_web.lab import Lab, RobotError
+from lab_web.lab import PageLab, RobotError
 from urdf_model.transforms import quaternion_from_matrix
 
 #: How long a page's word holds of what is held [s]: twice as long as one that draws without a graphics card is silent.
@@ -25,7 +27,7 @@ _START = "roslaunch moveit_servo baxter_servo.launch"
 _LED_RATE, _LEAP_M, _LEAP_RAD = 6.0, 0.15, 0.7
 
 
-class Servo(Protocol):
+class ServoControls(Protocol):
     """The controls of one arm's servo."""
 
     reason: str
@@ -79,17 +81,17 @@ class _Way:
         return np.concatenate([part / max(1.0, float(np.linalg.norm(part))) for part in shares])
 
 
-class Steering:
-    """A motion of the lab (as lab_web.motion.Motion) that has no set-points of its own: servos make them.
+class SteeredMotion:
+    """A motion of the lab (as lab_web.motion.PageMotion) that has no set-points of its own: servos make them.
 
-    ``servos()``: {side: Servo}; ``explain(side)`` is called once for each arm that does not follow its servo;
+    ``servos()``: {side: ServoControls}; ``explain(side)`` is called once for each arm that does not follow its servo;
     ``pose(side, measured)``: (4, 4) of a hand in the base, or None.
     """
 
     #: Joints that the lab itself holds when the motion ends; none, since the servos bring them to rest.
     limits: Mapping[str, Any] = {}
 
-    def __init__(self, servos: Callable[[], Mapping[str, Servo]], explain: Callable[[str], None],
+    def __init__(self, servos: Callable[[], Mapping[str, ServoControls]], explain: Callable[[str], None],
                  pose: Callable[[str, Mapping[str, float]], np.ndarray | None]) -> None:
         self._servos, self._explain, self._pose = servos, explain, pose
         self._led: dict[str, Led] = {}
@@ -102,7 +104,7 @@ class Steering:
     def is_moving(self) -> bool:
         return bool(self._twists or self._led)
 
-    def aim(self, twists: dict[str, np.ndarray], in_tool: bool, led: dict[str, Led] | None = None) -> "Steering":
+    def aim(self, twists: dict[str, np.ndarray], in_tool: bool, led: dict[str, Led] | None = None) -> SteeredMotion:
         """Go on with ``twists`` {side: (6,)}, and with hands that are ``led``, until the next ones, for FRESH_S at
         most."""
         servos, led = self._servos(), led or {}
@@ -136,14 +138,15 @@ class Steering:
             self._ask_why(servos[side], side)
         return {}
 
-    def _ask_why(self, servo: Servo, side: str) -> None:
+    def _ask_why(self, servo: ServoControls, side: str) -> None:
         if _STUCK in servo.reason and side not in self._explained:
             self._explained.add(side)
             self._explain(side)
 
 
-def operation(lab: Lab, steering: Steering, servos: Callable[[], Mapping[str, Servo]]) -> Callable[[int, dict], None]:
-    """Return ``serve`` of the operation "steer" for :meth:`lab_web.lab.Lab.add`: ``hands`` {side: six numbers} that
+def operation(lab: PageLab, steering: SteeredMotion,
+              servos: Callable[[], Mapping[str, ServoControls]]) -> Callable[[int, dict], None]:
+    """Return ``serve`` of the operation "steer" for :meth:`lab_web.lab.PageLab.add`: ``hands`` {side: six numbers} that
     something holds now, ``tool``: in the axes of each hand itself; ``led`` {side: {number, shift (3), turn (x, y, z,
     w)}}: hands that follow a device, and its motion since it was gripped. Raises RobotError, NotInControl.
     """

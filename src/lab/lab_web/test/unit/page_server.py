@@ -16,13 +16,13 @@ from tornado import web, websocket
 from lab_testing.waiting import wait_until
 from lab_web.buttons import Buttons
 from lab_web.episodes import Episodes
-from lab_web.hands import Hands, ghost
-from lab_web.lab import Lab
-from lab_web.motion import Limits
-from lab_web.playback import Recorder, play
+from lab_web.hands import HandAnswers, ghost
+from lab_web.lab import PageLab
+from lab_web.motion import PageJointLimits
+from lab_web.playback import MotionRecorder, play
 from lab_web.scene import SceneFollower
 from lab_web.serving import Pages, episode_routes, routes, upload_routes
-from lab_web.steering import Steering
+from lab_web.steering import SteeredMotion
 from lab_web.steering import operation as steer_operation
 from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
@@ -42,7 +42,7 @@ class Robot:
 
     def __init__(self):
         self.positions = lab_arms.posture()
-        self.limits = dict.fromkeys(JOINTS, Limits(-LIMIT_RAD, LIMIT_RAD, VELOCITY))
+        self.limits = dict.fromkeys(JOINTS, PageJointLimits(-LIMIT_RAD, LIMIT_RAD, VELOCITY))
         self.poses = {"neutral": dict(self.positions)}
         self.enabled, self.stopped = False, False
         self.switched, self.gripped = [], []
@@ -174,18 +174,18 @@ class Server:
         self._ended = threading.Event()
         self._sockets = set()
         self.loop = LoopThread()
-        self.lab = Lab(self.robot, lambda: self.pages.control_changed(), lambda *told: self.pages.tell(*told),
-                       rested=lambda client: self.pages.answer(client, {"op": "rested"}))
+        self.lab = PageLab(self.robot, lambda: self.pages.control_changed(), lambda *told: self.pages.tell(*told),
+                           rested=lambda client: self.pages.answer(client, {"op": "rested"}))
         self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop, self.lab)
-        hands = Hands(self.robot.measured, lambda chain, joints: ghost(self.pages.picture, chain, joints),
-                      self.pages.answer)
+        hands = HandAnswers(self.robot.measured, lambda chain, joints: ghost(self.pages.picture, chain, joints),
+                            self.pages.answer)
         description = parse_urdf(URDF, source="robot")
         hands.know(description, {side: ("base", side + "_gripper") for side in SIDES}, pytest.fail)
         tasks = TaskQueue(self.pages.tell, Faults(SimpleNamespace(error=pytest.fail)))
         buttons = Buttons(self.robot.switch, tasks)
         self.lab.when_lost(buttons.release_all)
         self.servos = {side: Servo() for side in SIDES}
-        steering = Steering(lambda: self.servos, lambda side: None, hands.pose)
+        steering = SteeredMotion(lambda: self.servos, lambda side: None, hands.pose)
         self.lab.add("steer", steer_operation(self.lab, steering, lambda: self.servos))
         self.marks = []
         self.lab.add("mark", lambda client, asked: self.marks.append(asked["mark"]))
@@ -193,7 +193,7 @@ class Server:
         self.episodes = Episodes(folder / "episodes", self.episode_recorder.start, self.marks.append, tasks,
                                  lambda state: self.pages.share("episodes", state))
         self.lab.add("episodes", self.episodes.ask, needs_control=False)
-        recorder = Recorder(lambda state: self.pages.share("recording", state))
+        recorder = MotionRecorder(lambda state: self.pages.share("recording", state))
         self.shown, self.planned, self.notebook_asks, self.watched, self.compared = [], [], [], {}, []
         self.lab.add("watch", self.watched.__setitem__, needs_control=False, for_viewers=True)
         for name, serve in {"press": buttons.press, "turn": buttons.turn,

@@ -2,15 +2,15 @@
 """Pages ask how much of a physical robot's interface is here."""
 import pytest
 
-from baxter_conformance.comparison import Finding, Seen, Verdict, compare, scores, totals
+from baxter_conformance.comparison import ConformanceFinding, SeenInterface, Verdict, compare, scores, totals
 from baxter_model.interface import physical_robot
 from lab_web.comparison import Comparison, findings_of, shown_of
 from lab_web.lab import RobotError
 
-FINDINGS = [Finding("/robot", "/robot/state", Verdict.MET, True),
-            Finding("/robot", "/robot/x", Verdict.MISSING, True, "nobody"),
-            Finding("services", "/s", Verdict.OTHER, True, "type a"),
-            Finding("services", "/own", Verdict.MISSING, False, "n")]
+FINDINGS = [ConformanceFinding("/robot", "/robot/state", Verdict.MET, True),
+            ConformanceFinding("/robot", "/robot/x", Verdict.MISSING, True, "nobody"),
+            ConformanceFinding("services", "/s", Verdict.OTHER, True, "type a"),
+            ConformanceFinding("services", "/own", Verdict.MISSING, False, "n")]
 
 
 class TaskQueue:
@@ -62,13 +62,13 @@ def test_a_comparison_that_failed_can_be_tried_again(tasks):
 
 def test_findings_are_those_of_the_command():
     robot = physical_robot()
-    found = findings_of(robot, lambda _: Seen(), lambda: True, OSError)
-    assert found == compare(robot, Seen()) and totals(found, True)[0] == 0 and len(scores(found)) > 5
+    found = findings_of(robot, lambda _: SeenInterface(), lambda: True, OSError)
+    assert found == compare(robot, SeenInterface()) and totals(found, True)[0] == 0 and len(scores(found)) > 5
 
 
 def test_a_master_that_ends_is_no_finding():
     def refused(_robot):
         raise ConnectionRefusedError("refused")
-    for read, is_there, why in ((refused, True, "refused"), (lambda _: Seen(), False, "not reachable")):
+    for read, is_there, why in ((refused, True, "refused"), (lambda _: SeenInterface(), False, "not reachable")):
         with pytest.raises(RobotError, match="nothing was compared.*" + why):
             findings_of(physical_robot(), read, lambda there=is_there: there, OSError)

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from lab_web.exercises import Results, shown_of
+from lab_web.exercises import ExerciseResults, shown_of
 
 RESULT = {
     "lab": "lab2", "exercise": "rotate_gripper", "program": "rotate.py", "seed": 1, "graded": True, "not_graded": None,
@@ -17,7 +17,7 @@ RESULT = {
 def test_a_result_is_shown_once_it_is_new(tmp_path):
     path = tmp_path / "exercise.json"
     path.write_text(json.dumps(RESULT))
-    results = Results(path)
+    results = ExerciseResults(path)
     assert results.newest() is None
     draft = tmp_path / "draft"
     draft.write_text(json.dumps(RESULT))

@@ -10,7 +10,7 @@ import pytest
 
 from arm_kinematics import Reason
 from lab_testing.waiting import wait_until
-from lab_web.hands import Hands, ghost
+from lab_web.hands import HandAnswers, ghost
 from lab_web.scene import SceneFollower
 from urdf_model import parse_urdf
 from world_picture.snapshot import SnapshotWriter
@@ -32,7 +32,7 @@ def turned(angle):
 
 @pytest.fixture
 def hands():
-    made = Hands(lambda: dict(START), lambda chain, joints: sorted(joints), None)
+    made = HandAnswers(lambda: dict(START), lambda chain, joints: sorted(joints), None)
     made.know(parse_urdf(ARM, source="arm"), {"left": ("base", "tip")}, pytest.fail)
     return made
 
@@ -93,14 +93,14 @@ def test_a_hand_that_is_not_there_is_told(hands, side):
 
 
 def test_before_the_joints_are_known_the_answer_says_which(hands):
-    unknown = Hands(dict, None, None)
+    unknown = HandAnswers(dict, None, None)
     unknown.know(parse_urdf(ARM, source="arm"), {"left": ("base", "tip")}, pytest.fail)
     assert "no value for j1, j2, j3" in unknown.reached("left", {})["text"]
 
 
 def test_an_arm_that_the_robot_lacks_is_left_out_with_a_warning():
     warned = []
-    made = Hands(dict, None, None)
+    made = HandAnswers(dict, None, None)
     made.know(parse_urdf(ARM, source="arm"), {"left": ("base", "tip"), "right": ("base", "tail")}, warned.append)
     assert made.sides == ["left"] and "right" in warned[0] and "tail" in warned[0]
 
@@ -117,7 +117,7 @@ def test_each_page_gets_the_answer_to_its_newest_question():
         asked.set()
         assert going.wait(60.0)
         return dict(START)
-    made = Hands(measured, lambda chain, joints: None, lambda *answer: answers.append(answer))
+    made = HandAnswers(measured, lambda chain, joints: None, lambda *answer: answers.append(answer))
     made.know(parse_urdf(ARM, source="arm"), {"left": ("base", "tip")}, pytest.fail)
     ended = threading.Event()
     thread = threading.Thread(target=made.run, args=(ended.is_set,))

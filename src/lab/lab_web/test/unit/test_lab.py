@@ -3,11 +3,11 @@
 import pytest
 
 from lab_web.control import CONNECTION_SILENCE_S, HEARTBEAT_S, SILENCE_S
-from lab_web.lab import TICK_S, Lab, RobotError
-from lab_web.motion import LEAD_RAD, RAMP_S, SPEED_SHARE, Limits, Motion, MotionError, limits_of
+from lab_web.lab import TICK_S, PageLab, RobotError
+from lab_web.motion import LEAD_RAD, RAMP_S, SPEED_SHARE, MotionError, PageJointLimits, PageMotion, limits_of
 from urdf_model import parse_urdf
 
-LIMITS = {"left_s0": Limits(-1.7, 1.7, 1.5), "left_w2": Limits(-3.0, 3.0, 4.0)}
+LIMITS = {"left_s0": PageJointLimits(-1.7, 1.7, 1.5), "left_w2": PageJointLimits(-3.0, 3.0, 4.0)}
 START = {"left_s0": 0.2, "left_w2": -0.5}
 
 
@@ -60,8 +60,8 @@ class Hall:
         self.told, self.rested = [], []
         self.changes = 0
         self.robot = Robot()
-        self.lab = Lab(self.robot, self.change, lambda *told: self.told.append(told), clock=lambda: self.now_s,
-                       rested=self.rested.append)
+        self.lab = PageLab(self.robot, self.change, lambda *told: self.told.append(told), clock=lambda: self.now_s,
+                           rested=self.rested.append)
 
     def change(self):
         self.changes += 1
@@ -275,7 +275,7 @@ def test_a_request_that_cannot_be_served_is_answered_with_the_reason(hall, opera
 
 
 def test_joints_of_one_request_arrive_together_slower_than_their_limits_and_without_jumps():
-    motion = Motion(LIMITS)
+    motion = PageMotion(LIMITS)
     motion.aim({"left_s0": 1.2, "left_w2": 2.5}, START)
     seen, measured = [dict(START)], dict(START)
     while motion.is_moving:
@@ -293,7 +293,7 @@ def test_joints_of_one_request_arrive_together_slower_than_their_limits_and_with
 
 
 def test_a_target_that_changes_on_the_way_is_followed():
-    motion = Motion(LIMITS)
+    motion = PageMotion(LIMITS)
     motion.aim({"left_s0": 1.5}, START)
     measured = dict(START)
     for _ in range(100):
@@ -310,7 +310,7 @@ def test_a_target_that_changes_on_the_way_is_followed():
 @pytest.mark.parametrize("away", [0.0005, 0.01, -0.0005, -0.1, 0.0])
 @pytest.mark.parametrize("others", [{}, {"left_w2": 2.5}])
 def test_a_moving_joint_with_a_new_target_nearby_brakes_as_quickly_as_ever(away, others):
-    motion, measured = Motion(LIMITS), {"left_s0": -1.0, "left_w2": -0.5}
+    motion, measured = PageMotion(LIMITS), {"left_s0": -1.0, "left_w2": -0.5}
     motion.aim({"left_s0": 1.5}, measured)
     for _ in range(100):
         measured.update(motion.step(TICK_S, measured))
@@ -330,7 +330,7 @@ def test_a_moving_joint_with_a_new_target_nearby_brakes_as_quickly_as_ever(away,
 
 
 def test_the_set_point_waits_for_a_joint_that_is_held():
-    motion = Motion(LIMITS)
+    motion = PageMotion(LIMITS)
     motion.aim({"left_s0": 1.5}, START)
     for _ in range(500):
         setpoints = motion.step(TICK_S, START)
@@ -354,11 +354,11 @@ def test_joints_without_bounds_or_speed_cannot_be_moved():
     text = "".join('<link name="%s"/><joint name="%s" type="%s"><parent link="a"/><child link="%s"/>'
                    '<limit effort="1" %s/></joint>' % (name, name, kind, name, limit) for name, kind, limit in made)
     joints = parse_urdf('<robot name="r"><link name="a"/>%s</robot>' % text).joints
-    assert limits_of(joints, ["bounded", "endless", "slow", "absent"]) == {"bounded": Limits(-1.0, 1.0, 2.0)}
+    assert limits_of(joints, ["bounded", "endless", "slow", "absent"]) == {"bounded": PageJointLimits(-1.0, 1.0, 2.0)}
 
 
 def test_nothing_changes_where_one_target_of_several_is_wrong():
-    motion = Motion(LIMITS)
+    motion = PageMotion(LIMITS)
     with pytest.raises(MotionError):
         motion.aim({"left_s0": 1.0, "left_w2": 9.0}, START)
     assert not motion.is_moving

@@ -13,7 +13,7 @@ from tornado.websocket import WebSocketHandler
 
 from lab_testing.waiting import stretched, wait_until
 from lab_web.jupyter import JupyterError
-from lab_web.notebooks import Door, NotebookHandler, Notebooks, labs_notebooks
+from lab_web.notebooks import NotebookDoor, NotebookHandler, Notebooks, labs_notebooks
 from web_bridge.access import Access
 from web_bridge.loop_thread import LoopThread
 from web_bridge.serving import Serving
@@ -88,7 +88,7 @@ class House:
         self.loop, self.told, self.starts = LoopThread(), [], 0
         self._folder, self.jupyter = folder, None
         self.notebooks = Notebooks(self._start, ["a.ipynb"], self.told.append, "/anna")
-        self.door = Door(Access({"drive": True, "look": False}, names=[]), self.notebooks)
+        self.door = NotebookDoor(Access({"drive": True, "look": False}, names=[]), self.notebooks)
         self.serving = Serving(self.loop, web.Application([(r"/notebook/.*", NotebookHandler, {"door": self.door})]), 0,
                                "127.0.0.1")
         self.host = "127.0.0.1:%d" % self.serving.port

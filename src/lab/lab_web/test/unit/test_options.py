@@ -54,5 +54,5 @@ def test_a_taken_port_is_refused_before_the_node_ends_the_page_that_has_it(monke
     monkeypatch.setattr(node.rospy, "init_node", lambda *_, **__: pytest.fail("became a node"))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(node.Failure, match=str(port)):
+        with pytest.raises(node.PageFailure, match=str(port)):
             node.serve(node.parse(["--port", str(port)]), None, None)

@@ -6,7 +6,7 @@ from test_lab import Hall, move
 
 from lab_web.control import SILENCE_S
 from lab_web.lab import TICK_S
-from lab_web.steering import FRESH_S, Steering, operation
+from lab_web.steering import FRESH_S, SteeredMotion, operation
 
 UP = [0, 0, 1, 0, 0, 0]
 
@@ -32,7 +32,7 @@ class Steered(Hall):
         self.servos, self.explained = {side: Servo() for side in ("left", "right")}, []
         #: Of both hands.
         self.pose = np.eye(4)
-        self.steering = Steering(lambda: self.servos, self.explained.append, lambda side, measured: self.pose)
+        self.steering = SteeredMotion(lambda: self.servos, self.explained.append, lambda side, measured: self.pose)
         self.lab.add("steer", operation(self.lab, self.steering, lambda: self.servos))
         self.lab.serve(1, True, {"op": "take"})
 

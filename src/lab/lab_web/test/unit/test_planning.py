@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from lab_testing.waiting import wait_until
-from lab_web.lab import Lab
-from lab_web.motion import Limits
-from lab_web.planning import SAMPLE_S, Plan, PlanFailed, Planning, tape_of
+from lab_web.lab import PageLab
+from lab_web.motion import PageJointLimits
+from lab_web.planning import SAMPLE_S, PagePlan, PagePlanning, PlanFailed, tape_of
 from lab_web.task_queue import TaskQueue
 from loop_ros.faults import Faults
 
@@ -20,7 +20,7 @@ GOAL = {"left_s0": 0.4, "left_s1": 0.1}
 class Robot:
     def __init__(self):
         self.positions = dict(START)
-        self.limits = dict.fromkeys(START, Limits(-1.0, 1.0, 2.0))
+        self.limits = dict.fromkeys(START, PageJointLimits(-1.0, 1.0, 2.0))
         self.poses = {"neutral": dict(GOAL)}
         self.enabled = True
 
@@ -57,7 +57,7 @@ class Planner:
         names = list(targets)
         begin, end = ([row[name] for name in names] for row in (self._robot.positions, targets))
         middle = [value + 0.1 for value in begin]
-        return Plan(names, [0.0, 0.5, 1.0], [begin, middle, end], [[0.0] * len(names)] * 3)
+        return PagePlan(names, [0.0, 0.5, 1.0], [begin, middle, end], [[0.0] * len(names)] * 3)
 
     def cancel(self):
         self.error = PlanFailed("preempted", "the planning was stopped")
@@ -68,9 +68,10 @@ class Served:
     def __init__(self):
         self.robot, self.told, self.answers = Robot(), [], []
         self.planner = Planner(self.robot)
-        self.lab = Lab(self.robot, lambda: None, lambda *told: self.told.append(told), silence_s=60.0)
+        self.lab = PageLab(self.robot, lambda: None, lambda *told: self.told.append(told), silence_s=60.0)
         tasks = TaskQueue(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=pytest.fail)))
-        planning = Planning(self.lab, self.robot, self.planner, tasks, lambda _, answer: self.answers.append(answer))
+        planning = PagePlanning(self.lab, self.robot, self.planner, tasks, lambda _,
+                                answer: self.answers.append(answer))
         self.lab.add("plan", planning.plan)
         self.lab.when_lost(planning.cancel, when_silent=False)
         self._ended = threading.Event()
@@ -165,7 +166,7 @@ def test_an_arm_that_has_moved_since_is_not_sent_along_the_plan(served):
     served.planner.may_answer.clear()
     served.do("plan", joints=GOAL)
     assert served.planner.began.wait(60.0)
-    plan = Plan(["left_s0"], [0.0, 1.0], [[0.3], [0.4]], None)
+    plan = PagePlan(["left_s0"], [0.0, 1.0], [[0.3], [0.4]], None)
     served.planner.plan = lambda _: plan
     served.planner.may_answer.set()
     wait_until(lambda: len(served.answers) == 2, "the first plan")
@@ -175,18 +176,19 @@ def test_an_arm_that_has_moved_since_is_not_sent_along_the_plan(served):
 
 
 def test_a_plan_is_sampled_as_controllers_interpolate_it():
-    tape = tape_of(Plan(["a"], [1.0, 2.0], [[0.0], [1.0]], [[0.0], [0.0]]))
+    tape = tape_of(PagePlan(["a"], [1.0, 2.0], [[0.0], [1.0]], [[0.0], [0.0]]))
     assert tape.times_s[0] == 0.0 and tape.duration_s == 1.0 and max(np.diff(tape.times_s)) <= SAMPLE_S + 1e-9
     assert tape.at(0.5)["a"] == pytest.approx(0.5)
     assert tape.at(0.26)["a"] == pytest.approx(0.26 ** 2 * (3 - 0.52), abs=1e-3)
-    assert tape_of(Plan(["a"], [0.0, 1.0], [[0.0], [1.0]], None)).at(0.26)["a"] == pytest.approx(0.26)
+    assert tape_of(PagePlan(["a"], [0.0, 1.0], [[0.0], [1.0]], None)).at(0.26)["a"] == pytest.approx(0.26)
 
 
 @pytest.mark.parametrize("plan", [
-    Plan(["a"], [], [], None), Plan(["a"], [0.0], [[0.0]], None), Plan(["a"], [0.0, 0.0], [[0.0], [1.0]], None),
-    Plan(["a", "b"], [0.0, 1.0], [[0.0], [1.0]], None), Plan(["a"], [0.0, 1.0], [[0.0], [float("nan")]], None),
-    Plan(["a"], [0.0, 1.0], [[0.0], [1.0, 2.0]], None),
-    Plan(["a"], [0.0, 1.0], [[0.0], [1.0]], [[0.0, 1.0], [0.0, 1.0]])])
+    PagePlan(["a"], [], [], None), PagePlan(["a"], [0.0], [[0.0]], None),
+    PagePlan(["a"], [0.0, 0.0], [[0.0], [1.0]], None),
+    PagePlan(["a", "b"], [0.0, 1.0], [[0.0], [1.0]], None), PagePlan(["a"], [0.0, 1.0], [[0.0], [float("nan")]], None),
+    PagePlan(["a"], [0.0, 1.0], [[0.0], [1.0, 2.0]], None),
+    PagePlan(["a"], [0.0, 1.0], [[0.0], [1.0]], [[0.0, 1.0], [0.0, 1.0]])])
 def test_what_is_no_plan_is_refused(plan):
     with pytest.raises(PlanFailed) as failed:
         tape_of(plan)

@@ -4,10 +4,10 @@ import pytest
 
 from baxter_examples.recording import COLUMNS
 from lab_web.lab import TICK_S, RobotError
-from lab_web.motion import LEAD_RAD, SPEED_SHARE, Limits, MotionError
-from lab_web.playback import LONGEST_S, Playback, Recorder, recording_of, text_of
+from lab_web.motion import LEAD_RAD, SPEED_SHARE, MotionError, PageJointLimits
+from lab_web.playback import LONGEST_S, MotionRecorder, RecordingPlayback, recording_of, text_of
 
-LIMITS = {"left_s0": Limits(-1.7, 1.7, 1.5), "left_s1": Limits(-2.0, 1.0, 1.5)}
+LIMITS = {"left_s0": PageJointLimits(-1.7, 1.7, 1.5), "left_s1": PageJointLimits(-2.0, 1.0, 1.5)}
 WAY = b"time,left_s0,left_s1,left_gripper\n0,0.5,0,100\n1,1.0,0.2,100\n2,0.5,0,0\n"
 
 
@@ -24,7 +24,7 @@ def played(playback, measured, seconds=60.0):
 
 def test_a_recording_begins_at_zero_and_its_file_is_joint_recorders():
     told = []
-    recorder = Recorder(told.append)
+    recorder = MotionRecorder(told.append)
     recorder.take(1.0, {"left_s0": 9.0})
     recorder.record(1, {"on": True})
     for number in range(3):
@@ -40,7 +40,7 @@ def test_a_recording_begins_at_zero_and_its_file_is_joint_recorders():
 
 
 def test_a_reset_simulation_begins_the_recording_again():
-    recorder = Recorder(lambda state: None)
+    recorder = MotionRecorder(lambda state: None)
     recorder.record(1, {"on": True})
     for time_s in (5.0, 6.0, 0.5, 1.0):
         recorder.take(time_s, {})
@@ -50,7 +50,7 @@ def test_a_reset_simulation_begins_the_recording_again():
 
 def test_a_recording_that_nobody_ends_ends():
     told = []
-    recorder = Recorder(told.append)
+    recorder = MotionRecorder(told.append)
     recorder.record(1, {"on": True})
     for time_s in (0.0, LONGEST_S / 2.0, LONGEST_S + 1.0, LONGEST_S + 2.0):
         recorder.take(time_s, {})
@@ -60,18 +60,18 @@ def test_a_recording_that_nobody_ends_ends():
 @pytest.mark.parametrize("operation", [{"on": False}, {}])
 def test_nothing_to_end_is_told(operation):
     with pytest.raises(RobotError, match="nothing is being recorded"):
-        Recorder(lambda state: None).record(1, operation)
+        MotionRecorder(lambda state: None).record(1, operation)
 
 
 @pytest.mark.parametrize("content", [None, "time,left_s0", {"rows": []}])
 def test_only_an_upload_loads_a_recording(content):
     with pytest.raises(RobotError, match="upload"):
-        Recorder(lambda state: None).load(1, {"content": content})
+        MotionRecorder(lambda state: None).load(1, {"content": content})
 
 
 def test_the_arms_go_to_the_start_slowly_and_then_as_recorded():
     measured = {"left_s0": -1.0, "left_s1": 0.9}
-    seen = played(Playback(LIMITS, recording_of(WAY), measured), measured)
+    seen = played(RecordingPlayback(LIMITS, recording_of(WAY), measured), measured)
     start = next(number for number, setpoints in enumerate(seen) if "left_gripper" in setpoints)
     assert start * TICK_S > 1.5 / (SPEED_SHARE * 1.5) * 0.9
     assert (len(seen) - start) * TICK_S == pytest.approx(2.0, abs=0.05)
@@ -82,14 +82,14 @@ def test_the_arms_go_to_the_start_slowly_and_then_as_recorded():
 
 def test_a_recording_that_is_too_fast_is_played_at_the_speed_limit():
     measured = {"left_s0": -1.5}
-    seen = played(Playback(LIMITS, recording_of(b"time,left_s0\n0,-1.5\n0.1,1.5\n"), measured), measured)
+    seen = played(RecordingPlayback(LIMITS, recording_of(b"time,left_s0\n0,-1.5\n0.1,1.5\n"), measured), measured)
     steps = [abs(after["left_s0"] - before["left_s0"]) for before, after in zip(seen, seen[1:], strict=False)]
     assert max(steps) <= 1.5 * TICK_S * 1.001 and seen[-1]["left_s0"] == 1.5
 
 
 def test_an_arm_that_is_held_is_waited_for():
     measured = {"left_s0": 0.5, "left_s1": 0.0}
-    playback = Playback(LIMITS, recording_of(WAY), measured)
+    playback = RecordingPlayback(LIMITS, recording_of(WAY), measured)
     for _ in range(1000):
         setpoints = playback.step(TICK_S, measured)
     assert playback.is_moving and LEAD_RAD < setpoints["left_s0"] - 0.5 < LEAD_RAD + 0.03
@@ -104,10 +104,10 @@ def test_an_arm_that_is_held_is_waited_for():
     (b"time,left_s0\n0,nan\n", "finite"), (b"", "first line"), (b"\xff", "decode")])
 def test_what_cannot_be_played_is_refused_with_the_reason(content, said):
     with pytest.raises(MotionError, match=said):
-        Playback(LIMITS, recording_of(content), {"left_s0": 0.0})
+        RecordingPlayback(LIMITS, recording_of(content), {"left_s0": 0.0})
 
 
 def test_noise_at_a_limit_is_clamped():
     measured = {"left_s0": 1.7}
-    seen = played(Playback(LIMITS, recording_of(b"time,left_s0\n0,1.705\n1,1.71\n"), measured), measured)
+    seen = played(RecordingPlayback(LIMITS, recording_of(b"time,left_s0\n0,1.705\n1,1.71\n"), measured), measured)
     assert {setpoints["left_s0"] for setpoints in seen} == {1.7}

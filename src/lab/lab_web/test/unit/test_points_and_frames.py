@@ -9,7 +9,7 @@ import tf2_ros
 
 from lab_web.clouds import MARK
 from lab_web.lab import RobotError
-from lab_web.overlay import CLOUD_S, Overlay
+from lab_web.overlay import CLOUD_S, PageOverlay
 from lab_web.overlay_topics import OverlayTopics
 
 
@@ -45,8 +45,9 @@ class Graph:
 @pytest.fixture
 def scene():
     made = SimpleNamespace(graph=Graph(), shown=[], answers=[], told=[], now=0.0)
-    made.overlay = Overlay(made.graph, lambda *what: made.shown.append(what), lambda *what: made.answers.append(what),
-                           lambda *what: made.told.append(what), lambda: made.now)
+    made.overlay = PageOverlay(made.graph, lambda *what: made.shown.append(what),
+                               lambda *what: made.answers.append(what),
+                               lambda *what: made.told.append(what), lambda: made.now)
     return made
 
 

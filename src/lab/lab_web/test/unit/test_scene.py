@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab_web.scene import SceneFollower, picture_of
-from sensor_renderer.mirror import Level, Part
+from sensor_renderer.mirror import DetailLevel, DrawnPart
 from world_picture.snapshot import SnapshotError, SnapshotWriter
 
 BOX = """<robot name="box"><link name="box"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
@@ -77,10 +77,11 @@ def test_a_new_body_makes_a_new_picture(writer):
 
 def test_parts_have_the_coarsest_triangles_that_are_near_the_original():
     plain, near, finest = (np.full((3 * count, 6), count, np.float32) for count in (1, 4, 9))
-    levels = tuple(Level(error_m, lambda rows=rows: rows, lambda rows=rows: np.zeros((len(rows), 2)))
+    levels = tuple(DetailLevel(error_m, lambda rows=rows: rows, lambda rows=rows: np.zeros((len(rows), 2)))
                    for error_m, rows in ((0.001, finest), (0.0025, near), (0.01, plain)))
-    part = Part("shape", plain, (1.0, 0.0, 0.0, 1.0), levels=levels)
-    body = SimpleNamespace(parts=[[part, Part("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[], link_names=["a"])
+    part = DrawnPart("shape", plain, (1.0, 0.0, 0.0, 1.0), levels=levels)
+    body = SimpleNamespace(parts=[[part, DrawnPart("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[],
+                           link_names=["a"])
     light = SimpleNamespace(ambient=[0.5], to_sun=[0.0, 0.0, 1.0], sun=[0.5])
     picture = picture_of(SimpleNamespace(bodies={"a": body}, light=light), 1)
     (first, second), = json.loads(picture.text)["bodies"][0]["links"]

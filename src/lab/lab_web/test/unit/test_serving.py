@@ -11,8 +11,8 @@ import websocket
 from tornado import web
 
 from lab_testing.waiting import stretched, wait_until
-from lab_web.playback import Recorder
-from lab_web.scene import Picture
+from lab_web.playback import MotionRecorder
+from lab_web.scene import SceneText
 from lab_web.serving import Pages, policy, routes, upload_routes
 from web_bridge.access import Access
 from web_bridge.loop_thread import LoopThread
@@ -46,7 +46,7 @@ class Server:
         (libraries / "three" / "LICENSE").write_text("MIT")
         self.loop = LoopThread()
         self.pages = Pages(Access({"drive": True, "look": False}, names=[]), self.loop, FakeLab())
-        self.recorder = Recorder(lambda state: None)
+        self.recorder = MotionRecorder(lambda state: None)
         self.serving = Serving(self.loop, web.Application(
             [*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, self.recorder)]), 0, "127.0.0.1")
 
@@ -83,7 +83,7 @@ def until(socket, condition):
 
 @pytest.mark.parametrize("path", ["/", "/?token=wrong", "/scene", "/scene/" + SHAPE, "/lab"])
 def test_nothing_of_the_lab_is_served_without_the_token(server, path):
-    server.pages.picture = Picture(1, "{}", {SHAPE: b"abc"})
+    server.pages.picture = SceneText(1, "{}", {SHAPE: b"abc"})
     with pytest.raises(urllib.error.HTTPError) as refused:
         server.get(path)
     assert refused.value.code == 403
@@ -108,7 +108,7 @@ def test_files_outside_of_the_page_are_not_served(server):
 def test_shapes_and_poses(server):
     with pytest.raises(urllib.error.HTTPError, match="404"):
         server.get("/scene?token=look")
-    picture = Picture(3, '{"revision": 3}', {SHAPE: b"abcd"})
+    picture = SceneText(3, '{"revision": 3}', {SHAPE: b"abcd"})
     server.pages.show_poses(picture, b"first")
     assert json.loads(server.get("/scene?token=look")[1]) == {"revision": 3}
     assert server.get("/scene/%s?token=look" % SHAPE)[1] == b"abcd"

@@ -19,6 +19,6 @@ def test_a_master_that_has_gone_is_named(monkeypatch):
         raise ConnectionRefusedError(errno.ECONNREFUSED, os.strerror(errno.ECONNREFUSED))
 
     monkeypatch.setattr(simulation, "call", refuse)
-    asked = simulation.Simulation(TaskQueue(), dict, None, None)
+    asked = simulation.SimulationControls(TaskQueue(), dict, None, None)
     with pytest.raises(RobotError, match="the ROS master does not answer .*: start the lab again"):
         asked._do("step")

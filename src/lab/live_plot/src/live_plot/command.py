@@ -14,7 +14,7 @@ import rospy
 
 from command_line.options import counted, seconds
 from live_plot import fields
-from live_plot.recording import Recording
+from live_plot.recording import PlotRecording
 from live_plot.subscriptions import Subscriptions, topic_types
 from rospy_nodes.start import limit_ports
 
@@ -74,9 +74,9 @@ def save_picture(options: argparse.Namespace) -> None:
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
     import pyqtgraph
 
-    from live_plot.graph import Graph
+    from live_plot.graph import PlotGraph
 
-    recording = Recording()
+    recording = PlotRecording()
     problems: list[str] = []
     subscriptions = Subscriptions(recording, problems.append)
     paths = [path for argument in options.topics for path in fields.expand(argument)]
@@ -92,7 +92,7 @@ def save_picture(options: argparse.Namespace) -> None:
     wait_for(lambda: False, time.monotonic() + options.seconds)
 
     application = pyqtgraph.mkQApp()
-    graph = Graph()
+    graph = PlotGraph()
     graph.resize(1000, 600)
     graph.show()
     graph.draw(recording)
@@ -124,7 +124,7 @@ def show_window(options: argparse.Namespace) -> None:
     from live_plot.window import PlotWindow
 
     application = pyqtgraph.mkQApp("plot")
-    recording = Recording()
+    recording = PlotRecording()
     subscriptions = Subscriptions(recording, lambda text: window.problem.emit(text))
     window = PlotWindow(
         recording, lambda path: subscriptions.open(path, topic_types()), subscriptions.close, options.span)

@@ -28,7 +28,7 @@ class UnknownTopic(PlotError):
 
 
 @dataclass(frozen=True)
-class Curve:
+class FieldCurve:
     """One number of a topic's messages. steps: (field, index or None) from the message inwards."""
 
     label: str
@@ -76,7 +76,7 @@ def split(path: str, topics: Iterable[str]) -> tuple[str, list[str]]:
     raise UnknownTopic("no topic begins '%s' so far; %s" % (path, hint))
 
 
-def curves(topic: str, tokens: Sequence[str], type_name: str, fields_of: Callable[..., Any]) -> list[Curve]:
+def curves(topic: str, tokens: Sequence[str], type_name: str, fields_of: Callable[..., Any]) -> list[FieldCurve]:
     """Return the Curves for field tokens in messages of a type; a message means all its numbers.
 
     Raises PlotError, which lists the existing fields. fields_of: function from the name of a message type to {field:
@@ -95,13 +95,13 @@ def curves(topic: str, tokens: Sequence[str], type_name: str, fields_of: Callabl
         here = _element(label, fields[name], None if index is None else int(index))
         steps += ((name, None if index is None else int(index)),)
     if here in NUMBERS:
-        return [Curve(label, steps)]
+        return [FieldCurve(label, steps)]
     fields = _fields(here, fields_of)
     numbers = [name for name, kind in fields.items() if kind in NUMBERS]
     if not numbers:
         what = "it has %s" % _listing(fields) if fields else "only numbers can be plotted"
         raise PlotError("%s (%s) is not a number; %s" % (label, here, what))
-    return [Curve("%s/%s" % (label, name), (*steps, (name, None))) for name in numbers]
+    return [FieldCurve("%s/%s" % (label, name), (*steps, (name, None))) for name in numbers]
 
 
 def _fields(type_name: str, fields_of: Callable[[Any], Any]) -> dict[str, str]:

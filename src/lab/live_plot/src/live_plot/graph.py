@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     import numpy as np
     from PyQt5.QtGui import QPen
 
-    from live_plot.recording import Recording
+    from live_plot.recording import PlotRecording
 
 # Distinguishable on white, also for colour-blind readers; the seventh curve uses the first colour again, dashed.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#333333")
 
 
-class Graph(pyqtgraph.PlotWidget):
+class PlotGraph(pyqtgraph.PlotWidget):
     """draw() shows a recording; with `span_s` its last seconds, otherwise all of it, or the range chosen by mouse."""
 
     def __init__(self) -> None:
@@ -29,8 +29,8 @@ class Graph(pyqtgraph.PlotWidget):
             self.getAxis(side).setTextPen("k")
         self._lines = {}
 
-    def draw(self, recording: Recording, span_s: float | None = None) -> None:
-        """Draw a Recording. span_s: time shown before the newest sample [s]; None keeps the view."""
+    def draw(self, recording: PlotRecording, span_s: float | None = None) -> None:
+        """Draw a PlotRecording. span_s: time shown before the newest sample [s]; None keeps the view."""
         samples, begin_s = recording.samples(span_s)
         self._match_lines(samples)
         end_s = begin_s

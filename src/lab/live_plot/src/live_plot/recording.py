@@ -34,7 +34,7 @@ class _Series:
         return self._data[:, max(0, self._end - self._capacity):self._end]
 
 
-class Recording:
+class PlotRecording:
     """Curves by label. Times are in s, on whatever clock the writer uses."""
 
     def __init__(self, capacity: int = CAPACITY) -> None:

@@ -12,7 +12,7 @@ import rospy
 from . import fields
 
 if TYPE_CHECKING:
-    from live_plot.recording import Recording
+    from live_plot.recording import PlotRecording
 
 
 def fields_of(type_name: str) -> dict[str, str]:
@@ -40,7 +40,7 @@ class Subscriptions:
     on_problem(text): called from another thread, once for each problem, if a message lacks the number.
     """
 
-    def __init__(self, recording: Recording, on_problem: Callable[[str], None]) -> None:
+    def __init__(self, recording: PlotRecording, on_problem: Callable[[str], None]) -> None:
         self._recording = recording
         self._on_problem = on_problem
         self._lock = threading.Lock()

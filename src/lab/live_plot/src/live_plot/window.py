@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from pyqtgraph.Qt import QtCore, QtWidgets
 
 from . import fields
-from .graph import Graph
+from .graph import PlotGraph
 
 if TYPE_CHECKING:
-    from live_plot.recording import Recording
+    from live_plot.recording import PlotRecording
 
 REDRAW_MS = 50
 # Drawing a whole long recording is slow, so it is drawn less often.
@@ -28,8 +28,8 @@ class PlotWindow(QtWidgets.QWidget):
     # May be emitted from any thread.
     problem = QtCore.Signal(str)  # pyright: ignore[reportAttributeAccessIssue]  (pyqtgraph's name for it)
 
-    def __init__(self, recording: Recording, subscribe: Callable[[str], list[str]], unsubscribe: Callable[[str], None],
-                 span_s: float) -> None:
+    def __init__(self, recording: PlotRecording, subscribe: Callable[[str], list[str]],
+                 unsubscribe: Callable[[str], None], span_s: float) -> None:
         super().__init__()
         self._recording, self._subscribe, self._unsubscribe = recording, subscribe, unsubscribe
         self._span_s = span_s
@@ -51,7 +51,7 @@ class PlotWindow(QtWidgets.QWidget):
         row = QtWidgets.QHBoxLayout()
         for item in (QtWidgets.QLabel("Topic"), self._entry, add, remove, self._autoscroll, self.pause, clear):
             row.addWidget(item)
-        self._graph = Graph()
+        self._graph = PlotGraph()
         self._status = QtWidgets.QLabel()
         self._status.setWordWrap(True)
         layout = QtWidgets.QVBoxLayout(self)

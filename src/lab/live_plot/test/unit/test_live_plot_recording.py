@@ -5,11 +5,11 @@ import threading
 import numpy as np
 import pytest
 
-from live_plot.recording import RESTART_STEP_S, Recording
+from live_plot.recording import RESTART_STEP_S, PlotRecording
 
 
 def recording_of(label, times, **arguments):
-    recording = Recording(**arguments)
+    recording = PlotRecording(**arguments)
     recording.add(label)
     for time_s in times:
         recording.append(label, time_s, 10.0 * time_s)

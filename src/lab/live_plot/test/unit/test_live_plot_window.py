@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from live_plot.fields import PlotError, UnknownTopic
-from live_plot.recording import Recording
+from live_plot.recording import PlotRecording
 
 os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
 pyqtgraph = pytest.importorskip("pyqtgraph", reason="./baxter.sh setup installs pyqtgraph")
@@ -22,7 +22,7 @@ def application():
 
 @pytest.fixture
 def recording():
-    recording = Recording()
+    recording = PlotRecording()
     times = np.linspace(100.0, 105.0, 200)
     for number in range(6):
         label = "/t/position[%d]" % number
@@ -48,9 +48,9 @@ def count(picture, colour):
 
 
 def test_every_curve_is_seen(application, recording):
-    from live_plot.graph import COLOURS, Graph
+    from live_plot.graph import COLOURS, PlotGraph
 
-    graph = Graph()
+    graph = PlotGraph()
     graph.resize(800, 500)
     empty = pixels(graph, application)
     graph.draw(recording)
@@ -65,9 +65,9 @@ def test_every_curve_is_seen(application, recording):
 
 
 def test_autoscroll_shows_the_last_seconds(application, recording):
-    from live_plot.graph import Graph
+    from live_plot.graph import PlotGraph
 
-    graph = Graph()
+    graph = PlotGraph()
     graph.draw(recording, span_s=2.0)
     assert graph.viewRange()[0] == pytest.approx([3.0, 5.0])
     graph.draw(recording, span_s=10.0)
@@ -75,9 +75,9 @@ def test_autoscroll_shows_the_last_seconds(application, recording):
 
 
 def test_curves_beyond_the_colours_differ_by_their_dashes(application):
-    from live_plot.graph import COLOURS, Graph
+    from live_plot.graph import COLOURS, PlotGraph
 
-    recording, graph = Recording(), Graph()
+    recording, graph = PlotRecording(), PlotGraph()
     for number in range(2 * len(COLOURS)):
         recording.add("/t/x%d" % number)
     graph.draw(recording)
@@ -103,7 +103,7 @@ class Topics:
 def window(application):
     from live_plot.window import PlotWindow
 
-    recording = Recording()
+    recording = PlotRecording()
     topics = Topics(recording)
     window = PlotWindow(recording, topics.subscribe, recording.remove, 10.0)
     window.topics, window.recording = topics, recording

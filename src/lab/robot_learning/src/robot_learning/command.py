@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from command_line.options import MAX_SEED, MAX_WORKERS, Parser, did_you_mean, number
-from demonstrations.collecting import Collected, Work, collect
+from demonstrations.collecting import Collected, CollectingWork, collect
 from demonstrations.environment import PROFILES, Conditions
 from demonstrations.experts import EXPERTS
 from demonstrations.frames import DemonstrationError
@@ -27,7 +27,7 @@ from .corrections import correct
 from .evaluation import Score, core_for, evaluate
 from .pictures import choose, draw_curve, film
 from .policy import PolicyError, load
-from .training import Curve, TrainingSettings, train
+from .training import LossCurve, TrainingSettings, train
 
 #: Seeds of demonstrations and of corrections begin here: those of the evaluation are below.
 FIRST_DEMONSTRATION, FIRST_CORRECTION, MAX_CORRECTIONS = 100_000, 10_000_000, 100_000
@@ -120,7 +120,8 @@ def _demonstrate(options: argparse.Namespace, source: Path) -> None:
     have = _tried(source, FIRST_DEMONSTRATION, FIRST_CORRECTION)
     if have < options.demonstrations:
         seeds = range(FIRST_DEMONSTRATION + have, FIRST_DEMONSTRATION + options.demonstrations)
-        _told(collect(options.task, source, seeds, NOISE, Work(options.workers, _say), conditions=_conditions(options)),
+        _told(collect(options.task, source, seeds, NOISE, CollectingWork(options.workers, _say),
+                      conditions=_conditions(options)),
               "demonstrations", options.task)
 
 
@@ -129,7 +130,7 @@ def _told(found: Collected, what: str, task: str) -> None:
          True)
 
 
-def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) -> Curve:
+def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) -> LossCurve:
     """Learn from all that is there, and write the policy."""
     data = DataSet(source)
     settings = TrainingSettings(chunk=options.chunk, steps=steps, seed=options.seed)

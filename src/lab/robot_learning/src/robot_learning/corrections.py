@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from demonstrations.collecting import RATE_HZ, Collected, Demonstrate, Work, collect
+from demonstrations.collecting import RATE_HZ, Collected, CollectingWork, Demonstrate, collect
 from demonstrations.environment import Conditions, record
 from demonstrations.frames import Episode
 from lab_batch import Spec
@@ -40,4 +40,4 @@ def correct(path: Path, folder: Path, seeds: Iterable[int], workers: int = 1,
     contract = load(path).contract
     spec = Spec("%s:%s" % (__name__, Correct.__name__), {
         "task": contract.task, "policy": str(Path(path).resolve()), "control_freq": contract.rate_hz})
-    return collect(contract.task, folder, seeds, work=Work(workers, say), spec=spec, conditions=conditions)
+    return collect(contract.task, folder, seeds, work=CollectingWork(workers, say), spec=spec, conditions=conditions)

@@ -14,7 +14,7 @@ from demonstrations.environment import Conditions, core_of
 from gym_baxter.core import Core
 from gym_baxter.names import action_names, robot_names
 from lab_batch import Job, Spec
-from lab_batch.processes import Limits, map_seeds
+from lab_batch.processes import BatchLimits, map_seeds
 
 from .policy import Acting, Contract, Runner, load
 
@@ -117,7 +117,7 @@ def evaluate(path: Path, seeds: Iterable[int], workers: int = 1,
     results: dict[int, dict[str, Any]] = {}
     errors: dict[int, str] = {}
     spec = Spec("%s:%s" % (__name__, Evaluate.__name__), {"policy": str(Path(path).resolve()), **choices})
-    for outcome in map_seeds(spec, seeds, Limits(min(workers, max(len(seeds), 1)), _EPISODE_S, None)):
+    for outcome in map_seeds(spec, seeds, BatchLimits(min(workers, max(len(seeds), 1)), _EPISODE_S, None)):
         if outcome.is_done:
             results[outcome.seed] = outcome.result
         else:

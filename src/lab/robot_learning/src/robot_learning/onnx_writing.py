@@ -36,7 +36,7 @@ _TWO, _THREE = 6, 9
 
 
 @dataclass
-class Graph:
+class OnnxGraph:
     """nodes: (operator, names of inputs, name of the output, whole attributes); tensors: constants by name."""
 
     nodes: list[tuple[str, tuple[str, ...], str, dict[str, int]]] = field(default_factory=list)
@@ -55,9 +55,9 @@ class Graph:
         return name
 
 
-def graph_of(policy: Policy) -> Graph:
+def graph_of(policy: Policy) -> OnnxGraph:
     """The graph that computes `Policy.chunks`."""
-    graph, taken, contract = Graph(), policy.inputs, policy.contract
+    graph, taken, contract = OnnxGraph(), policy.inputs, policy.contract
 
     def columns(index: Sequence[int]) -> str:
         return graph.add("Gather", OBSERVATION, np.array(index, np.int64), axis=1)
@@ -138,7 +138,7 @@ def _value(name: str, shape: Sequence[int]) -> bytes:
     return _message((1, name), (2, _message((1, _message((1, _FLOAT), (2, _message(*sizes)))))))
 
 
-def _nodes(graph: Graph) -> Iterator[bytes]:
+def _nodes(graph: OnnxGraph) -> Iterator[bytes]:
     for operator, inputs, output, attributes in graph.nodes:
         yield _message(*((1, name) for name in inputs), (2, output), (4, operator), *(
             (5, _message((1, name), (3, value), (20, _INT_ATTRIBUTE))) for name, value in attributes.items()))

@@ -14,7 +14,7 @@ from gym_baxter.core import Core
 
 from .evaluation import Score, play
 from .policy import Acting
-from .training import Curve
+from .training import LossCurve
 
 _SIZE, _LEFT, _TOP, _RIGHT, _BOTTOM = (720, 420), 70, 40, 20, 50
 _TRAINING, _VALIDATION, _GRID, _TEXT = (31, 119, 180), (214, 39, 40), (225, 225, 225), (40, 40, 40)
@@ -26,7 +26,7 @@ _LAST_S = 1.0
 _FRAME_PX = 4
 
 
-def draw_curve(curve: Curve, title: str, path: Path) -> None:
+def draw_curve(curve: LossCurve, title: str, path: Path) -> None:
     """Losses over steps, on a logarithmic scale, as PNG. Raises OSError."""
     picture = Image.new("RGB", _SIZE, "white")
     draw = ImageDraw.Draw(picture)

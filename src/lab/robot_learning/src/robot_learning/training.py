@@ -37,7 +37,7 @@ class TrainingSettings:
 
 
 @dataclass
-class Curve:
+class LossCurve:
     """Losses on the way: after `steps`, of the training's batches and of the episodes that only judge; `seconds`: of
     the whole training."""
 
@@ -88,7 +88,7 @@ def contract_of(data: DataSet, chunk: int, made: dict[str, Any] | None = None) -
 
 def train(data: DataSet, settings: TrainingSettings = TrainingSettings(), made: dict[str, Any] | None = None,  # noqa: B008 (frozen)
           progress: Callable[[int, float, float], None] = lambda step, training, validation: None
-          ) -> tuple[Policy, Curve]:
+          ) -> tuple[Policy, LossCurve]:
     """Learn from all successful episodes of a set. progress: called now and then with the step and both losses. The
     same set and settings give the same policy on one machine. Raises DemonstrationError."""
     random = np.random.default_rng(settings.seed)
@@ -115,7 +115,7 @@ def train(data: DataSet, settings: TrainingSettings = TrainingSettings(), made: 
     inputs, wanted, share = prepared(examples, seen)
     valid = prepared(judge, taken.of(judge.observations))
     network = Network.random((len(taken), *settings.hidden, wanted.shape[1]), random)
-    adam, curve, began, recent = Adam(network, settings.decay), Curve(), time.monotonic(), []
+    adam, curve, began, recent = Adam(network, settings.decay), LossCurve(), time.monotonic(), []
     for step in range(settings.steps):
         batch = random.integers(len(inputs), size=min(settings.batch, len(inputs)))
         loss, gradients = network.gradients(inputs[batch], wanted[batch], share[batch])

@@ -12,7 +12,7 @@ from sensor_msgs.msg import Joy
 
 from rospy_nodes.start import end_on_signals, limit_ports
 from steering_devices.hands import hands_of
-from steering_devices.steering import Gamepad, LayoutError, ParameterError, Steering, number
+from steering_devices.steering import DeviceParameterError, Gamepad, LayoutError, Steering, number
 
 _RATE_HZ = 50.0
 _DESCRIPTION = """Steer by a gamepad. Subscribes: joy. Publishes: twists to the servos, /steering/mark.
@@ -34,7 +34,7 @@ def main() -> None:
         sys.exit("servo_gamepad: ~layout: %s" % error)
     try:
         timeout = number("~joy_timeout", rospy.get_param("~joy_timeout", 0.25), 0.0)
-    except ParameterError as error:
+    except DeviceParameterError as error:
         sys.exit("servo_gamepad: %s" % error)
 
     def on_joy(message: Joy) -> None:

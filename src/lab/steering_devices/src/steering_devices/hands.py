@@ -15,7 +15,7 @@ from std_msgs.msg import Int8, String
 
 from baxter_interface import Gripper
 from baxter_model import SIDES
-from steering_devices.steering import ParameterError, number
+from steering_devices.steering import DeviceParameterError, number
 
 if TYPE_CHECKING:
     from steering_devices.steering import Steering
@@ -45,11 +45,11 @@ def _cached(name: str, default: Any) -> Any:
 
 
 def _words(name: str, default: list[str]) -> list[str]:
-    """A parameter that is a list of words, or a text of them. Raises ParameterError."""
+    """A parameter that is a list of words, or a text of them. Raises DeviceParameterError."""
     value = _param(name, default)
     words = value.split() if isinstance(value, str) else value
     if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
-        raise ParameterError("%s is %r; expected a list of names, or a text of them" % (name, value))
+        raise DeviceParameterError("%s is %r; expected a list of names, or a text of them" % (name, value))
     return list(words)
 
 
@@ -58,7 +58,7 @@ def hands_of(node: str, count: int = 0) -> Hands:
     end it."""
     try:
         hands = Hands()
-    except ParameterError as error:
+    except DeviceParameterError as error:
         sys.exit("%s: %s" % (node, error))
     if count and len(hands) != count:
         sys.exit("%s: ~servos must name the servos of the left and the right arm, got %d" % (node, len(hands)))
@@ -69,7 +69,7 @@ class Hand:
     """One servo and its gripper. name: of the servo's node; reason: why it holds back, "" if it does not."""
 
     def __init__(self, name: str, gripper: str = "") -> None:
-        """Raises ParameterError."""
+        """Raises DeviceParameterError."""
         self.name, self.reason, self.status = name, "", 0
         # A device may be started before the servo whose parameters these are.
         #: What 1 means, of a twist's two halves [m/s, rad/s].
@@ -145,12 +145,12 @@ class Hands:
     """All hands of a device. Parameters: ~servos, names of servos' nodes; ~grippers, of each Baxter's side or ""."""
 
     def __init__(self) -> None:
-        """Raises ParameterError."""
+        """Raises DeviceParameterError."""
         names, grippers = _words("~servos", ["servo_server"]), _words("~grippers", [])
         if not names or not all(map(is_legal_name, names)):
-            raise ParameterError("~servos is %r; expected names of servos' nodes" % (names,))
+            raise DeviceParameterError("~servos is %r; expected names of servos' nodes" % (names,))
         if len(grippers) > len(names) or not all(side in ("", *SIDES) for side in grippers):
-            raise ParameterError("~grippers is %r; expected for each of ~servos %s or \"\"" % (
+            raise DeviceParameterError("~grippers is %r; expected for each of ~servos %s or \"\"" % (
                 grippers, ", ".join(SIDES)))
         grippers += [""] * (len(names) - len(grippers))
         self.hands = [Hand(rospy.resolve_name(name), gripper) for name, gripper in zip(names, grippers, strict=False)]

@@ -14,7 +14,7 @@ import rospy
 from rospy_fixes.ports.event_log import printable
 from rospy_nodes.start import limit_ports
 from steering_devices.hands import Hands, hands_of
-from steering_devices.steering import MOTIONS, OTHER_KEYS, Keyboard
+from steering_devices.steering import MOTIONS, OTHER_KEYS, KeyboardSteering
 
 _PERIOD_S, _DRAWN_EVERY_S = 0.02, 0.1
 _DESCRIPTION = """Steer by the keys of this terminal. Publishes: twists to the servos, /steering/mark.
@@ -47,7 +47,7 @@ def _run(screen: curses.window, hands: Hands) -> None:
     with contextlib.suppress(curses.error):  # a terminal that cannot hide its cursor
         curses.curs_set(0)
     screen.nodelay(True)
-    keyboard, drawn = Keyboard(len(hands)), -1e9
+    keyboard, drawn = KeyboardSteering(len(hands)), -1e9
     while not rospy.is_shutdown():
         now = time.monotonic()
         while (code := screen.getch()) >= 0:
@@ -62,7 +62,7 @@ def _run(screen: curses.window, hands: Hands) -> None:
         time.sleep(_PERIOD_S)
 
 
-def _draw(screen: curses.window, hands: Hands, keyboard: Keyboard, steering) -> None:
+def _draw(screen: curses.window, hands: Hands, keyboard: KeyboardSteering, steering) -> None:
     hand = hands.hands[steering.hand]
     keys = ["%-6s %s" % (repr(key).strip("'") if key != " " else "space", what[0] if isinstance(what, tuple) else what)
             for key, what in {**MOTIONS, **OTHER_KEYS}.items()]

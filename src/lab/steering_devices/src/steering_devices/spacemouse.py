@@ -22,7 +22,7 @@ _LONGEST_REPORT = 64
 _ROWS = (1, 0, 2)
 
 
-class DeviceLost(Exception):
+class SpaceMouseLost(Exception):
     """The device is not there; the text says why, and what to do."""
 
 
@@ -59,21 +59,22 @@ class Cap:
             self.axes[first + row] = max(-1.0, min(1.0, -value / FULL)) or 0.0
 
 
-class Device:
-    """An open hidraw device. path "": the first SpaceMouse. Raises DeviceLost."""
+class SpaceMouseDevice:
+    """An open hidraw device. path "": the first SpaceMouse. Raises SpaceMouseLost."""
 
     def __init__(self, path: str = "", classes: Path = Path("/sys/class/hidraw")) -> None:
         self.path = path or _found(classes)
         try:
             self._file = os.open(self.path, os.O_RDONLY | os.O_NONBLOCK)
         except PermissionError:
-            raise DeviceLost("%s may not be read; as root: setfacl -m u:$USER:r %s" % (self.path, self.path)) from None
+            raise SpaceMouseLost("%s may not be read; as root: setfacl -m u:$USER:r %s" % (self.path,
+                                                                                           self.path)) from None
         except OSError as error:
-            raise DeviceLost("no SpaceMouse at %s: %s; plug one in, or set ~dev" % (
+            raise SpaceMouseLost("no SpaceMouse at %s: %s; plug one in, or set ~dev" % (
                 self.path, error.strerror)) from None
 
     def read(self, timeout_s: float) -> list[bytes]:
-        """Return the reports that come within a time [s], oldest first. Raises DeviceLost."""
+        """Return the reports that come within a time [s], oldest first. Raises SpaceMouseLost."""
         reports: list[bytes] = []
         try:
             if not select.select([self._file], [], [], timeout_s)[0]:
@@ -83,9 +84,9 @@ class Device:
         except BlockingIOError:
             return reports
         except OSError as error:
-            raise DeviceLost("the SpaceMouse %s is lost: %s" % (self.path, error.strerror)) from None
+            raise SpaceMouseLost("the SpaceMouse %s is lost: %s" % (self.path, error.strerror)) from None
         if not reports:
-            raise DeviceLost("the SpaceMouse %s is lost: it was closed" % self.path)
+            raise SpaceMouseLost("the SpaceMouse %s is lost: it was closed" % self.path)
         return reports
 
     def close(self) -> None:
@@ -93,7 +94,7 @@ class Device:
 
 
 def _found(classes: Path) -> str:
-    """The path of the first SpaceMouse. Raises DeviceLost."""
+    """The path of the first SpaceMouse. Raises SpaceMouseLost."""
     for device in sorted(classes.glob("hidraw*")):
         try:
             lines = (device / "device/uevent").read_text().splitlines()
@@ -103,4 +104,4 @@ def _found(classes: Path) -> str:
             continue
         if int(vendor, 16) == _VENDOR or int(vendor, 16) == _OLD_VENDOR and int(product, 16) in _OLD_PRODUCTS:
             return "/dev/" + device.name
-    raise DeviceLost("no SpaceMouse is connected; plug one in, or set ~dev to its /dev/hidraw file")
+    raise SpaceMouseLost("no SpaceMouse is connected; plug one in, or set ~dev to its /dev/hidraw file")

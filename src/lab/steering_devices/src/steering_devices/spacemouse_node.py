@@ -11,7 +11,7 @@ import rospy
 
 from rospy_nodes.start import end_on_signals, limit_ports
 from steering_devices.hands import Hands, hands_of
-from steering_devices.spacemouse import Cap, Device, DeviceLost
+from steering_devices.spacemouse import Cap, SpaceMouseDevice, SpaceMouseLost
 from steering_devices.steering import Gamepad, LayoutError, Steering
 
 # Between two messages; a cap that is pushed reports more often than the second [s]; between two looks for a device.
@@ -36,11 +36,11 @@ def main() -> None:
     told = ""
     while not rospy.is_shutdown():
         try:
-            with contextlib.closing(Device(str(rospy.get_param("~dev", "")))) as device:
+            with contextlib.closing(SpaceMouseDevice(str(rospy.get_param("~dev", "")))) as device:
                 rospy.loginfo("the SpaceMouse %s is there", device.path)
                 told = ""
                 _follow(device, pad, hands)
-        except DeviceLost as lost:
+        except SpaceMouseLost as lost:
             hands.send(Steering())
             if str(lost) != told:
                 told = str(lost)
@@ -48,8 +48,8 @@ def main() -> None:
             rospy.rostime.wallsleep(_LOOK_S)
 
 
-def _follow(device: Device, pad: Gamepad, hands: Hands) -> None:
-    """Steer by what the device reports until the node ends. Raises DeviceLost."""
+def _follow(device: SpaceMouseDevice, pad: Gamepad, hands: Hands) -> None:
+    """Steer by what the device reports until the node ends. Raises SpaceMouseLost."""
     cap, heard = Cap(), time.monotonic()
     while not rospy.is_shutdown():
         begin = time.monotonic()

@@ -29,11 +29,11 @@ OTHER_KEYS = {"g": "open or close the gripper", "h": "the other hand", "t": "axe
               "x": "end"}
 
 
-class ParameterError(ValueError):
+class DeviceParameterError(ValueError):
     """A parameter of a device that cannot be used; the text names it, its value and what would be right."""
 
 
-class LayoutError(ParameterError):
+class LayoutError(DeviceParameterError):
     """A gamepad's layout that cannot be used, with the reason."""
 
 
@@ -50,7 +50,7 @@ class Steering:
     ends: bool = False
 
 
-class Keyboard:
+class KeyboardSteering:
     """Keys of a terminal, which tells presses and repetitions but no releases: a key counts as held for a moment after
     each of them."""
 
@@ -162,14 +162,14 @@ def _source(row: str, source: Any) -> tuple:
 def _scale(row: str, source: dict) -> float:
     try:
         return number("scale of " + row, source.get("scale", 1.0), -MOST, MOST)
-    except ParameterError as error:
+    except DeviceParameterError as error:
         raise LayoutError(str(error)) from None
 
 
 def number(what: str, value: Any, least: float, most: float = MOST) -> float:
-    """Return ``value``, a number from ``least`` to ``most``. Raises ParameterError, which says ``what`` it is."""
+    """Return ``value``, a number from ``least`` to ``most``. Raises DeviceParameterError, which says ``what`` it is."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-        raise ParameterError("%s is %r; expected a number from %g to %g" % (what, value, least, most))
+        raise DeviceParameterError("%s is %r; expected a number from %g to %g" % (what, value, least, most))
     return float(value)
 
 

@@ -9,7 +9,7 @@ import pytest
 import rospy
 
 from steering_devices import gamepad_node, hands, keyboard_node
-from steering_devices.steering import Keyboard, Steering
+from steering_devices.steering import KeyboardSteering, Steering
 
 NAN = float("nan")
 
@@ -89,5 +89,5 @@ def test_what_a_servo_says_ends_no_keyboard(parameters, monkeypatch):
         drawn.append(text[:count])
     screen = SimpleNamespace(erase=lambda: None, refresh=lambda: None, getmaxyx=lambda: (24, 60), addnstr=add)
     hand = SimpleNamespace(name="left_servo", is_there=True, reason="'no\0where' is not a frame")
-    keyboard_node._draw(screen, SimpleNamespace(hands=[hand]), Keyboard(), Steering())
+    keyboard_node._draw(screen, SimpleNamespace(hands=[hand]), KeyboardSteering(), Steering())
     assert any("no\\x00where" in line for line in drawn)

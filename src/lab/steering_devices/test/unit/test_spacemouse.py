@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from steering_devices.spacemouse import Cap, Device, DeviceLost
+from steering_devices.spacemouse import Cap, SpaceMouseDevice, SpaceMouseLost
 
 
 def report(kind, *values):
@@ -47,14 +47,14 @@ def test_buttons_and_what_means_nothing():
 
 def test_a_device_sends_a_report_a_read():
     start, end = os.pipe2(os.O_DIRECT)  # each write is a report, as of a hidraw device
-    device = Device("/proc/self/fd/%d" % start)
+    device = SpaceMouseDevice("/proc/self/fd/%d" % start)
     os.close(start)
     for sent in (report(1, 1, 2, 3), bytes.fromhex("030100")):
         os.write(end, sent)
     assert device.read(1.0) == [report(1, 1, 2, 3), bytes.fromhex("030100")]
     assert device.read(0.0) == []
     os.close(end)
-    with pytest.raises(DeviceLost, match="closed"):
+    with pytest.raises(SpaceMouseLost, match="closed"):
         device.read(1.0)
     device.close()
 
@@ -64,7 +64,7 @@ def test_the_first_spacemouse_is_found_among_others(tmp_path):
                        ("hidraw2", "HID_ID=0003:0000256F:0000C635")):
         (tmp_path / name / "device").mkdir(parents=True)
         (tmp_path / name / "device/uevent").write_text("DRIVER=hid-generic\n%s\n" % line)
-    with pytest.raises(DeviceLost, match="/dev/hidraw2"):
-        Device(classes=tmp_path)
-    with pytest.raises(DeviceLost, match="connected"):
-        Device(classes=tmp_path / "nothing")
+    with pytest.raises(SpaceMouseLost, match="/dev/hidraw2"):
+        SpaceMouseDevice(classes=tmp_path)
+    with pytest.raises(SpaceMouseLost, match="connected"):
+        SpaceMouseDevice(classes=tmp_path / "nothing")

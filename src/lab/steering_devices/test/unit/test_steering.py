@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from steering_devices.steering import MOTIONS, OTHER_KEYS, Gamepad, Keyboard, LayoutError
+from steering_devices.steering import MOTIONS, OTHER_KEYS, Gamepad, KeyboardSteering, LayoutError
 
 CONFIG = Path(__file__).parents[2] / "config"
 PADS = ("xbox", "playstation")
@@ -15,7 +15,7 @@ PADS = ("xbox", "playstation")
 
 @pytest.mark.parametrize("key", MOTIONS)
 def test_a_key_moves_as_long_as_it_repeats(key):
-    keyboard = Keyboard()
+    keyboard = KeyboardSteering()
     _, row, sign = MOTIONS[key]
     for tick in range(10):
         keyboard.press(key, 0.03 * tick)
@@ -25,7 +25,7 @@ def test_a_key_moves_as_long_as_it_repeats(key):
 
 
 def test_the_other_keys():
-    keyboard = Keyboard(hands=2)
+    keyboard = KeyboardSteering(hands=2)
     assert set(OTHER_KEYS) & set(MOTIONS) == set()
     keyboard.press("w", 0.0)
     slow = keyboard.take(0.0).twist[0]

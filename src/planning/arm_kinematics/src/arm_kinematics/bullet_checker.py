@@ -18,7 +18,7 @@ from urdf_model import Mesh
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from bullet_sim import Contact, Model
+    from bullet_sim import ContactPoint, Model
     from urdf_model import Robot
     from urdf_model.merge import MergedLink
 
@@ -114,7 +114,7 @@ class BulletChecker:
         if self._rough is not None:
             self._rough[1].set_joint_positions(index, q)
 
-    def _touching(self) -> list[Contact]:
+    def _touching(self) -> list[ContactPoint]:
         """The contacts of the robot. Those with a fixed link of triangles take twenty times as long as all others, and
         are looked at where something touches its convex hull, unless that is as good."""
         if self._rough is not None and len(self._world.models) == 1:
@@ -152,7 +152,7 @@ class BulletChecker:
             self._plans[joint_names] = (self._model.index(joint_names), moved, last)
         return self._plans[joint_names]
 
-    def _named(self, found: Contact) -> tuple[tuple[str, ...], str]:
+    def _named(self, found: ContactPoint) -> tuple[tuple[str, ...], str]:
         """Return (our links that take part, the other one's name)."""
         if found.model_a == found.model_b:
             return (found.link_a, found.link_b), found.link_b

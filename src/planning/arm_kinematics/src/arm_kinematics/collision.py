@@ -14,7 +14,7 @@ from arm_kinematics.search import Collection, IkResult
 from command_line.options import counted
 
 if TYPE_CHECKING:
-    from arm_kinematics.search import Found, Search
+    from arm_kinematics.search import Search, SearchResult
 
 # Number of solutions checked between two searches; the first ones are mostly free.
 _CHUNK = 6
@@ -63,7 +63,7 @@ class OwnBody:
         return bool((gaps < self._distances).any())
 
 
-def first_free(search: Search, found: Found, checker: CollisionChecker) -> IkResult:
+def first_free(search: Search, found: SearchResult, checker: CollisionChecker) -> IkResult:
     """Return the IkResult of ``found`` if it has no contact, else of the solution without contact that is nearest to
     the preferred posture, among the first ones found.
 

@@ -19,7 +19,7 @@ from command_line.options import counted
 if TYPE_CHECKING:
     from arm_kinematics.budget import Budget
     from arm_kinematics.chain import Chain
-    from arm_kinematics.search import Found, Search
+    from arm_kinematics.search import Search, SearchResult
     from arm_kinematics.target import Target
 
 # If the pose error stays above this without limits, more iterations will not help [m or rad].
@@ -55,7 +55,7 @@ def beyond_reach(chain: Chain, target: Target) -> str:
     return (text + " towards the shoulder at (%.3f %.3f %.3f) in %s") % (over, *chain.shoulder, chain.base)
 
 
-def explain(search: Search, found: Found) -> Found:
+def explain(search: Search, found: SearchResult) -> SearchResult:
     """Raise the NoSolution that explains why ``search`` failed with ``found``.
 
     Returns a solution if the diagnosis happens to find one.
@@ -110,7 +110,8 @@ def _failure(search: Search, reason: Reason, detail: str, nearest: tuple[np.ndar
     return NoSolution(search.target.pose, reason, detail, attempt, joints=joints, excess=excess)
 
 
-def _least_excess(search: Search, start: np.ndarray, lifted: np.ndarray) -> tuple[Found | None, dict[str, float]]:
+def _least_excess(search: Search, start: np.ndarray, lifted: np.ndarray) -> tuple[SearchResult | None,
+                                                                                  dict[str, float]]:
     """Return (a solution inside the limits or None, {joint name: signed excess} of the joints that must exceed their
     limits).
 
@@ -137,7 +138,7 @@ def _least_excess(search: Search, start: np.ndarray, lifted: np.ndarray) -> tupl
     return None, least
 
 
-def _alone(search: Search, joint: int, bound: float, start: np.ndarray) -> tuple[Found | None, dict[str, float]]:
+def _alone(search: Search, joint: int, bound: float, start: np.ndarray) -> tuple[SearchResult | None, dict[str, float]]:
     """Return (a solution inside the limits or None, {name of joint number ``joint``: signed excess}, empty if it fails
     within ``bound`` [rad or m] beyond its limits).
     """
@@ -158,8 +159,8 @@ def _sum(over: dict[str, float]) -> float:
     return sum(map(abs, over.values()))
 
 
-def _settled(search: Search, q: np.ndarray) -> Found | None:
-    """Return the Found of a search from ``q``, wrapped into the limits, if it arrives; else None."""
+def _settled(search: Search, q: np.ndarray) -> SearchResult | None:
+    """Return the SearchResult of a search from ``q``, wrapped into the limits, if it arrives; else None."""
     start = np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays)
     inside = search.run(budget=_budget(search, 1), postures=(start, search.preferred))
     return inside if inside.arrived else None

@@ -20,7 +20,7 @@ _MAX_LOOKUPS, _MAX_POSES = 200_000_000, 100_000
 
 
 @dataclass(frozen=True)
-class Place:
+class BasePlace:
     """position: (3,) [m] of the task's origin in the map's frame; yaw: [rad] about z; share: of the task's poses that
     are reached there; spare: the mean share of orientations in their cells, which tells equally good places apart."""
 
@@ -79,7 +79,7 @@ def table_poses(width_m: float, depth_m: float, step_m: float, rotations: np.nda
     return np.array([rigid(rotation, (x, y, 0.0)) for x in xs for y in ys for rotation in rotations])
 
 
-def best_places(reach_map: ReachMap, poses: np.ndarray, region: Region, most: int = 10) -> list[Place]:
+def best_places(reach_map: ReachMap, poses: np.ndarray, region: Region, most: int = 10) -> list[BasePlace]:
     """Return the best Places of a task with ``poses`` (m, 4, 4) in its own frame, best first.
 
     A pose counts as reached where the map reaches its cell with the nearest of its orientations. Equal shares are
@@ -100,8 +100,8 @@ def best_places(reach_map: ReachMap, poses: np.ndarray, region: Region, most: in
             index = tuple(cells.T)
             reached += inside & reach_map.reached[(*index, turn)]
             spare += np.where(inside, share[index], 0.0)
-        found += [Place(*one) for one in zip(positions, [yaw] * len(positions), reached / len(poses),
-                                             spare / len(poses), strict=True)]
+        found += [BasePlace(*one) for one in zip(positions, [yaw] * len(positions), reached / len(poses),
+                                                 spare / len(poses), strict=True)]
     found.sort(key=lambda place: (-place.share, -place.spare))
     return found[:most]
 

@@ -35,7 +35,7 @@ class IkResult(NamedTuple):
     restarts: int
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The result of a search. arrived: number of starts that arrived; q: the chosen solution, or the best attempt if
     none arrived."""
 
@@ -75,8 +75,8 @@ class Search:
         self.preferred = self.seed if posture is None else chain.posture(posture)
 
     def run(self, *, budget: Budget | None = None, limits: Limits | None = None, postures: Postures | None = None,
-            rows: Rows | None = None) -> Found:
-        """Return the Found; arguments replace the search's own groups.
+            rows: Rows | None = None) -> SearchResult:
+        """Return the SearchResult; arguments replace the search's own groups.
 
         ``limits``: (lower, upper) in place of the chain's; ``postures``: (seed, preferred); ``rows``: the Rows of the
         error that count.
@@ -88,15 +88,15 @@ class Search:
         arrived, starts, iterations, error_m, error_rad = kernels.search(
             self.chain.arrays, limits or self.chain.limit_arrays, target, (budget or self.budget).effort,
             postures or (self.seed, self.preferred), q)
-        return Found(arrived, starts, iterations, error_m, error_rad, q)
+        return SearchResult(arrived, starts, iterations, error_m, error_rad, q)
 
-    def newton(self) -> Found:
-        """Return the Found of plain Newton steps from the seed, as the vendor's simulator makes them; ``arrived`` is 1
-        or 0."""
+    def newton(self) -> SearchResult:
+        """Return the SearchResult of plain Newton steps from the seed, as the vendor's simulator makes them;
+        ``arrived`` is 1 or 0."""
         q = np.empty(len(self.chain))
         steps, arrived = kernels.newton(self.chain.arrays, self.chain.limit_arrays, self.target.arrays,
                                         self.budget.effort, self.seed, q)
-        return Found(int(arrived), 1, steps, *self.residual(q), q)
+        return SearchResult(int(arrived), 1, steps, *self.residual(q), q)
 
     def gather(self, solutions: np.ndarray, collection: Collection, *, budget: Budget | None = None,
                limits: Limits | None = None) -> tuple[int, int, int]:

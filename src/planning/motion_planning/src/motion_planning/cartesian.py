@@ -77,7 +77,7 @@ def cartesian_path(model: PlanningModel, group: str, start: State, link: str, wa
         raise CartesianError("the greatest step must be above 0, got %g m" % max_step)
     if not (math.isfinite(jump_threshold) and jump_threshold >= 0.0):
         raise CartesianError("the jump threshold must be 0 or more, got %g" % jump_threshold)
-    follower = Follower(model, model.groups[group], start, link, steps.accept)
+    follower = LineFollower(model, model.groups[group], start, link, steps.accept)
     waypoints = [follower.pose(i, waypoint) for i, waypoint in enumerate(waypoints)]
     here = follower.pose_of_link(follower.q)
     pieces = [_pieces(a, b) for a, b in zip([here, *waypoints], waypoints, strict=False)]
@@ -170,7 +170,7 @@ class Curve(Protocol):
         ...
 
 
-class Follower:
+class LineFollower:
     """Follows a line, which is a :class:`Curve`, with the joints of one group that move the link.
 
     q (k,): the group's present

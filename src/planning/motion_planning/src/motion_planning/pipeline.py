@@ -13,7 +13,7 @@ import numpy as np
 
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.errors import PlanningError
-from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
+from motion_planning.planners import NoPath, SearchOptions, first_touching, rrt_connect
 from motion_planning.planners.planning import MIN_FOR_SCENE_S, SHARE_OF_SEARCH
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
@@ -82,7 +82,7 @@ class PlanQuery:
     """A planning request.
 
     scene: Scene with the robot at the start; group: name; goals: ConstraintSets, one of which must be met.
-    path_constraints: ConstraintSet for the whole path, or None. planner: as in Search. allowed_time [s];
+    path_constraints: ConstraintSet for the whole path, or None. planner: as in SearchOptions. allowed_time [s];
     attempts: plans of which the shortest counts. velocity_scaling, acceleration_scaling: 0 < f <= 1. timing: algorithm
     of timing.time_path.
     start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is moved onto the limit.
@@ -111,7 +111,7 @@ class Tools:
     that returns the time [s]; seed: of the random numbers; stop(): true ends the planning."""
 
     exact: ExactChecker
-    plan_path: Callable[[Scene, str, np.ndarray, np.ndarray, Search], Path]
+    plan_path: Callable[[Scene, str, np.ndarray, np.ndarray, SearchOptions], Path]
     sampler: Callable[..., Sampler]
     clock: Callable[[], float]
     seed: int = 0
@@ -339,9 +339,9 @@ class _Planning:
 
     def _path(self, scene: Scene, start: np.ndarray, goals: np.ndarray, attempt: int) -> np.ndarray:
         left = self.query.allowed_time - self._used()
-        search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
-                        clock=self.tools.clock, stop=self.tools.stop, constraints=self.query.path_constraints,
-                        planner=self.query.planner, improve=True)
+        search = SearchOptions(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
+                               clock=self.tools.clock, stop=self.tools.stop, constraints=self.query.path_constraints,
+                               planner=self.query.planner, improve=True)
         try:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:

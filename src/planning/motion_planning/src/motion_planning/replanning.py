@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 # How far ahead of now the new trajectory begins [s]: planning it, and its way to the controller, take most of that.
 # The first that leaves room to brake before the obstacle.
 _AHEAD_S = (0.12, 0.08, 0.05)
-# The same for further searches, where an earlier one had too little time and the obstacle is at least _FAR times as far.
+# The same for further searches, where an earlier one had too little time and the obstacle is at least _FAR times as
+# far.
 _LATER_S, _FAR = (0.4, 1.0), 2.0
 _TOO_LITTLE_TIME = (Code.TIMED_OUT, Code.PREEMPTED, Code.PLANNING_FAILED)
 # What the way to the controller may take of that [s], and the share of the rest that the search may use.

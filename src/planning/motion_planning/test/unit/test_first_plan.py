@@ -6,7 +6,7 @@ import time
 import pytest
 
 from motion_planning.exact import ExactChecker
-from motion_planning.planners import NoPath, Search, plan_path, planning
+from motion_planning.planners import NoPath, SearchOptions, plan_path, planning
 from motion_planning.scene import Scene
 
 PATIENCE_S = 60.0
@@ -32,7 +32,8 @@ def plan(mix, exact, answers, stop=lambda: False):
         group = mix.groups["arm"]
         q = Scene(mix).state.q[group.indices]
         try:
-            answers.append(plan_path(Scene(mix), "arm", q, q[None], Search(exact, 1, PATIENCE_S, time.monotonic, stop)))
+            answers.append(plan_path(Scene(mix), "arm", q, q[None],
+                                     SearchOptions(exact, 1, PATIENCE_S, time.monotonic, stop)))
         except NoPath as error:
             answers.append(error)
 

@@ -9,7 +9,7 @@ import pytest
 
 from motion_planning.constraints import ConstraintSet, JointTarget, OrientationTarget, PositionTarget
 from motion_planning.exact import ExactChecker
-from motion_planning.industrial import Auxiliary, CartesianLimits, Command, plan, plan_sequence
+from motion_planning.industrial import Auxiliary, CartesianLimits, IndustrialCommand, plan, plan_sequence
 from motion_planning.industrial.profile import WINDOW_S, Profile
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools
 from motion_planning.scene import Scene, WorldObject
@@ -36,7 +36,7 @@ class Lab:
         options = {"velocity_scaling": 0.5, "acceleration_scaling": 0.5, **options}
         velocities = options.pop("start_velocities", ())
         query = PlanQuery(scene or self.scene, options.pop("group", GROUP), [goal], planner_id=planner, **options)
-        return Command(query, auxiliary, velocities)
+        return IndustrialCommand(query, auxiliary, velocities)
 
     def plan(self, *arguments, **options):
         return plan(self.command(*arguments, **options), self.tools, LIMITS).timed
@@ -174,7 +174,7 @@ def test_lin_with_seven_joints_is_smooth(baxter):
     goal = shifted(begin, x=-0.1, y=-0.1, z=0.15)
     query = PlanQuery(scene, "left_arm", [at(goal, "left_gripper")], planner_id="LIN", velocity_scaling=0.3,
                       acceleration_scaling=0.3)
-    timed = plan(Command(query), Tools(_Free(), None, None, time.monotonic), LIMITS).timed
+    timed = plan(IndustrialCommand(query), Tools(_Free(), None, None, time.monotonic), LIMITS).timed
     group = baxter.groups["left_arm"]
     states, _, accelerations = timed.sampled(np.linspace(0.0, timed.duration, 500))
     poses = np.array([baxter.frame_of(scene.state.with_q(q, group.indices).q, "left_gripper") for q in states])
@@ -370,7 +370,7 @@ def test_two_groups_make_two_trajectories(baxter):
     commands = []
     for side in ("left", "right", "right"):
         values = ConstraintSet("", [JointTarget(side + "_w2", 0.3 if not commands else -0.1 * len(commands))])
-        commands.append(Command(PlanQuery(scene, side + "_arm", [values], planner_id="PTP")))
+        commands.append(IndustrialCommand(PlanQuery(scene, side + "_arm", [values], planner_id="PTP")))
     tools = Tools(_Free(), None, None, time.monotonic)
     plans = plan_sequence(commands, [0.05, 0.0, 0.0], tools, LIMITS)
     assert [group for group, _ in plans] == ["left_arm", "right_arm"]

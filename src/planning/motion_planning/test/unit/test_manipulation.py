@@ -10,9 +10,9 @@ from motion_planning.exact import ExactChecker
 from motion_planning.manipulation import (
     Candidate,
     ManipulationFailure,
+    ManipulationTools,
     PickTask,
     PlaceTask,
-    Tools,
     Translation,
     hand_links,
     places_on,
@@ -69,7 +69,7 @@ def from_above(name="top", z=0.03, **options):
 
 def tools(exact, plan=None, **options):
     ticks = itertools.count()
-    return Tools(exact, plan or straight_plan, lambda: next(ticks) * 1e-4, **options)
+    return ManipulationTools(exact, plan or straight_plan, lambda: next(ticks) * 1e-4, **options)
 
 
 def straight_plan(scene, q, seconds):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motion_planning.exact import ExactChecker
-from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
+from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, SensorView
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import AttachedBody, Scene, WorldObject
 from motion_planning.spheres.cover import CoverError
@@ -47,7 +47,7 @@ def empty(probot, meshes):
 
 
 def view(things, frame=None, max_range=5.0, eye=EYE):
-    return View(picture(things, eye), eye, np.eye(4) if frame is None else frame, max_range)
+    return SensorView(picture(things, eye), eye, np.eye(4) if frame is None else frame, max_range)
 
 
 def cubes(occupancy, frame=None):
@@ -158,8 +158,8 @@ def test_a_link_that_spheres_cannot_cover_is_not_seen_either(probot, meshes, mon
 def test_nothing_and_nonsense_change_nothing(empty):
     occupancy = OccupancyMap(SIDE)
     points = np.array([[np.nan] * 3, [np.inf, 0.0, 1.0], [0.0, 0.0, 0.0], [1e30, 0.0, 0.0]])
-    assert not occupancy.see(View(points, EYE, np.eye(4), 5.0), empty)[0]
-    assert not occupancy.see(View(np.empty((0, 3)), EYE, np.eye(4), 5.0), empty)[0]
+    assert not occupancy.see(SensorView(points, EYE, np.eye(4), 5.0), empty)[0]
+    assert not occupancy.see(SensorView(np.empty((0, 3)), EYE, np.eye(4), 5.0), empty)[0]
     # In range, but out of the tree.
     tiny = OccupancyMap(1e-5)
     assert not tiny.see(view([CAN]), empty)[0]
@@ -173,7 +173,7 @@ def test_a_whole_picture_is_entered_in_moderate_time(empty, record_property):
     took = []
     for _ in range(3):
         begin = time.process_time()
-        occupancy.see(View(points, EYE, np.eye(4), 5.0), empty)
+        occupancy.see(SensorView(points, EYE, np.eye(4), 5.0), empty)
         took.append(time.process_time() - begin)
     record_property("seconds", min(took))
     print("%d points, %d cells: %.0f ms" % (np.isfinite(points[:, 0]).sum(), len(occupancy), 1e3 * min(took)))
@@ -210,7 +210,7 @@ def test_a_cloud_alone_does_not_show_the_robot(probot, meshes):
     mask = Mask(scene, sphere_model_of(ExactChecker(probot, meshes)), padding=0.02)
     points = np.concatenate([probot.frames(scene.state.q)[:, :3, 3], [[0.5, 0.5, 0.5]]])
     alone = CloudMap(0.05)
-    _, outside = alone.see(View(points, np.eye(4), np.eye(4), 5.0), mask)
+    _, outside = alone.see(SensorView(points, np.eye(4), np.eye(4), 5.0), mask)
     assert outside[-1] and len(alone) < len(points) and not outside.all()
-    _, outside = alone.see(View(np.array([[0.0, 0.0, 9.0], [np.nan] * 3]), np.eye(4), np.eye(4), 5.0), mask)
+    _, outside = alone.see(SensorView(np.array([[0.0, 0.0, 9.0], [np.nan] * 3]), np.eye(4), np.eye(4), 5.0), mask)
     assert outside.tolist() == [True, False] and not len(alone)

@@ -22,7 +22,7 @@ from motion_planning.exact import ExactChecker
 from motion_planning.kinematics import ik
 from motion_planning.model import PlanningModel
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools, plan
-from motion_planning.planners import NoPath, Search, plan_path
+from motion_planning.planners import NoPath, SearchOptions, plan_path
 from motion_planning.scene import AttachedBody, Scene, WorldObject
 from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Sphere
@@ -158,15 +158,15 @@ def test_a_start_that_breaks_them_is_told_with_the_numbers(desk):
 def test_time_and_stop_end_the_search(cup):
     upright = ConstraintSet(orientations=[OrientationTarget(cup.link, DOWN, (0.1, 0.1, math.pi))])
     start, goal = cup.scene.state.q[cup.indices], cup.posture((0.7, 0.02, 0.05))[cup.indices]
-    planned = plan_path(cup.scene, cup.group, start, goal, Search(cup.exact, 1, PATIENCE_S, time.monotonic,
-                                                                  constraints=upright))
+    planned = plan_path(cup.scene, cup.group, start, goal, SearchOptions(cup.exact, 1, PATIENCE_S, time.monotonic,
+                                                                         constraints=upright))
     assert len(planned.points) > 5 and np.array_equal(planned.points[-1], goal)
 
     def refused(goal, **more):
         # Time is the number of looks at the clock.
         with pytest.raises(NoPath) as failure:
             plan_path(cup.scene, cup.group, start, goal,
-                      Search(cup.exact, 1, 8, itertools.count().__next__, constraints=upright, **more))
+                      SearchOptions(cup.exact, 1, 8, itertools.count().__next__, constraints=upright, **more))
         return failure.value
 
     late = refused(goal)
@@ -297,7 +297,7 @@ TETRAHEDRON = [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]
 def straight(reacher, start, goal, constraints):
     """Whether the constraints are planned as the straight motion, with 2 mrad to spare."""
     scene, exact = reacher
-    search = Search(exact, 1, PATIENCE_S, time.monotonic, constraints=constraints)
+    search = SearchOptions(exact, 1, PATIENCE_S, time.monotonic, constraints=constraints)
     path = plan_path(scene.with_state(scene.state.with_q(start)), "arm", start, [goal], search)
     return path.length <= float(np.linalg.norm(goal - start)) + 2e-3
 

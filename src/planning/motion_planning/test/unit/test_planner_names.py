@@ -8,7 +8,7 @@ import pytest
 
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
-from motion_planning.planners import NoPath, Run, Search, ompl_wheel, plan_path, rrt_connect, warm_up
+from motion_planning.planners import NoPath, SearchOptions, TreeSearch, ompl_wheel, plan_path, rrt_connect, warm_up
 from motion_planning.planners.names import NAMES, config_name, kind_of, planner_of
 from motion_planning.planners.planning import checker_of
 from motion_planning.scene import Scene, WorldObject
@@ -53,7 +53,7 @@ def scene(exact):
 
 
 def search(exact, planner, allowed=PATIENCE_S, **more):
-    return Search(exact, 1, allowed, time.monotonic, planner=planner, **more)
+    return SearchOptions(exact, 1, allowed, time.monotonic, planner=planner, **more)
 
 
 @pytest.mark.parametrize("name", sorted({*MOVEIT, *NAMES}))
@@ -110,7 +110,7 @@ def test_settings_reach_the_planner():
 def test_the_range_of_our_own_counts(exact, scene):
     planner, _ = planner_of("RRTConnect", {"range": "0.05"})
     checker = _Everything()
-    run = Run(1, time.monotonic() + PATIENCE_S, time.monotonic)
+    run = TreeSearch(1, time.monotonic() + PATIENCE_S, time.monotonic)
     assert planner.keywords == {"reach": 0.05} and planner_of("RRTConnect", {"range": "0.0"})[0] is rrt_connect
     assert planner_of("RRTConnect", {"range": "far"})[0] is rrt_connect
     assert len(planner(checker, exact.model.bounds, START, GOAL, run).points) == 2
@@ -139,12 +139,12 @@ def test_the_wheels_planners_end_when_they_are_told_to(name, exact):
     bounds = exact.model.bounds
     # Time is the number of looks at the clock.
     with pytest.raises(NoPath) as late:
-        planner(_Nothing(), bounds, START, GOAL, Run(1, 300, itertools.count().__next__))
+        planner(_Nothing(), bounds, START, GOAL, TreeSearch(1, 300, itertools.count().__next__))
     assert late.value.late or "ended without a path" in str(late.value)
     looks = itertools.count()
     with pytest.raises(NoPath) as stopped:
         planner(_Nothing(), bounds, START, GOAL,
-                Run(1, time.monotonic() + PATIENCE_S, time.monotonic, lambda: next(looks) > 50))
+                TreeSearch(1, time.monotonic() + PATIENCE_S, time.monotonic, lambda: next(looks) > 50))
     assert stopped.value.stopped
 
 
@@ -155,7 +155,7 @@ def test_a_checker_that_raises_ends_the_search(exact):
 
     planner, _ = planner_of("RRT", {})
     with pytest.raises(ZeroDivisionError):
-        planner(Broken(), exact.model.bounds, START, GOAL, Run(1, time.monotonic() + PATIENCE_S, time.monotonic))
+        planner(Broken(), exact.model.bounds, START, GOAL, TreeSearch(1, time.monotonic() + PATIENCE_S, time.monotonic))
 
 
 def test_anytime_planners_find_shorter_paths_than_quick_ones(exact, scene):
@@ -164,5 +164,5 @@ def test_anytime_planners_find_shorter_paths_than_quick_ones(exact, scene):
     for name, seconds in (("RRT", PATIENCE_S), ("RRTstar", BRIEF_S)):
         planner, _ = planner_of(name, {})
         lengths[name] = [planner(checker, exact.model.bounds, START, GOAL,
-                                 Run(1, time.monotonic() + seconds, time.monotonic)).length for _ in range(3)]
+                                 TreeSearch(1, time.monotonic() + seconds, time.monotonic)).length for _ in range(3)]
     assert np.median(lengths["RRTstar"]) < np.median(lengths["RRT"])

@@ -12,7 +12,7 @@ import pytest
 
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
-from motion_planning.planners import NoPath, Run, Search, parts, plan_path, rrt_connect, shorten
+from motion_planning.planners import NoPath, SearchOptions, TreeSearch, parts, plan_path, rrt_connect, shorten
 from motion_planning.planners.parts import _synchronized
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.planners.trees import growing
@@ -46,12 +46,12 @@ def exact(snake):
 
 
 def search(exact, seed=1, allowed_time=PATIENCE_S, **more):
-    return Search(exact, seed, allowed_time, time.monotonic, **more)
+    return SearchOptions(exact, seed, allowed_time, time.monotonic, **more)
 
 
 def patient(exact, seed, looks=60):
-    """A Search whose time is the number of looks at the clock: as patient on any machine."""
-    return Search(exact, seed, looks, itertools.count().__next__)
+    """A SearchOptions whose time is the number of looks at the clock: as patient on any machine."""
+    return SearchOptions(exact, seed, looks, itertools.count().__next__)
 
 
 def clutter(model, seed, count=5):
@@ -178,7 +178,7 @@ def test_shorter_and_still_free(snake, exact):
     scene, group = clutter(snake, 4), snake.groups["arm"]
     checker = SphereChecker(SphereModel.of(snake, None), group, scene)
     rng = np.random.default_rng(2)
-    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+    run = TreeSearch(3, time.monotonic() + PATIENCE_S, time.monotonic)
     gained = []
     while len(gained) < 20:
         start, goal = free_postures(exact, scene, group, rng, 2)
@@ -215,7 +215,7 @@ def test_a_path_stays_as_it_was_found_without_time_to_improve_it_or_where_that_t
     start, goal = apart(exact, scene, group)
     found = plan_path(scene, "arm", start, [goal], search(exact))
     ticks = itertools.count()
-    late = Search(exact, 1, PATIENCE_S, lambda: PATIENCE_S * 0.6 * (next(ticks) > 0), improve=True)
+    late = SearchOptions(exact, 1, PATIENCE_S, lambda: PATIENCE_S * 0.6 * (next(ticks) > 0), improve=True)
     assert np.array_equal(plan_path(scene, "arm", start, [goal], late).points, found.points)
     watched = Watched(exact)
     plan_path(scene, "arm", start, [goal], search(watched))
@@ -226,7 +226,7 @@ def test_a_path_stays_as_it_was_found_without_time_to_improve_it_or_where_that_t
 def test_a_search_gives_up_after_its_samples(snake):
     scene, inside, outside = shut_in(snake)
     checker = SphereChecker(SphereModel.of(snake, None), snake.groups["arm"], scene)
-    run = Run(1, time.monotonic() + PATIENCE_S, time.monotonic, samples=3000)
+    run = TreeSearch(1, time.monotonic() + PATIENCE_S, time.monotonic, samples=3000)
     with pytest.raises(NoPath, match="3000 samples") as caught:
         rrt_connect(checker, snake.bounds, outside, [inside], run)
     assert caught.value.spent and not caught.value.late
@@ -366,7 +366,7 @@ def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
         start, goal = free_postures(exact, scene, group, rng, 2)
         if not checker.valid([start, goal]).all():
             continue
-        run = Run(seed, time.monotonic() + PATIENCE_S, time.monotonic)
+        run = TreeSearch(seed, time.monotonic() + PATIENCE_S, time.monotonic)
         path = parts.two_parts(checker, model.bounds[group.indices], start, goal[None], run, 0.5)
         if "shorten" not in path.times:
             continue  # of both arms together
@@ -405,7 +405,7 @@ def test_both_arms_together_and_further_pairs_of_paths_take_turns(pair, monkeypa
     def endless(searched, within, *arguments):
         return itertools.repeat(None) if within is bounds else growing(searched, within, *arguments)
 
-    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+    run = TreeSearch(3, time.monotonic() + PATIENCE_S, time.monotonic)
     path = planned(20, endless)
     assert len(tried) >= 21 and set(tried[3:]) == {"_in_turns"}
     assert np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
@@ -431,7 +431,7 @@ def test_a_posture_aside_that_cannot_be_reached_costs_one_turn_only(pair, monkey
     asked = []
     monkeypatch.setattr(parts, "_free_posture_of", lambda *arguments: asked.append(arguments) or enclosed)
     monkeypatch.setattr(parts, "_PAIRS", 0)
-    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+    run = TreeSearch(3, time.monotonic() + PATIENCE_S, time.monotonic)
     path = parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
     assert asked and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
 
@@ -444,7 +444,7 @@ def test_one_arm_makes_room_for_the_other_and_comes_back(pair):
     start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
     found = 0
     for seed in range(20):
-        run = Run(seed, time.monotonic() + PATIENCE_S, time.monotonic)
+        run = TreeSearch(seed, time.monotonic() + PATIENCE_S, time.monotonic)
         points, samples = parts._in_turns(checker, bounds, start, goal, run, 0.5, seed % 2)
         if points is None:
             continue

@@ -129,7 +129,7 @@ def soup(count, size=1.0):
 def test_a_mesh_costs_no_more_than_its_bound(mesh, monkeypatch):
     """2,000 triangles of a metre are 250 million samples at the usual distance."""
     monkeypatch.setattr(sphere_model, "_MAX_POINTS", 50_000)
-    monkeypatch.setattr(covers, "OF_OBJECTS", covers.Bound(50_000, 100_000, 2_000_000, 2_000))
+    monkeypatch.setattr(covers, "OF_OBJECTS", covers.WorkBound(50_000, 100_000, 2_000_000, 2_000))
     made = []
     points_on = covers.points_on
 

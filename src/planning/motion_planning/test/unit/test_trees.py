@@ -16,7 +16,7 @@ def test_making_a_path_shorter_ends_at_its_deadline_however_long_a_try_takes(mon
         return path
 
     monkeypatch.setattr(trees, "_shorter", shorter)
-    trees.improve(trees.Path(np.zeros((2, 1))), None, trees.Run(1, 0.1, lambda: now[0]))
+    trees.improve(trees.Path(np.zeros((2, 1))), None, trees.TreeSearch(1, 0.1, lambda: now[0]))
     assert sum(tries) == trees.IMPROVING or 0.1 <= now[0] < 0.1 + max(0.005, 4.0 * seconds_a_try)
     assert len(tries) < 100
 
@@ -24,4 +24,4 @@ def test_making_a_path_shorter_ends_at_its_deadline_however_long_a_try_takes(mon
 def test_making_a_path_shorter_can_be_stopped(monkeypatch):
     monkeypatch.setattr(trees, "_shorter", lambda path, *_: path)
     with pytest.raises(NoPath, match="stopped"):
-        trees.improve(trees.Path(np.zeros((2, 1))), None, trees.Run(1, 1.0, lambda: 0.0, lambda: True))
+        trees.improve(trees.Path(np.zeros((2, 1))), None, trees.TreeSearch(1, 1.0, lambda: 0.0, lambda: True))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from motion_planning.model import PlanningModel, State
     from motion_planning_rviz.drawing import Colour
-    from motion_planning_rviz.interaction import Handle, Query
+    from motion_planning_rviz.interaction import Handle, PanelQuery
 
 SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "check_state_validity": srv.GetStateValidity,
             "compute_ik": srv.GetPositionIK, "get_planning_scene": srv.GetPlanningScene,
@@ -45,7 +45,7 @@ class NoPosture(PlanningError):
         self.code = code
 
 
-class Touch(NamedTuple):
+class BodyTouch(NamedTuple):
     """Two bodies that touch, by name. links: those of them that are links of the robot; held: those that it holds;
     point (3,) in ``frame``."""
 
@@ -57,7 +57,7 @@ class Touch(NamedTuple):
     frame: str
 
 
-class Snapshot(NamedTuple):
+class SceneSnapshot(NamedTuple):
     """values: {joint: value} of the robot; objects: CollisionObjects; attached: AttachedCollisionObjects; colours:
     {object: r g b a}; is_measured: whether move_group has heard from the joints, which otherwise stand at their
     defaults."""
@@ -69,7 +69,7 @@ class Snapshot(NamedTuple):
     is_measured: bool = True
 
 
-class Outcome(NamedTuple):
+class ActionOutcome(NamedTuple):
     """How an action ended. text: of its server, or the error code's name; trajectory: the RobotTrajectory of a plan;
     seconds: planning time."""
 
@@ -92,17 +92,17 @@ class MoveGroupClient:
 
     # -- questions ----------------------------------------------------------------------------------------------
 
-    def snapshot(self) -> Snapshot:
-        """Return a Snapshot of the present scene. Raises NoAnswer."""
+    def snapshot(self) -> SceneSnapshot:
+        """Return a SceneSnapshot of the present scene. Raises NoAnswer."""
         parts = PlanningSceneComponents
         scene = self._call("get_planning_scene", parts(
             parts.ROBOT_STATE | parts.ROBOT_STATE_ATTACHED_OBJECTS | parts.WORLD_OBJECT_NAMES
             | parts.WORLD_OBJECT_GEOMETRY | parts.OBJECT_COLORS)).scene
         colours = {entry.id: (entry.color.r, entry.color.g, entry.color.b, entry.color.a)
                    for entry in scene.object_colors}
-        return Snapshot(state_values(scene.robot_state), list(scene.world.collision_objects),
-                        list(scene.robot_state.attached_collision_objects), colours,
-                        not scene.robot_state.joint_state.header.stamp.is_zero())
+        return SceneSnapshot(state_values(scene.robot_state), list(scene.world.collision_objects),
+                             list(scene.robot_state.attached_collision_objects), colours,
+                             not scene.robot_state.joint_state.header.stamp.is_zero())
 
     def posture(self, handle: Handle, pose: np.ndarray, state: State, avoid: bool) -> dict[str, float]:
         """Return {joint: value} that put a handle's link to ``pose`` (4, 4) in the root link, near ``state``.
@@ -118,8 +118,8 @@ class MoveGroupClient:
             raise NoPosture(code_name(answer.error_code.val))
         return state_values(answer.solution)
 
-    def validity(self, group: str, state: State) -> tuple[bool, list[Touch]]:
-        """Return (whether move_group takes ``state``, [Touch ...]). Raises NoAnswer."""
+    def validity(self, group: str, state: State) -> tuple[bool, list[BodyTouch]]:
+        """Return (whether move_group takes ``state``, [BodyTouch ...]). Raises NoAnswer."""
         answer = self._call("check_state_validity", state_message(state.positions), group, msg.Constraints())
         return answer.valid, [_touch(contact) for contact in answer.contacts]
 
@@ -187,9 +187,9 @@ class MoveGroupClient:
 
     # -- motions ------------------------------------------------------------------------------------------------
 
-    def plan(self, query: Query, execute: bool, done: Callable[[Outcome], None]) -> None:
-        """Plan for an interaction.Query, and ``execute`` it at once where that is true; ``done(Outcome)`` is called in
-        a thread of actionlib's. Raises NoAnswer."""
+    def plan(self, query: PanelQuery, execute: bool, done: Callable[[ActionOutcome], None]) -> None:
+        """Plan for an interaction.PanelQuery, and ``execute`` it at once where that is true; ``done(ActionOutcome)`` is
+        called in a thread of actionlib's. Raises NoAnswer."""
         goal = msg.MoveGroupGoal()
         request, options = goal.request, goal.planning_options
         request.group_name, request.pipeline_id, request.planner_id = query.group, query.pipeline, query.planner
@@ -201,8 +201,8 @@ class MoveGroupClient:
         options.planning_scene_diff.is_diff = options.planning_scene_diff.robot_state.is_diff = True
         self._send("move_group", goal, done)
 
-    def execute(self, trajectory: msg.RobotTrajectory, done: Callable[[Outcome], None]) -> None:
-        """Follow a RobotTrajectory; ``done(Outcome)`` as in :meth:`plan`. Raises NoAnswer."""
+    def execute(self, trajectory: msg.RobotTrajectory, done: Callable[[ActionOutcome], None]) -> None:
+        """Follow a RobotTrajectory; ``done(ActionOutcome)`` as in :meth:`plan`. Raises NoAnswer."""
         self._send("execute_trajectory", msg.ExecuteTrajectoryGoal(trajectory), done)
 
     def stop(self) -> None:
@@ -213,7 +213,7 @@ class MoveGroupClient:
             handle.cancel()
         self._event.publish("stop")
 
-    def _send(self, name: str, goal: rospy.Message, done: Callable[[Outcome], None]) -> None:
+    def _send(self, name: str, goal: rospy.Message, done: Callable[[ActionOutcome], None]) -> None:
         client = self._clients[name]
         # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
         if not client.wait_for_server(rospy.Duration(0, -1)):
@@ -236,19 +236,19 @@ class MoveGroupClient:
                 self._handles.add(handle)
 
 
-def _touch(contact: msg.ContactInformation) -> Touch:
+def _touch(contact: msg.ContactInformation) -> BodyTouch:
     bodies = ((contact.contact_body_1, contact.body_type_1), (contact.contact_body_2, contact.body_type_2))
     kinds = msg.ContactInformation
-    return Touch(contact.contact_body_1, contact.contact_body_2,
-                 tuple(name for name, kind in bodies if kind == kinds.ROBOT_LINK),
-                 tuple(name for name, kind in bodies if kind == kinds.ROBOT_ATTACHED),
-                 (contact.position.x, contact.position.y, contact.position.z), contact.header.frame_id)
+    return BodyTouch(contact.contact_body_1, contact.contact_body_2,
+                     tuple(name for name, kind in bodies if kind == kinds.ROBOT_LINK),
+                     tuple(name for name, kind in bodies if kind == kinds.ROBOT_ATTACHED),
+                     (contact.position.x, contact.position.y, contact.position.z), contact.header.frame_id)
 
 
-def _outcome(handle: ClientGoalHandle) -> Outcome:
+def _outcome(handle: ClientGoalHandle) -> ActionOutcome:
     result, text = handle.get_result(), handle.get_goal_status_text()
     if result is None:
-        return Outcome(False, text or "no result came")
+        return ActionOutcome(False, text or "no result came")
     success = result.error_code.val == MoveItErrorCodes.SUCCESS
-    return Outcome(success, text or code_name(result.error_code.val), getattr(result, "planned_trajectory", None),
-                   getattr(result, "planning_time", 0.0))
+    return ActionOutcome(success, text or code_name(result.error_code.val), getattr(result, "planned_trajectory", None),
+                         getattr(result, "planning_time", 0.0))

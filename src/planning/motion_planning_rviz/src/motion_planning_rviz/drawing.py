@@ -36,7 +36,7 @@ class Solid(NamedTuple):
     points: np.ndarray | None = None
 
 
-class Drawn(NamedTuple):
+class DrawnSolid(NamedTuple):
     """A Solid in a picture. name: of the link or object; number: counts the shapes of one name; pose (4, 4); colour
     r g b a."""
 
@@ -94,7 +94,8 @@ def link_solids(robot: Robot, links: Iterable[str]) -> dict[str, tuple[Solid, ..
 
 
 def drawn(solids: Mapping[str, Sequence[Solid]], poses: Mapping[str, np.ndarray], colour: Colour,
-          special: Mapping[str, Colour] | None = None) -> list[Drawn]:
-    """Return the Drawn of ``solids`` {name: (Solid, ...)}. poses: {name: (4, 4)}; special: {name: its own colour}."""
-    return [Drawn(name, number, solid, poses[name] @ solid.pose, (special or {}).get(name, colour))
+          special: Mapping[str, Colour] | None = None) -> list[DrawnSolid]:
+    """Return the DrawnSolid of ``solids`` {name: (Solid, ...)}. poses: {name: (4, 4)}; special: {name: its own
+    colour}."""
+    return [DrawnSolid(name, number, solid, poses[name] @ solid.pose, (special or {}).get(name, colour))
             for name, several in solids.items() for number, solid in enumerate(several)]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 FILM_HZ = 15.0
 
 
-class Picture:
+class MarkerSet:
     """A topic with one set of markers. Only markers that are no longer needed are deleted: otherwise rviz would load
     meshes again, and flicker.
 
@@ -50,11 +50,11 @@ class Picture:
         return self._publisher.get_num_connections() > 0
 
 
-class Film:
+class PlaybackFilm:
     """Shows a playback.Playback on a topic again and again, in a separate thread. width: of the line [m]."""
 
     def __init__(self, name: str, model: PlanningModel, width: float) -> None:
-        self._picture, self._model, self._width = Picture(name, model.root), model, width
+        self._picture, self._model, self._width = MarkerSet(name, model.root), model, width
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._enabled, self._playback, self._begin = True, None, 0.0

@@ -18,7 +18,7 @@ from motion_planning_rviz.messages import pose_message
 if TYPE_CHECKING:
     from visualization_msgs.msg import InteractiveMarkerFeedback
 
-    from motion_planning_rviz.menu import Entry
+    from motion_planning_rviz.menu import PanelEntry
 
 #: The topic of MoveIt's panel for its markers; programs expect them there.
 TOPIC = "/rviz_moveit_motion_planning_display/robot_interaction_interactive_marker_topic"
@@ -53,13 +53,13 @@ def marker_message(which: str, link: str, pose: np.ndarray, frame: str, scale: f
     return message
 
 
-def menu_entries(entries: Iterable[Entry]) -> list[MenuEntry]:
-    """Return the MenuEntries of menu.Entries."""
+def menu_entries(entries: Iterable[PanelEntry]) -> list[MenuEntry]:
+    """Return the MenuEntries of the panel's entries."""
     return [MenuEntry(id=entry.number, parent_id=entry.parent, title=entry.title, command_type=MenuEntry.FEEDBACK)
             for entry in entries]
 
 
-class Handles:
+class HandleMarkers:
     """The markers on ``topic``. on_feedback: function of an InteractiveMarkerFeedback; frame: the robot's root link."""
 
     def __init__(self, topic: str, frame: str, scale: float,
@@ -92,7 +92,7 @@ class Handles:
             self._names -= gone
             self._server.applyChanges()
 
-    def set_menu(self, entries: Iterable[Entry]) -> None:
+    def set_menu(self, entries: Iterable[PanelEntry]) -> None:
         """Give every marker the menu of these menu.Entries."""
         with self._lock:
             self._menu = menu_entries(entries)

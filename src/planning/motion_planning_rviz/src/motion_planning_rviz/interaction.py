@@ -34,7 +34,7 @@ class Handle(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Query:
+class PanelQuery:
     """The present planning query. Immutable.
 
     group: name. goal: State. start: State, None for the robot's present state. speed: share of the joints' limits, for
@@ -54,7 +54,7 @@ class Query:
         """The State of "goal" or "start"; None for a start at the robot's present state."""
         return self.goal if which == "goal" else self.start
 
-    def with_state(self, which: str, state: State | None) -> Query:
+    def with_state(self, which: str, state: State | None) -> PanelQuery:
         return replace(self, **{which: state})
 
 

@@ -9,7 +9,7 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0)
 BOX_SIZES_M = (0.05, 0.1, 0.2)
 
 
-class Entry(NamedTuple):
+class PanelEntry(NamedTuple):
     """number: from 1 on, the same in every menu of a panel; parent: number of the entry it is below, 0 at the top;
     command: (what, value ...), empty for entries that only hold others."""
 
@@ -35,7 +35,7 @@ class MenuState(NamedTuple):
     attached: tuple[str, ...] = ()
 
 
-def build(state: MenuState, numbers: dict[tuple[int, Hashable], int]) -> list[Entry]:
+def build(state: MenuState, numbers: dict[tuple[int, Hashable], int]) -> list[PanelEntry]:
     """Return the Entries for a MenuState.
 
     numbers: {(parent, command or title): number} of all menus before, to which new entries are added: rviz answers with
@@ -88,12 +88,12 @@ def build(state: MenuState, numbers: dict[tuple[int, Hashable], int]) -> list[En
 
 class _Menu:
     def __init__(self, numbers: dict[tuple[int, Hashable], int]) -> None:
-        self.entries: list[Entry] = []
+        self.entries: list[PanelEntry] = []
         self._numbers = numbers
 
     def add(self, parent: int, title: str, *command: Hashable) -> int:
         number = self._numbers.setdefault((parent, command or title), len(self._numbers) + 1)
-        self.entries.append(Entry(number, parent, title, command))
+        self.entries.append(PanelEntry(number, parent, title, command))
         return number
 
     def choice(self, parent: int, title: str, chosen: bool, *command: Hashable) -> int:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from moveit_msgs.msg import CollisionObject, DisplayTrajectory, PlanningScene
 
     from motion_planning.model import PlanningModel
-    from motion_planning_rviz.drawing import Colour, Drawn, Solid
+    from motion_planning_rviz.drawing import Colour, DrawnSolid, Solid
 
 #: Tolerance of a joint goal [rad or m], as in MoveIt's programs.
 JOINT_TOLERANCE = 1e-4
@@ -151,8 +151,8 @@ def _plane_pose(coefficients: Sequence[float]) -> np.ndarray:
     return rigid(turn, -coefficients[3] / length * normal)
 
 
-def marker_of(one: Drawn, frame: str, prefix: str = "") -> Marker:
-    """Return the Marker of a drawing.Drawn whose pose is in ``frame``."""
+def marker_of(one: DrawnSolid, frame: str, prefix: str = "") -> Marker:
+    """Return the Marker of a drawing.DrawnSolid whose pose is in ``frame``."""
     solid = one.solid
     marker = Marker(ns=prefix + one.name, id=one.number, type=_KINDS[solid.kind], action=Marker.ADD,
                     pose=pose_message(one.pose), scale=Vector3(*map(float, solid.size)), color=ColorRGBA(*one.colour),

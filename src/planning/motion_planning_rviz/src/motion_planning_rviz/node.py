@@ -55,7 +55,8 @@ class PanelNode:
     def __init__(self, model: PlanningModel) -> None:
         self._model = model
         scale = float(rospy.get_param("~marker_scale", 0.2))
-        markers = handles.Handles(rospy.get_param("~marker_topic", handles.TOPIC), model.root, scale, self._on_feedback)
+        markers = handles.HandleMarkers(rospy.get_param("~marker_topic", handles.TOPIC), model.root, scale,
+                                        self._on_feedback)
         self._view = View(model, markers, scale)
         self._worker = Worker(self._on_error)
         self._client = MoveGroupClient(model, float(rospy.get_param("~planning_time", 5.0)))

@@ -12,14 +12,14 @@ import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning_rviz import interaction, menu
-from motion_planning_rviz.client import NoPosture, Snapshot
+from motion_planning_rviz.client import NoPosture, SceneSnapshot
 from motion_planning_rviz.interaction import WHICH, InteractionError
 
 if TYPE_CHECKING:
     from numpy.random import Generator as Random
 
     from motion_planning.model import PlanningModel, State
-    from motion_planning_rviz.client import MoveGroupClient, Outcome, Touch
+    from motion_planning_rviz.client import ActionOutcome, BodyTouch, MoveGroupClient
     from motion_planning_rviz.interaction import Handle
     from motion_planning_rviz.view import View
     from motion_planning_rviz.worker import Worker
@@ -45,10 +45,10 @@ class Panel:
         self.groups = interaction.plannable(model)
         if not self.groups:
             raise InteractionError("robot '%s' has no group with joints; its SRDF has to name one" % model.name)
-        self.query = interaction.Query(self.groups[0], model.default_state())
+        self.query = interaction.PanelQuery(self.groups[0], model.default_state())
         self.handles = ()
         self.trajectory = None
-        self._snapshot = Snapshot({}, [], [], {})
+        self._snapshot = SceneSnapshot({}, [], [], {})
         self._planners = {}
         self._menu_numbers = {}
         self._path_shown = True
@@ -88,7 +88,7 @@ class Panel:
             self._show(which, moved=False)
         self._show_menu()
 
-    def _look(self) -> Snapshot:
+    def _look(self) -> SceneSnapshot:
         self._snapshot = self.client.snapshot()
         return self._snapshot
 
@@ -116,7 +116,7 @@ class Panel:
                                     for handle in self.handles})
         self._say()
 
-    def _invalid(self, state: State, touches: Sequence[Touch]) -> str:
+    def _invalid(self, state: State, touches: Sequence[BodyTouch]) -> str:
         beyond = ["joint '%s' is at %.4g, beyond %.4g to %.4g" % found for found in self.model.beyond_limits(
             state.q, 1e-6, self.model.group(self.query.group).indices)]
         pairs = list(dict.fromkeys("%s touches %s" % (touch.a, touch.b) for touch in touches))
@@ -282,8 +282,8 @@ class Panel:
             self._busy = ""
         self._say(motion="stopped")
 
-    def _begin(self, what: str, send: Callable[[Callable[[Outcome], None]], None],
-               ended: Callable[[Outcome], None]) -> None:
+    def _begin(self, what: str, send: Callable[[Callable[[ActionOutcome], None]], None],
+               ended: Callable[[ActionOutcome], None]) -> None:
         if self._busy:
             raise InteractionError("still %s; stop that first" % self._busy)
         self._busy, generation = what, self._generation
@@ -294,13 +294,13 @@ class Panel:
             self._busy = ""
             raise
 
-    def _ended(self, generation: int, outcome: Outcome, ended: Callable[[Outcome], None]) -> None:
+    def _ended(self, generation: int, outcome: ActionOutcome, ended: Callable[[ActionOutcome], None]) -> None:
         # A result after a stop is ignored.
         if generation == self._generation:
             self._busy = ""
             ended(outcome)
 
-    def _planned(self, outcome: Outcome) -> None:
+    def _planned(self, outcome: ActionOutcome) -> None:
         self.trajectory = outcome.trajectory if outcome.success else None
         if self.trajectory is None:
             self._say(motion="no plan: " + outcome.text)
@@ -309,7 +309,7 @@ class Panel:
         seconds = points[-1].time_from_start.to_sec() if points else 0.0
         self._say(motion="planned: %.2f s long, found in %.3f s" % (seconds, outcome.seconds))
 
-    def _executed(self, outcome: Outcome) -> None:
+    def _executed(self, outcome: ActionOutcome) -> None:
         if outcome.success:
             self.trajectory = None
             self.view.forget_path()

@@ -13,7 +13,7 @@ from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker
 
 from motion_planning_rviz import drawing
-from motion_planning_rviz.film import Film, Picture
+from motion_planning_rviz.film import MarkerSet, PlaybackFilm
 from motion_planning_rviz.interaction import WHICH
 from motion_planning_rviz.messages import line_marker, marker_of, object_solids, playback_of, text_marker
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, DisplayTrajectory
 
     from motion_planning.model import PlanningModel, State
-    from motion_planning_rviz.client import Snapshot, Touch
+    from motion_planning_rviz.client import BodyTouch, SceneSnapshot
     from motion_planning_rviz.drawing import Colour
-    from motion_planning_rviz.handles import Handles
+    from motion_planning_rviz.handles import HandleMarkers
     from motion_planning_rviz.interaction import Handle
-    from motion_planning_rviz.menu import Entry
+    from motion_planning_rviz.menu import PanelEntry
 
 _COLOURS = {"goal": drawing.GOAL, "start": drawing.START}
 #: Topics with pictures, below the node's name.
@@ -39,14 +39,15 @@ _TEXT, _ABOVE, _LINE, _CONTACT = 0.16, 1.0, 0.04, 0.15
 
 class View:
     """Publishes the ghosts ``~goal_state`` and ``~start_state``, ``~contacts``, ``~planning_scene``, ``~planned_path``
-    and ``~text`` (all MarkerArray), and ``~status`` (String). handles: handles.Handles; scale: size of its markers [m].
+    and ``~text`` (all MarkerArray), and ``~status`` (String). handles: handles.HandleMarkers; scale: size of its
+    markers [m].
     """
 
-    def __init__(self, model: PlanningModel, handles: Handles, scale: float) -> None:
+    def __init__(self, model: PlanningModel, handles: HandleMarkers, scale: float) -> None:
         self._model, self._handles, self._scale = model, handles, scale
-        self._pictures = {name: Picture("~" + name, model.root) for name in PICTURES}
+        self._pictures = {name: MarkerSet("~" + name, model.root) for name in PICTURES}
         self._status = rospy.Publisher("~status", String, queue_size=10, latch=True)
-        self._film = Film("~" + FILM, model, _LINE * scale)
+        self._film = PlaybackFilm("~" + FILM, model, _LINE * scale)
         self._solids, self._moving, self._links = {}, frozenset(), ()
         self._touches, self._anchor = {}, np.zeros(3)
         self._entries, self._said, self._logged = {}, None, ""
@@ -62,7 +63,7 @@ class View:
         self._links = tuple(handle.link for handle in handles)
         self._film.forget()
 
-    def ghost(self, which: str, state: State, touches: Sequence[Touch], attached: Iterable[AttachedCollisionObject],
+    def ghost(self, which: str, state: State, touches: Sequence[BodyTouch], attached: Iterable[AttachedCollisionObject],
               unreached: tuple[Handle, np.ndarray] | None) -> None:
         """Draw the group's links at ``state`` and their attached objects; bodies in contact are red.
 
@@ -102,7 +103,7 @@ class View:
         """Put markers to ``poses`` {Handle: (4, 4)}."""
         self._handles.place(which, {handle.link: pose for handle, pose in poses.items()})
 
-    def menu(self, entries: Iterable[Entry]) -> None:
+    def menu(self, entries: Iterable[PanelEntry]) -> None:
         """Show menu.Entries behind a right click. Those of earlier menus stay known: a click may be on its way."""
         self._entries.update({entry.number: entry.command for entry in entries})
         self._handles.set_menu(entries)
@@ -141,8 +142,8 @@ class View:
             rospy.loginfo("%s", motion)
         self._logged = motion
 
-    def scene(self, snapshot: Snapshot) -> None:
-        """Draw the objects of the world and attached objects at their present poses, from a client.Snapshot."""
+    def scene(self, snapshot: SceneSnapshot) -> None:
+        """Draw the objects of the world and attached objects at their present poses, from a client.SceneSnapshot."""
         markers = []
         for one in snapshot.objects:
             markers += _object(one, one.header.frame_id, snapshot.colours.get(one.id, drawing.THING))

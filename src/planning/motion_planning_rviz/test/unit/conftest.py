@@ -11,7 +11,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import xacro
 from motion_planning.kinematics import ik
 from motion_planning.model import PlanningModel
-from motion_planning_rviz.client import NoAnswer, NoPosture, Outcome, Snapshot
+from motion_planning_rviz.client import ActionOutcome, NoAnswer, NoPosture, SceneSnapshot
 from motion_planning_rviz.panel import Panel
 
 TWINS_URDF = """<robot name="twins">
@@ -67,7 +67,7 @@ class FakeClient:
 
     def snapshot(self):
         self._check()
-        return Snapshot(self.robot, list(self.objects), list(self.attached), {}, self.is_measured)
+        return SceneSnapshot(self.robot, list(self.objects), list(self.attached), {}, self.is_measured)
 
     def _check(self):
         if self.missing:
@@ -174,8 +174,8 @@ def trajectory():
 
 @pytest.fixture(scope="session")
 def planned(trajectory):
-    """Function of times [s] that returns the Outcome of a plan with points at these."""
-    return lambda *times: Outcome(True, "", trajectory(*times), 0.0123)
+    """Function of times [s] that returns the ActionOutcome of a plan with points at these."""
+    return lambda *times: ActionOutcome(True, "", trajectory(*times), 0.0123)
 
 
 @pytest.fixture

@@ -48,7 +48,7 @@ def test_scenes_that_tell_of_joints_alone():
 
 def test_a_marker_shows_a_shape():
     pose = pose_matrix((1.0, 0.0, 0.0), (0.0, 0.0, 0.5))
-    one = drawing.Drawn("crate", 3, drawing.solid_of(Box((0.1, 0.2, 0.3)), np.eye(4)), pose, drawing.THING)
+    one = drawing.DrawnSolid("crate", 3, drawing.solid_of(Box((0.1, 0.2, 0.3)), np.eye(4)), pose, drawing.THING)
     marker = messages.marker_of(one, "base")
     assert (marker.ns, marker.id, marker.type, marker.header.frame_id) == ("crate", 3, Marker.CUBE, "base")
     assert (marker.scale.x, marker.scale.y, marker.scale.z) == (0.1, 0.2, 0.3)

@@ -5,10 +5,10 @@ import pytest
 
 from motion_planning.errors import PlanningError
 from motion_planning_rviz import interaction
-from motion_planning_rviz.client import NoAnswer, Outcome, Touch
+from motion_planning_rviz.client import ActionOutcome, BodyTouch, NoAnswer
 from motion_planning_rviz.interaction import InteractionError
 
-TOUCH = Touch("left_hand", "crate", ("left_hand",), (), (0.0, 0.0, 0.0), "base")
+TOUCH = BodyTouch("left_hand", "crate", ("left_hand",), (), (0.0, 0.0, 0.0), "base")
 
 
 def command(panel, *words):
@@ -153,7 +153,7 @@ def test_a_plan_is_executed(twins, panel_of, planned):
     panel.execute()
     _, trajectory, done = panel.client.sent.pop()
     assert trajectory.joint_trajectory.points[-1].time_from_start.to_sec() == 1.5
-    done(Outcome(True, "SUCCESS"))
+    done(ActionOutcome(True, "SUCCESS"))
     assert panel.view.lines == ["executed"] and panel.view.seen[-1] == "no path"
     with pytest.raises(InteractionError, match="there is no plan"):
         panel.execute()
@@ -163,10 +163,10 @@ def test_the_reason_of_a_failure_is_said(twins, panel_of):
     panel = panel_of(twins)
     panel.plan_and_execute()
     assert panel.client.sent[-1][2] is True
-    panel.client.sent.pop()[3](Outcome(False, "GOAL_IN_COLLISION: left_hand and crate"))
+    panel.client.sent.pop()[3](ActionOutcome(False, "GOAL_IN_COLLISION: left_hand and crate"))
     assert panel.view.lines == ["not executed: GOAL_IN_COLLISION: left_hand and crate"]
     panel.plan()
-    panel.client.sent.pop()[3](Outcome(False, "TIMED_OUT"))
+    panel.client.sent.pop()[3](ActionOutcome(False, "TIMED_OUT"))
     assert panel.view.lines == ["no plan: TIMED_OUT"] and panel.trajectory is None
 
 

@@ -54,7 +54,7 @@ def how_to_start() -> str:
         " or ".join(found) or "ROBOT_moveit_config")
 
 
-class Connection:
+class MoveGroupConnection:
     """To the move_group in one namespace. All methods can be called from several threads."""
 
     def __init__(self, namespace: str) -> None:
@@ -174,7 +174,7 @@ def _failure(name: str) -> Any:
 
 
 @cache
-def connect(namespace: str) -> Connection:
+def connect(namespace: str) -> MoveGroupConnection:
     """Return the program's connection to the move_group in a namespace, the same one for every commander."""
     ensure_node()
-    return Connection(namespace)
+    return MoveGroupConnection(namespace)

@@ -21,14 +21,15 @@ from .tuning import Tunable
 if TYPE_CHECKING:
     from motion_planning.model import Group, PlanningModel, State
 
-    from .connection import Connection
+    from .connection import MoveGroupConnection
     from .requests import RequestSettings
 
 
-class GroupState(Tunable):
+class GroupQueries(Tunable):
     """The methods of MoveGroupCommander that read."""
 
-    def __init__(self, connection: Connection, model: PlanningModel, group: Group, settings: RequestSettings) -> None:
+    def __init__(self, connection: MoveGroupConnection, model: PlanningModel, group: Group,
+                 settings: RequestSettings) -> None:
         super().__init__(settings)
         self._connection, self._model, self._group = connection, model, group
         self._end_effector_link = group.tip or ""

@@ -22,7 +22,7 @@ from std_msgs.msg import String
 from . import requests, scene_calls
 from .connection import connect
 from .description import load
-from .plan import Plan, trajectory_of
+from .plan import PlanTuple, trajectory_of
 from .requests import JOINTS, RequestSettings, code_name
 from .retiming import retimed
 from .targeting import Targeting
@@ -108,14 +108,14 @@ class MoveGroupCommander(Targeting):
             return True
         return self._ended("move_group", goal).error_code.val == MoveItErrorCodes.SUCCESS
 
-    def plan(self, joints: JointsLike | PoseLike | None = None) -> Plan:
+    def plan(self, joints: JointsLike | PoseLike | None = None) -> PlanTuple:
         """Plan, as :meth:`go` does; return (success, RobotTrajectory, planning time, MoveItErrorCodes).
 
-        The tuple can be used as the trajectory itself, too (:class:`Plan`).
+        The tuple can be used as the trajectory itself, too (:class:`PlanTuple`).
         """
         result = self._ended("move_group", self._goal(joints, plan_only=True))
-        return Plan((result.error_code.val == MoveItErrorCodes.SUCCESS, result.planned_trajectory, result.planning_time,
-                     result.error_code))
+        return PlanTuple((result.error_code.val == MoveItErrorCodes.SUCCESS, result.planned_trajectory,
+                          result.planning_time, result.error_code))
 
     def _goal(self, joints: JointsLike | PoseLike | None, plan_only: bool) -> MoveGroupGoal:
         if isinstance(joints, Pose | PoseStamped):

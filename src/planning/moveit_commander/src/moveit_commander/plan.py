@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     Motion = tuple | RobotTrajectory | JointTrajectory
 
 
-class Plan(tuple):
+class PlanTuple(tuple):
     """(success, RobotTrajectory, planning time [s], MoveItErrorCodes).
 
     Every attribute of the trajectory is one of the plan, too (``plan.joint_trajectory.points``, ``plan.serialize``), so
@@ -34,7 +34,7 @@ class Plan(tuple):
 
 
 def trajectory_of(plan: Motion | None) -> RobotTrajectory:
-    """Return the RobotTrajectory in a Plan, a tuple like it, a RobotTrajectory or a JointTrajectory.
+    """Return the RobotTrajectory in a PlanTuple, a tuple like it, a RobotTrajectory or a JointTrajectory.
 
     Raises TypeError for anything else.
     """

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["RobotCommander"]
 
 
-class Joint:
+class CommanderJoint:
     """A joint of the robot. Raises MoveItCommanderException for an unknown name."""
 
     def __init__(self, robot: RobotCommander, name: str) -> None:
@@ -68,7 +68,7 @@ class Joint:
         return group.go(wait)
 
 
-class Link:
+class CommanderLink:
     """A link of the robot. Raises MoveItCommanderException for an unknown name."""
 
     def __init__(self, robot: RobotCommander, name: str) -> None:
@@ -92,7 +92,7 @@ class RobotCommander:
     Raises RuntimeError without a description. ns: namespace of move_group.
     """
 
-    Joint, Link = Joint, Link
+    Joint, Link = CommanderJoint, CommanderLink
 
     def __init__(self, robot_description: str = "robot_description", ns: str = "") -> None:
         self._robot_description, self._namespace = robot_description, ns
@@ -157,15 +157,15 @@ class RobotCommander:
             self._groups[name] = MoveGroupCommander(name, self._robot_description, self._namespace)
         return self._groups[name]
 
-    def get_joint(self, name: str) -> Joint:
-        """Return a :class:`Joint`."""
-        return Joint(self, name)
+    def get_joint(self, name: str) -> CommanderJoint:
+        """Return a :class:`CommanderJoint`."""
+        return CommanderJoint(self, name)
 
-    def get_link(self, name: str) -> Link:
-        """Return a :class:`Link`."""
-        return Link(self, name)
+    def get_link(self, name: str) -> CommanderLink:
+        """Return a :class:`CommanderLink`."""
+        return CommanderLink(self, name)
 
-    def __getattr__(self, name: str) -> MoveGroupCommander | Joint | Link:
+    def __getattr__(self, name: str) -> MoveGroupCommander | CommanderJoint | CommanderLink:
         if name.startswith("_"):
             raise AttributeError(name)
         if name in self._model.groups:

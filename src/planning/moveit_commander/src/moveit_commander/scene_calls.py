@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The planning scene of a running move_group: asked for, and changed. ``connection``: a connection.Connection."""
+"""The planning scene of a running move_group: asked for, and changed. ``connection``: a
+connection.MoveGroupConnection."""
 from __future__ import annotations
 
 from collections.abc import Iterable
@@ -15,15 +16,15 @@ from .exception import MoveItCommanderException
 if TYPE_CHECKING:
     from moveit_msgs.msg import RobotState
 
-    from moveit_commander.connection import Connection
+    from moveit_commander.connection import MoveGroupConnection
 
 
-def scene(connection: Connection, components: int) -> PlanningScene:
+def scene(connection: MoveGroupConnection, components: int) -> PlanningScene:
     """Return the PlanningScene with the parts that ``components``, a sum of PlanningSceneComponents' numbers, names."""
     return connection.call("get_planning_scene", components=PlanningSceneComponents(components)).scene
 
 
-def robot_state(connection: Connection) -> RobotState:
+def robot_state(connection: MoveGroupConnection) -> RobotState:
     """Return the RobotState now, with what the robot holds. It has no stamp, as MoveIt's: programs compare states."""
     state = scene(connection, PlanningSceneComponents.ROBOT_STATE
                   | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS).robot_state
@@ -31,7 +32,7 @@ def robot_state(connection: Connection) -> RobotState:
     return state
 
 
-def held_frame(connection: Connection, name: str) -> tuple[str, np.ndarray]:
+def held_frame(connection: MoveGroupConnection, name: str) -> tuple[str, np.ndarray]:
     """Return (link, pose (4, 4) in it) of an attached object, or of "object/subframe" of one. Raises
     MoveItCommanderException for other names."""
     owner, _, subframe = name.rpartition("/")
@@ -52,7 +53,7 @@ def difference() -> PlanningScene:
     return message
 
 
-def attach(connection: Connection, attached: AttachedCollisionObject) -> bool:
+def attach(connection: MoveGroupConnection, attached: AttachedCollisionObject) -> bool:
     """Attach or detach (AttachedCollisionObject), and return whether that was done."""
     message = difference()
     message.robot_state.attached_collision_objects = [attached]

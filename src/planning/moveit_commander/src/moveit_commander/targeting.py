@@ -21,9 +21,9 @@ from urdf_model.transforms import rpy_from_matrix, rpy_matrix
 from . import states
 from .conversions import list_to_pose, matrix_of, pose_of, pose_to_list
 from .exception import MoveItCommanderException
-from .group_state import GroupState
+from .group_state import GroupQueries
 from .requests import JOINTS, ORIENTATION, POSE, POSITION, code_name
-from .targets import JointTarget, with_followers
+from .targets import JointValueTarget, with_followers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from motion_planning.model import Group, PlanningModel
 
-    from .connection import Connection
+    from .connection import MoveGroupConnection
     from .requests import RequestSettings
 
     PoseLike = Pose | PoseStamped | Sequence[float]
@@ -40,12 +40,13 @@ if TYPE_CHECKING:
     JointsLike = str | ManyJointsLike
 
 
-class Targeting(GroupState):
+class Targeting(GroupQueries):
     """The methods of MoveGroupCommander that set targets."""
 
-    def __init__(self, connection: Connection, model: PlanningModel, group: Group, settings: RequestSettings) -> None:
+    def __init__(self, connection: MoveGroupConnection, model: PlanningModel, group: Group,
+                 settings: RequestSettings) -> None:
         super().__init__(connection, model, group, settings)
-        self._joint_target = JointTarget(model, group)
+        self._joint_target = JointValueTarget(model, group)
         self._pose_targets: dict[str, list[PoseStamped]] = {}
         self._kind = JOINTS
         self._remembered: dict[str, list[float]] = {}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from motion_planning.model import Group, PlanningModel
 
 
-class JointTarget:
+class JointValueTarget:
     """Values for every variable of a model, of which those of one group are the target.
 
     It starts at the model's default state: every joint at 0, or in the middle of its limits if 0 is beyond them.

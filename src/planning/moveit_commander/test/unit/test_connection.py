@@ -29,12 +29,13 @@ def waiting(monkeypatch):
                 raise node
             return node
 
-        monkeypatch.setattr(connection.Connection, "_client", lambda self, _: SimpleNamespace(wait_for_server=served))
+        monkeypatch.setattr(connection.MoveGroupConnection, "_client", lambda self,
+                            _: SimpleNamespace(wait_for_server=served))
         monkeypatch.setattr(rosgraph.Master, "lookupNode", lookup)
         monkeypatch.setattr(rospy, "get_name", lambda: "/test")
         monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
         monkeypatch.setattr(rospy, "logwarn", logged.append)
-        connection.Connection("").wait_for_actions(names, LIMIT_S)
+        connection.MoveGroupConnection("").wait_for_actions(names, LIMIT_S)
         return logged
     monkeypatch.setattr(connection, "_POLL_S", 0.02)
     return wait

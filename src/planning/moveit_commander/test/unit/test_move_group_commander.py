@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from moveit_commander import MoveGroupCommander, MoveItCommanderException, conversions
-from moveit_commander.plan import Plan
+from moveit_commander.plan import PlanTuple
 
 
 def trajectory():
@@ -223,7 +223,7 @@ def test_plan_is_melodics_trajectory_too(arm, planned):
     assert sent.trajectory[0].joint_trajectory.points[1].positions == (0.1, 0.2)
     assert conversions.msg_to_string(plan) == conversions.msg_to_string(plan[1])
     for copied in (copy.copy(plan), copy.deepcopy(plan)):
-        assert isinstance(copied, Plan) and copied.joint_trajectory == plan.joint_trajectory
+        assert isinstance(copied, PlanTuple) and copied.joint_trajectory == plan.joint_trajectory
     with pytest.raises(AttributeError):
         plan.points  # noqa: B018
 

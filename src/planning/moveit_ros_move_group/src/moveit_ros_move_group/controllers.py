@@ -22,12 +22,12 @@ _SERVERS = (
     ("robot/end_effector/", "/gripper_action", "rosrun baxter_interface gripper_action_server.py"))
 
 
-class ControllerError(PlanningError):
+class NoControllers(PlanningError):
     """No set of controllers fits; the sentence names the joints."""
 
 
 @dataclass(frozen=True)
-class Controller:
+class ControllerEntry:
     """One entry of a controller_list.
 
     name: its namespace, may be empty; kind: FOLLOW, GRIPPER or FAKE; joints: those that it moves; action: name of its
@@ -55,7 +55,7 @@ class Controller:
         return "start the controller that serves it, or correct its name in controller_list"
 
 
-def read_list(entries: object, fake: bool = False) -> tuple[list[Controller], list[str]]:
+def read_list(entries: object, fake: bool = False) -> tuple[list[ControllerEntry], list[str]]:
     """Return (list of Controllers, list of sentences on entries that were left out) of a ``controller_list``."""
     controllers, complaints = [], []
     for number, entry in enumerate(entries if isinstance(entries, list) else [], 1):
@@ -76,42 +76,42 @@ def read_list(entries: object, fake: bool = False) -> tuple[list[Controller], li
                 complaints.append("fake controller '%s' is of type '%s', expected one of %s; it interpolates"
                                   % (entry["name"], kind, ", ".join(_FAKE_TYPES)))
                 kind = _FAKE_TYPES[0]
-            controllers.append(Controller(entry["name"], FAKE, tuple(joints), options={**options, "type": kind}))
+            controllers.append(ControllerEntry(entry["name"], FAKE, tuple(joints), options={**options, "type": kind}))
         elif entry["type"] not in (FOLLOW, GRIPPER):
             complaints.append("controller '%s' is of type '%s', expected %s or %s; it is left out"
                               % (entry["name"], entry["type"], FOLLOW, GRIPPER))
         else:
             action = "/".join(part for part in (entry["name"], entry["action_ns"]) if part)
-            controllers.append(Controller(entry["name"], entry["type"], tuple(joints), action,
-                                          bool(entry.get("default", False)), options))
+            controllers.append(ControllerEntry(entry["name"], entry["type"], tuple(joints), action,
+                                               bool(entry.get("default", False)), options))
     if not isinstance(entries, list):
         complaints.append("controller_list is %r, expected a list" % (entries,))
     return controllers, complaints
 
 
-def choose(controllers: Sequence[Controller], joints: Iterable[str],
-           alive: Callable[[Controller], bool] = lambda controller: True) -> list[Controller]:
+def choose(controllers: Sequence[ControllerEntry], joints: Iterable[str],
+           alive: Callable[[ControllerEntry], bool] = lambda controller: True) -> list[ControllerEntry]:
     """Return the fewest Controllers that together move all ``joints``; those that answer and defaults are preferred.
 
-    alive(controller): whether its action answers. Raises ControllerError, which names the joints without a controller.
+    alive(controller): whether its action answers. Raises NoControllers, which names the joints without a controller.
     """
     joints = set(joints)
     useful = [controller for controller in controllers if joints & set(controller.joints)]
     orphans = sorted(joints - {joint for controller in useful for joint in controller.joints})
     if orphans:
-        raise ControllerError(
+        raise NoControllers(
             "Unable to identify any set of controllers that can actuate the specified joints: [%s]. No controller "
             "moves %s; %s" % (" ".join(sorted(joints)), ", ".join(orphans), _known(controllers)))
     answering = {controller.action: alive(controller) for controller in useful}
 
-    def cost(chosen: Sequence[Controller]) -> tuple[int, ...]:
+    def cost(chosen: Sequence[ControllerEntry]) -> tuple[int, ...]:
         moved = [joint for controller in chosen for joint in controller.joints]
         return (sum(not answering[controller.action] for controller in chosen), len(chosen),
                 len(moved) - len(set(moved)), sum(not controller.default for controller in chosen), len(moved))
 
     if len(useful) > _MAX_TO_COMBINE:
         return _greedy(useful, joints)
-    best: tuple[Controller, ...] | None = None
+    best: tuple[ControllerEntry, ...] | None = None
     for size in range(1, len(useful) + 1):
         for chosen in itertools.combinations(useful, size):
             moved = {joint for controller in chosen for joint in controller.joints}
@@ -120,7 +120,7 @@ def choose(controllers: Sequence[Controller], joints: Iterable[str],
     return list(best or ())
 
 
-def _greedy(useful: Sequence[Controller], joints: Iterable[str]) -> list[Controller]:
+def _greedy(useful: Sequence[ControllerEntry], joints: Iterable[str]) -> list[ControllerEntry]:
     chosen, left = [], set(joints)
     while left:
         most = max(useful, key=lambda controller: len(left & set(controller.joints)))
@@ -129,7 +129,7 @@ def _greedy(useful: Sequence[Controller], joints: Iterable[str]) -> list[Control
     return chosen
 
 
-def _known(controllers: Sequence[Controller]) -> str:
+def _known(controllers: Sequence[ControllerEntry]) -> str:
     if not controllers:
         return "there are no controllers: the parameter controller_list is empty or missing"
     return "the controllers are %s" % ", ".join(
@@ -156,9 +156,9 @@ def start_deviation(names: Sequence[str], positions: Sequence[float], current: M
     return worst
 
 
-def allowed_duration(duration: float, controllers: Sequence[Controller], scaling: float, margin: float) -> float:
+def allowed_duration(duration: float, controllers: Sequence[ControllerEntry], scaling: float, margin: float) -> float:
     """How long [s] the controllers may take for a trajectory of ``duration``: the most generous of them decides."""
-    def number(controller: Controller, key: str, usual: float) -> float:
+    def number(controller: ControllerEntry, key: str, usual: float) -> float:
         value = controller.options.get(key, usual)
         return value if isinstance(value, (int, float)) and math.isfinite(value) else usual
 

@@ -14,14 +14,14 @@ from moveit_msgs.msg import MoveItErrorCodes
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from command_line.options import counted
-from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
+from moveit_ros_move_group.controllers import NoControllers, allowed_duration, choose, start_deviation
 from moveit_ros_move_group.handles import TICK_S
 from moveit_ros_move_group.rest_of_the_way import LATER_S, NewWay
 
 if TYPE_CHECKING:
     from moveit_msgs.msg import RobotTrajectory
 
-    from moveit_ros_move_group.controllers import Controller
+    from moveit_ros_move_group.controllers import ControllerEntry
     from moveit_ros_move_group.handles import Handle
     from moveit_ros_move_group.monitor import SceneMonitor
 
@@ -73,7 +73,7 @@ class ExecutionSettings:
 
 
 @dataclass
-class Outcome:
+class ExecutionOutcome:
     """How an execution ended: a value of MoveItErrorCodes, and the reason if it failed."""
 
     code: int
@@ -84,10 +84,10 @@ class Outcome:
 class Executor:
     """One execution at a time. settings: ExecutionSettings, which may be changed."""
 
-    def __init__(self, controllers: Callable[[], list[Controller]], settings: ExecutionSettings, monitor: SceneMonitor,
-                 handle_of: Callable[[Controller], Handle]) -> None:
-        """controllers(): list of controllers.Controller at present; may raise ControllerError. handle_of(controller):
-        how it is spoken to, as handles.Handles.of."""
+    def __init__(self, controllers: Callable[[], list[ControllerEntry]], settings: ExecutionSettings,
+                 monitor: SceneMonitor, handle_of: Callable[[ControllerEntry], Handle]) -> None:
+        """controllers(): list of controllers.ControllerEntry at present; may raise NoControllers.
+        handle_of(controller): how it is spoken to, as handles.ControllerHandles.of."""
         self._controllers, self.settings, self._monitor = controllers, settings, monitor
         self._handle_of = handle_of
         self._busy = threading.Lock()
@@ -104,8 +104,9 @@ class Executor:
         self._stop.set()
 
     def execute(self, message: RobotTrajectory, preempted: Callable[[], bool] = lambda: False,
-                invalidated: Callable[[], str | NewWay | None] = lambda: None, from_anywhere: bool = False) -> Outcome:
-        """Follow a RobotTrajectory to its end; return an Outcome.
+                invalidated: Callable[[], str | NewWay | None] = lambda: None,
+                from_anywhere: bool = False) -> ExecutionOutcome:
+        """Follow a RobotTrajectory to its end; return an ExecutionOutcome.
 
         preempted(): whether the caller wants to stop it; invalidated(): None, the reason why the rest of the path is no
         longer free, which ends the motion at once, or a NewWay, which is followed instead, until the joints rest if it
@@ -115,20 +116,20 @@ class Executor:
         trajectory = message.joint_trajectory
         if not trajectory.points:
             if message.multi_dof_joint_trajectory.points:
-                return Outcome(MoveItErrorCodes.CONTROL_FAILED, "no controller moves the multi-DOF joints %s"
-                               % ", ".join(message.multi_dof_joint_trajectory.joint_names))
-            return Outcome(MoveItErrorCodes.SUCCESS)
+                return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED, "no controller moves the multi-DOF joints %s"
+                                        % ", ".join(message.multi_dof_joint_trajectory.joint_names))
+            return ExecutionOutcome(MoveItErrorCodes.SUCCESS)
         flaw = _flaw(trajectory)
         if flaw:
-            return Outcome(MoveItErrorCodes.CONTROL_FAILED, flaw)
+            return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED, flaw)
         if not self._busy.acquire(blocking=False):
-            return Outcome(MoveItErrorCodes.CONTROL_FAILED,
-                           "another trajectory is being executed; wait or stop it first")
+            return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED,
+                                    "another trajectory is being executed; wait or stop it first")
         self._stop.clear()
         try:
             return self._follow(trajectory, preempted, invalidated, from_anywhere)
-        except ControllerError as error:
-            return Outcome(MoveItErrorCodes.CONTROL_FAILED, str(error))
+        except NoControllers as error:
+            return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED, str(error))
         finally:
             self._busy.release()
 
@@ -136,18 +137,18 @@ class Executor:
         """None where there are controllers for all ``joints``, else the sentence that names what is missing."""
         try:
             choose(self._controllers(), joints)
-        except ControllerError as error:
+        except NoControllers as error:
             return str(error)
         return None
 
-    def silent(self, timeout_s: float) -> list[Controller]:
+    def silent(self, timeout_s: float) -> list[ControllerEntry]:
         """Return the Controllers whose actions do not answer within ``timeout_s`` [s, wall time] in all."""
         deadline = time.monotonic() + timeout_s
         return [controller for controller in self._controllers()
                 if not self._handle_of(controller).connected(max(0.0, deadline - time.monotonic()))]
 
     def _follow(self, trajectory: JointTrajectory, preempted: Callable[[], bool],
-                invalidated: Callable[[], str | NewWay | None], from_anywhere: bool) -> Outcome:
+                invalidated: Callable[[], str | NewWay | None], from_anywhere: bool) -> ExecutionOutcome:
         def given_up() -> bool:
             return self._stop.is_set() or preempted()
 
@@ -159,9 +160,10 @@ class Executor:
         for controller, handle in zip(chosen, handles, strict=True):
             if not handle.connected(self.settings.connection_timeout, given_up):
                 if given_up():
-                    return Outcome(MoveItErrorCodes.PREEMPTED, "stopped on request")
-                return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; %s"
-                               % (controller, controller.remedy))
+                    return ExecutionOutcome(MoveItErrorCodes.PREEMPTED, "stopped on request")
+                return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED,
+                                        "Action client not connected: %s does not answer; %s"
+                                        % (controller, controller.remedy))
         try:
             _send(trajectory, chosen, handles)
             return self._watch(trajectory, chosen, handles, preempted, invalidated)
@@ -170,24 +172,26 @@ class Executor:
                 handle.cancel()
             raise
 
-    def _flaw_of_start(self, trajectory: JointTrajectory, given_up: Callable[[], bool]) -> Outcome | None:
-        """An Outcome where the joints are not where the trajectory starts, or do not say where they are; else None."""
+    def _flaw_of_start(self, trajectory: JointTrajectory, given_up: Callable[[], bool]) -> ExecutionOutcome | None:
+        """An ExecutionOutcome where the joints are not where the trajectory starts, or do not say where they are; else
+        None."""
         tolerance, names = self.settings.start_tolerance, trajectory.joint_names
         checked = [name for name, limit in zip(names, self._limits(names), strict=True) if limit > 0.0]
         # The first execution may be asked for before the first joint state has come.
         silent = self._monitor.wait_for_state(rospy.Time(), _FIRST_STATE_S, checked, given_up)
         if silent:
-            return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Failed to validate trajectory: %s" % silent)
+            return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED, "Failed to validate trajectory: %s" % silent)
         off = start_deviation(names, trajectory.points[0].positions, self._monitor.joint_values(), tolerance,
                               self._monitor.continuous)
         if off is None:
             return None
-        return Outcome(MoveItErrorCodes.CONTROL_FAILED,
-                       "Invalid Trajectory: start point deviates from current robot state more than the allowed start "
-                       "tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
+        return ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED,
+                                "Invalid Trajectory: start point deviates from current robot state more than the "
+                                "allowed start "
+                                "tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
 
-    def _watch(self, trajectory: JointTrajectory, chosen: Sequence[Controller], handles: Sequence[Handle],
-               preempted: Callable[[], bool], invalidated: Callable[[], str | NewWay | None]) -> Outcome:
+    def _watch(self, trajectory: JointTrajectory, chosen: Sequence[ControllerEntry], handles: Sequence[Handle],
+               preempted: Callable[[], bool], invalidated: Callable[[], str | NewWay | None]) -> ExecutionOutcome:
         duration = trajectory.points[-1].time_from_start.to_sec()
         allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
         begin, stops, answered = rospy.get_time(), "", time.monotonic()
@@ -217,11 +221,11 @@ class Executor:
             answered = answered if away else time.monotonic()
             failed = _failed(handles)
             if failed is None and time.monotonic() - answered > _AWAY_S:
-                failed = Outcome(MoveItErrorCodes.CONTROL_FAILED, "%s has ended while it moved the arm; %s"
-                                 % (away[0], away[0].remedy))
+                failed = ExecutionOutcome(MoveItErrorCodes.CONTROL_FAILED, "%s has ended while it moved the arm; %s"
+                                          % (away[0], away[0].remedy))
             elif failed is None and self.settings.monitored and now - begin > allowed:
-                failed = Outcome(MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
-                                 % (", ".join(map(str, chosen)), allowed, duration))
+                failed = ExecutionOutcome(MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
+                                          % (", ".join(map(str, chosen)), allowed, duration))
             if failed is not None:
                 return self._cancel(handles, failed.code, failed.text) if not stops else self._cancel(
                     handles, _INVALIDATED, "%s; %s" % (stops, failed.text))
@@ -230,15 +234,15 @@ class Executor:
             return failed
         if stops or self.settings.wait_for_rest:
             self._wait_for_rest(trajectory.joint_names, preempted)
-        return Outcome(_INVALIDATED, stops) if stops else Outcome(MoveItErrorCodes.SUCCESS)
+        return ExecutionOutcome(_INVALIDATED, stops) if stops else ExecutionOutcome(MoveItErrorCodes.SUCCESS)
 
-    def _cancel(self, handles: Sequence[Handle], code: int, text: str) -> Outcome:
+    def _cancel(self, handles: Sequence[Handle], code: int, text: str) -> ExecutionOutcome:
         for handle in handles:
             handle.cancel()
         deadline = time.monotonic() + _CANCEL_S
         for handle in handles:
             handle.done.wait(max(0.0, deadline - time.monotonic()))
-        return Outcome(code, text)
+        return ExecutionOutcome(code, text)
 
     def _wait_for_rest(self, names: Sequence[str], preempted: Callable[[], bool]) -> None:
         """Until three joint states in a row agree within the start tolerance."""
@@ -263,21 +267,21 @@ class Executor:
         tolerance = self.settings.start_tolerance
         return [tolerance.get(name, 0.0) if isinstance(tolerance, dict) else tolerance for name in names]
 
-    def _is_alive(self, controller: Controller) -> bool:
+    def _is_alive(self, controller: ControllerEntry) -> bool:
         return self._handle_of(controller).connected(0.0)
 
 
-def _send(trajectory: JointTrajectory, chosen: Sequence[Controller], handles: Sequence[Handle]) -> None:
+def _send(trajectory: JointTrajectory, chosen: Sequence[ControllerEntry], handles: Sequence[Handle]) -> None:
     for controller, handle in zip(chosen, handles, strict=True):
         handle.send(part_of(trajectory, controller.joints))
 
 
-def _failed(handles: Sequence[Handle]) -> Outcome | None:
-    """The Outcome of the first of those that have ended with an error, or None."""
+def _failed(handles: Sequence[Handle]) -> ExecutionOutcome | None:
+    """The ExecutionOutcome of the first of those that have ended with an error, or None."""
     for handle in handles:
         if handle.done.is_set() and handle.error():
             code = MoveItErrorCodes.PREEMPTED if handle.was_preempted() else MoveItErrorCodes.CONTROL_FAILED
-            return Outcome(code, handle.error())
+            return ExecutionOutcome(code, handle.error())
     return None
 
 

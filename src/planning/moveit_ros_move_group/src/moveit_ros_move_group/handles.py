@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from control_msgs.msg import GripperCommandFeedback
     from trajectory_msgs.msg import JointTrajectory
 
-    from moveit_ros_move_group.controllers import Controller
+    from moveit_ros_move_group.controllers import ControllerEntry
 
     Handle: TypeAlias = "FollowHandle | GripperHandle | FakeHandle"
 
@@ -47,13 +47,13 @@ _FOLLOW_ERRORS = {value: name for name, value in vars(FollowJointTrajectoryResul
 _STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if isinstance(value, int) and name.isupper()}
 
 
-class Handles:
+class ControllerHandles:
     """A handle for each controller, made when it is first asked for; controllers of one action share it."""
 
-    def __init__(self, controllers: Sequence[Controller], initial: Mapping[str, float] | None = None,
+    def __init__(self, controllers: Sequence[ControllerEntry], initial: Mapping[str, float] | None = None,
                  limits: Mapping[str, Sequence[float]] | None = None) -> None:
-        """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin. limits:
-        {joint: (lowest, highest)}, for grippers that are commanded in percent."""
+        """controllers: list of controllers.ControllerEntry. initial: {joint: value}, where fake controllers begin.
+        limits: {joint: (lowest, highest)}, for grippers that are commanded in percent."""
         self._limits = limits or {}
         self._made: dict[str, Handle] = {}
         self._fake_states: rospy.Publisher | None = None
@@ -62,7 +62,7 @@ class Handles:
         for controller in controllers:
             self.of(controller)
 
-    def of(self, controller: Controller) -> Handle:
+    def of(self, controller: ControllerEntry) -> Handle:
         key = controller.action or controller.name
         if key not in self._made:
             if controller.kind == FAKE:
@@ -113,7 +113,7 @@ class _Goal:
 class _ActionHandle:
     """A controller that serves an action. Each goal has its own record: the late end of an older one ends no other."""
 
-    def __init__(self, controller: Controller, action_type: type[rospy.Message]) -> None:
+    def __init__(self, controller: ControllerEntry, action_type: type[rospy.Message]) -> None:
         self.controller = controller
         # Resolved: actionlib remaps the name as written, roscpp's version remaps the resolved name.
         self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
@@ -177,7 +177,7 @@ class _ActionHandle:
 class FollowHandle(_ActionHandle):
     """FollowJointTrajectory."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: ControllerEntry) -> None:
         super().__init__(controller, FollowJointTrajectoryAction)
 
     def _goal_of(self, trajectory: JointTrajectory) -> FollowJointTrajectoryGoal:
@@ -201,7 +201,7 @@ class GripperHandle(_ActionHandle):
     """GripperCommand: the last point's position is the command; with the option ``percent``, how much of the joint's
     range that is, 0 at its lower limit and 100 at its upper."""
 
-    def __init__(self, controller: Controller, limits: Mapping[str, Sequence[float]]) -> None:
+    def __init__(self, controller: ControllerEntry, limits: Mapping[str, Sequence[float]]) -> None:
         super().__init__(controller, GripperCommandAction)
         self._limits = limits
 
@@ -232,7 +232,7 @@ class GripperHandle(_ActionHandle):
 class FakeHandle:
     """A controller that moves nothing and says where the joints would be."""
 
-    def __init__(self, controller: Controller, publisher: rospy.Publisher) -> None:
+    def __init__(self, controller: ControllerEntry, publisher: rospy.Publisher) -> None:
         self.controller, self.done = controller, threading.Event()
         self._publisher = publisher
         self._cancelled = threading.Event()

@@ -21,7 +21,7 @@ from moveit_ros_move_group.convert.geometry import matrix_of
 if TYPE_CHECKING:
     from moveit_msgs.msg import Constraints, MotionPlanRequest, MotionSequenceItem
 
-    from motion_planning.industrial import Auxiliary, Command
+    from motion_planning.industrial import Auxiliary, IndustrialCommand
     from motion_planning.pipeline import Plan, Tools
     from motion_planning.scene import Scene
     from moveit_ros_move_group.context import Context
@@ -58,7 +58,7 @@ class IndustrialPlanner:
             commands.append(self._command(item.req, scene, pipe))
         return industrial.plan_sequence(commands, [item.blend_radius for item in items], tools, self._limits)
 
-    def _command(self, request: MotionPlanRequest, scene: Scene, pipe: Pipeline) -> Command:
+    def _command(self, request: MotionPlanRequest, scene: Scene, pipe: Pipeline) -> IndustrialCommand:
         """The industrial.Command of a MotionPlanRequest."""
         for text in self._complaints:
             rospy.logwarn("%s", text)
@@ -86,7 +86,7 @@ class IndustrialPlanner:
         start = request.start_state.joint_state
         speeds = dict(zip(start.name, start.velocity, strict=False))
         joints = self._context.group(request.group_name).joints
-        return industrial.Command(query, auxiliary, [speeds.get(joint, 0.0) for joint in joints])
+        return industrial.IndustrialCommand(query, auxiliary, [speeds.get(joint, 0.0) for joint in joints])
 
     def _auxiliary(self, message: Constraints, scene: Scene) -> Auxiliary | None:
         """The industrial.Auxiliary of CIRC's path constraints, None where there are none."""

@@ -28,7 +28,7 @@ from moveit_ros_move_group.capabilities import (
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
 from moveit_ros_move_group.failures import Failures
-from moveit_ros_move_group.handles import Handles
+from moveit_ros_move_group.handles import ControllerHandles
 from moveit_ros_move_group.industrial import IndustrialPlanner
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
@@ -99,7 +99,7 @@ def _executor(monitor: SceneMonitor) -> Executor:
         rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
     model = monitor.model
     limits = dict(zip(model.variables, model.bounds.tolist(), strict=True))
-    handles = Handles(controllers, settings.initial_positions(model), limits)
+    handles = ControllerHandles(controllers, settings.initial_positions(model), limits)
     return Executor(present, settings.execution_settings(), monitor, handles.of)
 
 
@@ -110,11 +110,11 @@ def _capabilities(context: Context, wanted: set[str], description: str, may_exec
                 for group, entry in (rospy.get_param(description + "_kinematics", {}) or {}).items()
                 if isinstance(entry, dict) and isinstance(entry.get("kinematics_solver_timeout"), (int, float))}
     offered = {
-        "MoveGroupCartesianPathService": lambda: cartesian.CartesianPath(context),
+        "MoveGroupCartesianPathService": lambda: cartesian.CartesianPathService(context),
         "MoveGroupKinematicsService": lambda: kinematics.Kinematics(context, timeouts),
         "MoveGroupExecuteTrajectoryAction": lambda: motion.ExecuteAction(context),
         "MoveGroupMoveAction": lambda: motion.MoveAction(context, planner, may_execute),
-        "MoveGroupPickPlaceAction": lambda: pick_place.PickPlace(context, planner, may_execute),
+        "MoveGroupPickPlaceAction": lambda: pick_place.PickPlaceActions(context, planner, may_execute),
         "MoveGroupPlanService": lambda: motion.PlanService(context, planner),
         "MoveGroupQueryPlannersService": lambda: planners.Planners(context),
         "MoveGroupStateValidationService": lambda: scene.StateValidity(context),

@@ -16,7 +16,7 @@ from moveit_msgs.msg import MoveItErrorCodes
 from motion_planning import pipeline
 from motion_planning.constraints import sampler
 from motion_planning.errors import PlanningError
-from motion_planning.planners import Search, plan_path
+from motion_planning.planners import SearchOptions, plan_path
 from motion_planning.planners.names import config_name, kind_of, planner_of
 from motion_planning.replanning import redirected
 from motion_planning.scene import Scene
@@ -155,7 +155,7 @@ class Planner:
             q = scene.state.q[group.indices]
             near = np.clip(q + 0.1, *context.model.bounds[group.indices].T)
             try:
-                plan_path(scene, name, q, near[None], Search(context.exact, 0, 1.0, wall_clock))
+                plan_path(scene, name, q, near[None], SearchOptions(context.exact, 0, 1.0, wall_clock))
             except PlanningError:
                 pass  # for example if the robot touches itself in its zero position
             time_path(np.array([q, near]), context.model.velocity[group.indices],

@@ -11,7 +11,7 @@ import rosgraph
 import rospy
 from controller_manager_msgs.srv import ListControllers
 
-from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, Controller, ControllerError
+from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, ControllerEntry, NoControllers
 
 if TYPE_CHECKING:
     from controller_manager_msgs.msg import ControllerState
@@ -27,7 +27,7 @@ _KINDS = {"JointTrajectoryController": (FOLLOW, "follow_joint_trajectory"),
           "GripperActionController": (GRIPPER, "gripper_cmd")}
 
 
-def running(namespace: str, states: Iterable[ControllerState]) -> list[Controller]:
+def running(namespace: str, states: Iterable[ControllerState]) -> list[ControllerEntry]:
     """Return the Controllers of those controller_manager_msgs/ControllerState that run and serve a known action.
 
     namespace: that of their controller manager, with a slash at its end.
@@ -39,14 +39,14 @@ def running(namespace: str, states: Iterable[ControllerState]) -> list[Controlle
             continue
         joints = tuple(joint for claim in state.claimed_resources for joint in claim.resources)
         name = namespace + state.name
-        found.append(Controller(name, kind, joints, "%s/%s" % (name, action)))
+        found.append(ControllerEntry(name, kind, joints, "%s/%s" % (name, action)))
     return found
 
 
 class RosControl:
     """Asks controller managers each time for what they have: controllers come and go."""
 
-    def __init__(self, namespace: str | None, listed: Iterable[Controller] = (),
+    def __init__(self, namespace: str | None, listed: Iterable[ControllerEntry] = (),
                  list_controllers: Callable[[str], Sequence[ControllerState]] | None = None,
                  service_names: Callable[[], Sequence[str]] | None = None,
                  warn: Callable[..., object] = rospy.logwarn, answer_s: float = ANSWER_S) -> None:
@@ -58,14 +58,14 @@ class RosControl:
         self._service_names = service_names or _service_names
         self._warn, self._answer_s = warn, answer_s
 
-    def __call__(self) -> list[Controller]:
-        """Return the present Controllers; raise ControllerError, which names the services, if no manager answers."""
+    def __call__(self) -> list[ControllerEntry]:
+        """Return the present Controllers; raise NoControllers, which names the services, if no manager answers."""
         services = self._services()
         answers, failures = self._ask(services)
         silent = "; ".join("service %s: %s" % (service, failures.get(service, "no answer within %g s" % self._answer_s))
                            for service in services if service not in answers)
         if silent and not answers:
-            raise ControllerError("the controllers are not known: " + silent)
+            raise NoControllers("the controllers are not known: " + silent)
         if silent:
             self._warn("controllers of these managers are left out: %s", silent)
         found = [controller for service in services

@@ -19,7 +19,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 from motion_planning.errors import PlanningError
-from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, View
+from motion_planning.occupancy import CloudMap, Mask, OccupancyMap, SensorView
 from motion_planning.scene import Octree
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
@@ -155,7 +155,7 @@ class Sensors:
         sensor, frame = (self._pose(name, scene, header.stamp) for name in (header.frame_id.lstrip("/"), self._frame))
         mask = Mask(scene, self._spheres, settings.padding, settings.scale)
         with self._lock:
-            view = View(points, sensor, frame, min(settings.max_range, self._max_range))
+            view = SensorView(points, sensor, frame, min(settings.max_range, self._max_range))
             changed, outside = self._map.see(view, mask, settings.topic)
             # A client's planning scene may have removed the octomap.
             if changed or self._octree is not _shape_of(self._monitor.scene().octomap):

@@ -19,7 +19,7 @@ from moveit_ros_move_group.ros_control import PLUGINS, RosControl
 if TYPE_CHECKING:
     from motion_planning.model import PlanningModel
     from motion_planning.scene import Scene
-    from moveit_ros_move_group.controllers import Controller
+    from moveit_ros_move_group.controllers import ControllerEntry
 
 DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupCartesianPathService", "move_group/MoveGroupKinematicsService",
@@ -166,14 +166,14 @@ def execution_settings() -> ExecutionSettings:
         _number(tree.get("controller_connection_timeout"), usual.connection_timeout))
 
 
-def controllers() -> tuple[list[Controller], list[str]]:
+def controllers() -> tuple[list[ControllerEntry], list[str]]:
     """Return (list of Controllers, list of complaints) of ``~controller_list``."""
     fake = rospy.get_param("~moveit_controller_manager", "") == _FAKE
     entries = rospy.get_param("~controller_list", [])
     return read_list(entries, fake)
 
 
-def controllers_at_present(listed: list[Controller]) -> Callable[[], list[Controller]]:
+def controllers_at_present(listed: list[ControllerEntry]) -> Callable[[], list[ControllerEntry]]:
     """Return a function that returns the list of Controllers: ``listed``, or what controller managers have by then."""
     manager = rospy.get_param("~moveit_controller_manager", "")
     if manager not in PLUGINS:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from moveit_ros_move_group.controllers import (
-    ControllerError,
+    NoControllers,
     allowed_duration,
     choose,
     read_list,
@@ -71,11 +71,11 @@ def test_default_wins_among_equals():
 
 def test_joints_without_a_controller_are_named():
     controllers, _ = read_list(ARMS)
-    with pytest.raises(ControllerError) as refused:
+    with pytest.raises(NoControllers) as refused:
         choose(controllers, ["l0", "head"])
     assert "Unable to identify any set of controllers" in str(refused.value)
     assert "No controller moves head" in str(refused.value) and "/left" in str(refused.value)
-    with pytest.raises(ControllerError, match="controller_list is empty"):
+    with pytest.raises(NoControllers, match="controller_list is empty"):
         choose([], ["l0"])
 
 

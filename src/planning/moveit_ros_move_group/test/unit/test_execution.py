@@ -362,7 +362,7 @@ class Client:
 def follow(monkeypatch):
     monkeypatch.setattr(handles.actionlib, "ActionClient", Client)
     controllers, _ = read_list([{"name": "a", "action_ns": "f", "type": "FollowJointTrajectory", "joints": JOINTS}])
-    return handles.Handles(controllers).of(controllers[0])
+    return handles.ControllerHandles(controllers).of(controllers[0])
 
 
 def test_the_late_end_of_an_older_goal_ends_no_other(follow):

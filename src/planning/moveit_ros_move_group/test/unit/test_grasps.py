@@ -12,7 +12,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from motion_planning.errors import PlanningError
 from motion_planning.manipulation import PlaceTask
 from motion_planning.scene import WorldObject
-from moveit_ros_move_group.controllers import Controller
+from moveit_ros_move_group.controllers import ControllerEntry
 from moveit_ros_move_group.convert.geometry import pose_of
 from moveit_ros_move_group.convert.grasps import (
     grasp_candidate,
@@ -128,7 +128,7 @@ def test_a_posture_takes_its_time_and_begins_where_the_hand_is(model):
 def test_a_gripper_is_told_its_joint_or_percents(options, expected):
     class Handle(GripperHandle):
         def __init__(self):  # without a connection
-            self.controller = Controller("grip", "GripperCommand", ("reach",), "grip/act", options=options)
+            self.controller = ControllerEntry("grip", "GripperCommand", ("reach",), "grip/act", options=options)
             self._limits = {"reach": (0.0, 1.0)}
 
     goal = Handle()._goal_of(posture(0.25))

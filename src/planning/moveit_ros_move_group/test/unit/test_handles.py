@@ -6,8 +6,8 @@ import actionlib
 import pytest
 import rospy
 
-from moveit_ros_move_group.controllers import FOLLOW, Controller
-from moveit_ros_move_group.handles import Handles, goal_id
+from moveit_ros_move_group.controllers import FOLLOW, ControllerEntry
+from moveit_ros_move_group.handles import ControllerHandles, goal_id
 
 
 @pytest.mark.parametrize(("remap", "expected"), [
@@ -17,7 +17,7 @@ def test_a_launch_file_can_remap_a_controllers_action(monkeypatch, remap, expect
     named = []
     monkeypatch.setattr(actionlib, "ActionClient", lambda name, action_type: named.append(name) or Mock())
     monkeypatch.setattr(rospy.names, "_resolved_mappings", remap)
-    Handles([Controller("arm_controller", FOLLOW, ("elbow",), "arm_controller/follow")])
+    ControllerHandles([ControllerEntry("arm_controller", FOLLOW, ("elbow",), "arm_controller/follow")])
     assert named == [expected]
 
 

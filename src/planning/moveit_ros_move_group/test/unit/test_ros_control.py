@@ -6,7 +6,7 @@ import pytest
 import rospy
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 
-from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, Controller, ControllerError
+from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, ControllerEntry, NoControllers
 from moveit_ros_move_group.ros_control import RosControl
 
 
@@ -48,8 +48,8 @@ def test_all_managers_of_the_master():
 
 
 def test_listed_controllers_count_where_no_manager_has_them():
-    listed = [Controller("arm", FOLLOW, ("a", "b"), "arm/follow_joint_trajectory"),
-              Controller("tool", FOLLOW, ("t",), "tool/follow")]
+    listed = [ControllerEntry("arm", FOLLOW, ("a", "b"), "arm/follow_joint_trajectory"),
+              ControllerEntry("tool", FOLLOW, ("t",), "tool/follow")]
     found = RosControl("/", listed, lambda service: [ARM])()
     assert [controller.action for controller in found] == ["/arm/follow_joint_trajectory", "tool/follow"]
 
@@ -58,7 +58,7 @@ def test_a_manager_that_does_not_answer_is_named():
     def unavailable(service):
         raise rospy.ServiceException("service [%s] unavailable" % service)
 
-    with pytest.raises(ControllerError, match="the controllers are not known: service /robot/controller_manager/list"):
+    with pytest.raises(NoControllers, match="the controllers are not known: service /robot/controller_manager/list"):
         RosControl("/robot", list_controllers=unavailable)()
 
 
@@ -82,11 +82,11 @@ def test_managers_that_do_not_answer_cost_their_own_controllers_only():
 
 def test_a_stopped_manager_is_an_error_after_its_time():
     end = threading.Event()
-    with pytest.raises(ControllerError, match="service /controller_manager/list_controllers: no answer within 0.2 s"):
+    with pytest.raises(NoControllers, match="service /controller_manager/list_controllers: no answer within 0.2 s"):
         RosControl("/", list_controllers=lambda service: end.wait(), answer_s=0.2)()
     end.set()
 
 
 def test_without_any_manager_the_listed_controllers_count():
-    listed = [Controller("tool", FOLLOW, ("t",), "tool/follow")]
+    listed = [ControllerEntry("tool", FOLLOW, ("t",), "tool/follow")]
     assert RosControl(None, listed, service_names=list)() == listed

@@ -33,7 +33,7 @@ _MAX_SLOWING, _BRAKING_S = 3.0, 0.3
 _NOTHING = 1e-18
 
 
-class Wanted(NamedTuple):
+class WantedMotion(NamedTuple):
     """velocity (k,) of the joints; metric (k, k): how much a deviation from it counts; lost, share of the twist that a
     singularity takes of what the joints can do, 0 to 1, and 1 where they can do nothing of it; condition: ratio of the
     largest singular value to the least."""
@@ -44,7 +44,7 @@ class Wanted(NamedTuple):
     condition: float
 
 
-class Arm(NamedTuple):
+class ServoArm(NamedTuple):
     """An arm, and the rows of twists that count: rotations, offsets, prismatic of arm_kinematics.Chain.arrays; turn
     (3, 3) from the chain's base to the axes of the twist; keep (r,) rows; lower, upper, velocity (k,) as in
     JointLimits."""
@@ -68,7 +68,7 @@ class Thresholds(NamedTuple):
 
 @compiled
 def jacobian_of(arm, q):
-    """Return the Jacobian (r, k) of an Arm at ``q`` (k,), in the rows that count."""
+    """Return the Jacobian (r, k) of an ServoArm at ``q`` (k,), in the rows that count."""
     whole = tip_and_jacobian(arm.rotations, arm.offsets, arm.prismatic, q)[1]
     rows, k = len(arm.keep), len(q)
     jacobian = np.empty((rows, k))
@@ -83,9 +83,9 @@ def jacobian_of(arm, q):
 
 @compiled
 def velocity_for(twist, jacobian, arm, q, thresholds):
-    """Return the Wanted joint velocities for ``twist`` (r,), the rows of an Arm that count.
+    """Return the WantedMotion joint velocities for ``twist`` (r,), the rows of an ServoArm that count.
 
-    jacobian (r, k): that of the Arm at ``q`` (k,). thresholds: Thresholds.
+    jacobian (r, k): that of the ServoArm at ``q`` (k,). thresholds: Thresholds.
     """
     left, values, right = np.linalg.svd(jacobian)
     rank, k, rows = len(values), len(q), len(twist)
@@ -124,7 +124,7 @@ def velocity_for(twist, jacobian, arm, q, thresholds):
                     metric[a, b] += (_FREE_WEIGHT * values[0]) ** 2 * along[a] * along[b]
     whole = np.sum(twist * twist)
     share = math.sqrt(lost / size) if size > _NOTHING * whole else 1.0 if whole > 0.0 else 0.0
-    return Wanted(velocity, metric, share, values[0] / max(values[-1], 1e-12))
+    return WantedMotion(velocity, metric, share, values[0] / max(values[-1], 1e-12))
 
 
 @compiled

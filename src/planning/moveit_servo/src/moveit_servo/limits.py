@@ -18,7 +18,7 @@ _LOOKED_AT, _NO_MATTER = (1, 3, 6), 1e-3
 _NO_GAPS = np.empty((0, 1))
 
 
-class JointLimits(NamedTuple):
+class ServoLimits(NamedTuple):
     """lower, upper (k,) [rad or m], infinite where there is none; velocity, acceleration, jerk (k,) [per s, s^2, s^3].
 
     Every joint can stop from its velocity within the time that the limits were made for.
@@ -32,8 +32,8 @@ class JointLimits(NamedTuple):
 
 
 def stoppable(lower: np.ndarray, upper: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray | None,
-              stopping_time: float) -> JointLimits:
-    """Return JointLimits with which every joint comes to rest within ``stopping_time`` [s].
+              stopping_time: float) -> ServoLimits:
+    """Return ServoLimits with which every joint comes to rest within ``stopping_time`` [s].
 
     velocity, acceleration (k,): limits of the robot. Where the acceleration does not suffice, the velocity gets lower;
     acceleration None: what the velocity needs.
@@ -42,14 +42,14 @@ def stoppable(lower: np.ndarray, upper: np.ndarray, velocity: np.ndarray, accele
     braking = (1.0 - _SHARE_OF_JERK) * time
     most = velocity / braking if acceleration is None else acceleration
     velocity = np.minimum(velocity, most * braking)
-    return JointLimits(lower, upper, velocity, most, most / (_SHARE_OF_JERK * time))
+    return ServoLimits(lower, upper, velocity, most, most / (_SHARE_OF_JERK * time))
 
 
 @compiled
 def speed_towards(room, limits, lag):
     """Return (k,) the greatest speed at which joints can still stop within ``room`` (k,) [rad], 0 where none is left.
 
-    limits: JointLimits. lag [s]: until braking begins.
+    limits: ServoLimits. lag [s]: until braking begins.
     """
     speed = np.empty(len(room))
     for a in range(len(room)):
@@ -60,10 +60,10 @@ def speed_towards(room, limits, lag):
     return speed
 
 
-class Motion:
+class ServoMotion:
     """Position, velocity and acceleration (k,) of the set-points, which never jump."""
 
-    def __init__(self, position: np.ndarray, limits: JointLimits) -> None:
+    def __init__(self, position: np.ndarray, limits: ServoLimits) -> None:
         self.limits = limits
         self._solver = ruckig.Ruckig(len(position))
         self._input = ruckig.InputParameter(len(position))

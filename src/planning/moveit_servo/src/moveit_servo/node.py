@@ -38,7 +38,7 @@ from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_servo.commands import CommandIgnored, Commands, Frame, bounded_pose, sent_at
 from moveit_servo.convex_parts import ConvexParts, cuts_named
 from moveit_servo.outputs import message_of, message_type
-from moveit_servo.servo import Command, Servo, Status
+from moveit_servo.servo import Servo, ServoCommand, Status
 from moveit_servo.settings import ServoSettings, SettingsError, at_run_time
 from moveit_servo.surroundings import Surroundings
 from moveit_servo.telling import Telling, kind_of
@@ -301,17 +301,18 @@ class ServoNode:
         if self._status.get_num_connections():
             self._status.publish(Int8(int(status)))
 
-    def _command(self, kind: str, value: Any, frame: Frame, q: np.ndarray, settings: ServoSettings) -> Command:
+    def _command(self, kind: str, value: Any, frame: Frame, q: np.ndarray, settings: ServoSettings) -> ServoCommand:
         if not kind:
-            return Command()
+            return ServoCommand()
         if kind == "joints":
-            return Command(joints=value)
+            return ServoCommand(joints=value)
         axes = self._axes(settings.planning_frame, q)[:3, :3]
         if kind == "pose":
-            return Command(pose=value, axes=axes, drift=self.commands.drift)
+            return ServoCommand(pose=value, axes=axes, drift=self.commands.drift)
         frame = frame if len(frame) else settings.robot_link_command_frame or settings.planning_frame
         turn = axes.T @ self._axes(frame, q)[:3, :3]
-        return Command(twist=np.concatenate([turn @ value[:3], turn @ value[3:]]), drift=self.commands.drift, axes=axes)
+        return ServoCommand(twist=np.concatenate([turn @ value[:3], turn @ value[3:]]), drift=self.commands.drift,
+                            axes=axes)
 
     def _axes(self, frame: Frame, q: np.ndarray) -> np.ndarray:
         """The pose (4, 4) of a frame in the model's frame; that of a link moves with the arm."""

@@ -13,7 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, SettingsError
 
 if TYPE_CHECKING:
-    from moveit_servo.servo import Step
+    from moveit_servo.servo import ServoStep
     from moveit_servo.settings import ServoSettings
 
 # Points of a trajectory for Gazebo, whose controller may drop those that are late.
@@ -34,12 +34,12 @@ def message_type(name: str) -> type:
     return kind
 
 
-def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings, seconds: float = 0.0,
-               now: float = 0.0) -> Any:
-    """Return the message of ``settings.command_out_type`` for a Step; measured (k,): where the joints are; seconds: how
-    long the step is; now: when it was made. A trajectory takes that time, or a period: a step that came late is a long
-    one, and its way in one period would be faster than the servo allows. With a command_lead it is due at a time:
-    otherwise one that comes late, or together with the next, is hurried by what it is late.
+def message_of(step: ServoStep, measured: np.ndarray, joints: tuple[str, ...], settings: ServoSettings,
+               seconds: float = 0.0, now: float = 0.0) -> Any:
+    """Return the message of ``settings.command_out_type`` for a ServoStep; measured (k,): where the joints are;
+    seconds: how long the step is; now: when it was made. A trajectory takes that time, or a period: a step that came
+    late is a long one, and its way in one period would be faster than the servo allows. With a command_lead it is due
+    at a time: otherwise one that comes late, or together with the next, is hurried by what it is late.
     """
     lead, pace = _lead(step, settings)
     positions, accelerations = step.position.tolist(), (pace**2 * step.acceleration).tolist()
@@ -70,7 +70,7 @@ def message_of(step: Step, measured: np.ndarray, joints: tuple[str, ...], settin
     return trajectory
 
 
-def _lead(step: Step, settings: ServoSettings) -> tuple[float, float]:
+def _lead(step: ServoStep, settings: ServoSettings) -> tuple[float, float]:
     """How long after its step a trajectory's point is due [s], and the pace at which the controller then follows."""
     grown = settings.publish_period + _SLOWER_FIRST * step.moving
     if settings.command_out_type != TRAJECTORY or grown >= settings.command_lead:

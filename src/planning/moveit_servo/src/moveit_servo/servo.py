@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from arm_kinematics import Chain, ChainError
-from moveit_servo.directions import Arm, Thresholds, jacobian_of, velocity_for
-from moveit_servo.limits import JointLimits, Motion, stoppable
+from moveit_servo.directions import ServoArm, Thresholds, jacobian_of, velocity_for
+from moveit_servo.limits import ServoLimits, ServoMotion, stoppable
 from moveit_servo.pose_tracking import PoseTracker
 from moveit_servo.possible import LEAD_RAD, Possible, Rates, possible, shares
 from moveit_servo.settings import STOP_DISTANCE, SettingsError
@@ -55,7 +55,7 @@ class Status(IntEnum):
     JOINT_BOUND = 5
 
 
-class Step(NamedTuple):
+class ServoStep(NamedTuple):
     """Set-points (k,) of the arm's joints after a step, and what held them back.
 
     reason: a sentence, empty for NO_WARNING. rests: nothing moves and nothing is wanted. reached: the pose is there.
@@ -73,7 +73,7 @@ class Step(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Command:
+class ServoCommand:
     """A command: one of twist (6,) [m/s, rad/s], joint velocities (k,) [per s], and a pose (4, 4) of the tip in
     the model's frame; none of them: to stop. axes (3, 3): those of the twist, as columns in the model's frame. drift
     (6,) bool: rows of the twist that do not matter."""
@@ -89,8 +89,8 @@ class Command:
 
 
 class _Wanted(NamedTuple):
-    """A motion that is possible: velocity (k,); together: as for Motion.follow; slope (m, k) @ velocity >= least (m,)
-    keeps what is near from coming too near."""
+    """A motion that is possible: velocity (k,); together: as for ServoMotion.follow; slope (m, k) @ velocity >= least
+    (m,) keeps what is near from coming too near."""
 
     velocity: np.ndarray
     status: Status = Status.NO_WARNING
@@ -118,7 +118,7 @@ class Servo:
         self._base_in_root = model.frame_of(model.default_state().q, base)
         self._nothing_near = (np.empty(0), np.empty((0, len(self.joints))), np.empty(0), np.empty(0, dtype=bool))
         self.surroundings: Surroundings | None = None
-        self._motion: Motion | None = None
+        self._motion: ServoMotion | None = None
         self._tracker, self._target, self._way = PoseTracker(), None, StraightWay()
         self._rests, self._moving = True, 0.0
         self.settings = settings
@@ -132,10 +132,10 @@ class Servo:
         self.limits = self._limits(settings)
         self._settings, self._rates = settings, _rates(settings)
         if self._motion is not None:
-            before, self._motion = self._motion, Motion(self._motion.position, self.limits)
+            before, self._motion = self._motion, ServoMotion(self._motion.position, self.limits)
             self._motion.velocity, self._motion.acceleration = before.velocity, before.acceleration
 
-    def _limits(self, settings: ServoSettings) -> JointLimits:
+    def _limits(self, settings: ServoSettings) -> ServoLimits:
         said = settings.max_acceleration
         if isinstance(said, dict):
             missing = [name for name in self.joints if name not in said]
@@ -162,8 +162,8 @@ class Servo:
         """Return the pose (4, 4) of ``link``, empty: the tip, in the model's frame at ``q`` (n,)."""
         return self.model.frame_of(q, link or self.tip, self.base)
 
-    def step(self, q: np.ndarray, velocity: np.ndarray, command: Command, seconds: float) -> Step:
-        """Return the Step that comes ``seconds`` after the last one.
+    def step(self, q: np.ndarray, velocity: np.ndarray, command: ServoCommand, seconds: float) -> ServoStep:
+        """Return the ServoStep that comes ``seconds`` after the last one.
 
         q, velocity (n,): all joints of the model as measured. The command is that of now; the caller decides when one
         is too old.
@@ -171,7 +171,7 @@ class Servo:
         measured = np.asarray(q, dtype=float)[self._indices]
         motion = self._motion
         if motion is None:
-            motion = self._motion = Motion(measured, self.limits)
+            motion = self._motion = ServoMotion(measured, self.limits)
         away, at_rest = np.abs(motion.position - measured), _at_rest(motion)
         moved = ""
         if away.max() > (_SAME_RAD if at_rest else _MOVED_RAD):
@@ -193,8 +193,8 @@ class Servo:
         if not command and _at_rest(motion):
             motion.rest_at(motion.position)
             self._rests = True
-            return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(),
-                        Status.JOINT_BOUND if moved else Status.NO_WARNING, moved, True, reached, self._moving)
+            return ServoStep(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(),
+                             Status.JOINT_BOUND if moved else Status.NO_WARNING, moved, True, reached, self._moving)
         if self._rests:
             self._rests, self._moving = False, 0.0
         self._moving += seconds
@@ -209,11 +209,11 @@ class Servo:
         except ArithmeticError as error:
             motion.rest_at(motion.position)
             status, reason = Status.INVALID, str(error)
-        return Step(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), status, reason, False,
-                    reached, self._moving)
+        return ServoStep(motion.position.copy(), motion.velocity.copy(), motion.acceleration.copy(), status, reason,
+                         False, reached, self._moving)
 
-    def _towards(self, whole: np.ndarray, command: Command, target: np.ndarray,
-                 seconds: float) -> tuple[Command, bool]:
+    def _towards(self, whole: np.ndarray, command: ServoCommand, target: np.ndarray,
+                 seconds: float) -> tuple[ServoCommand, bool]:
         """The twist towards the command's pose, ``target`` (4, 4), and whether that is reached."""
         if self._target is None:
             self._tracker.reset()
@@ -222,12 +222,12 @@ class Servo:
         twist = self._tracker.twist(pose, target, self.settings, seconds)
         angle = np.arccos(np.clip(0.5 * (np.trace(target[:3, :3].T @ pose[:3, :3]) - 1.0), -1.0, 1.0))
         if np.linalg.norm(target[:3, 3] - pose[:3, 3]) < _REACHED_M and angle < _REACHED_RAD:
-            return Command(), True
+            return ServoCommand(), True
         axes = command.axes
         twist = np.concatenate([axes.T @ twist[:3], axes.T @ twist[3:]])
-        return Command(twist=twist, drift=command.drift, axes=axes), False
+        return ServoCommand(twist=twist, drift=command.drift, axes=axes), False
 
-    def _along(self, whole: np.ndarray, command: Command, seconds: float) -> Command:
+    def _along(self, whole: np.ndarray, command: ServoCommand, seconds: float) -> ServoCommand:
         """The command with a twist that keeps the hand on its way."""
         if command.twist is None or not command.twist.any():
             self._way.reset()
@@ -241,7 +241,7 @@ class Servo:
     # -- the motion that is wanted and possible ------------------------------------------------------------------
 
     def _wanted(self, whole: np.ndarray, velocity: np.ndarray, q: np.ndarray, measured: np.ndarray,
-                command: Command) -> _Wanted:
+                command: ServoCommand) -> _Wanted:
         """q (k,): the set-points; measured (k,): where the joints are."""
         settings = self.settings
         lost, condition = 0.0, 1.0
@@ -250,7 +250,7 @@ class Servo:
             # Where none matters, x does, as in MoveIt's node: something must tell the way.
             keep = np.array([0]) if command.drift.all() else np.flatnonzero(~command.drift)
             turn = command.axes.T @ self._chain_base(whole)[:3, :3]
-            arm = Arm(*self._chain.arrays, turn, keep, limits.lower, limits.upper, limits.velocity)
+            arm = ServoArm(*self._chain.arrays, turn, keep, limits.lower, limits.upper, limits.velocity)
             jacobian = jacobian_of(arm, q)
             wanted, metric, lost, condition = velocity_for(
                 command.twist[keep], jacobian, arm, q,
@@ -320,7 +320,7 @@ class Servo:
         return Status.NO_WARNING, ""
 
 
-def _at_rest(motion: Motion) -> bool:
+def _at_rest(motion: ServoMotion) -> bool:
     return np.abs(motion.velocity).max() < _AT_REST and np.abs(motion.acceleration).max() < 1e3 * _AT_REST
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from motion_planning.model import PlanningModel
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.spheres import SphereModel
-from moveit_servo.servo import Command, Servo
+from moveit_servo.servo import Servo, ServoCommand
 from moveit_servo.settings import ServoSettings
 from moveit_servo.straight import StraightWay
 from moveit_servo.surroundings import Surroundings
@@ -33,7 +33,7 @@ def warm_up() -> None:
     no_meshes: dict[str, TriangleMesh] = {}
     servo.surroundings = Surroundings(SphereModel.of(model, no_meshes.__getitem__), servo.group, scene)
     turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
-    for command in (Command(joints=np.array([0.5])), Command(twist=turn), Command(pose=np.eye(4))):
+    for command in (ServoCommand(joints=np.array([0.5])), ServoCommand(twist=turn), ServoCommand(pose=np.eye(4))):
         servo.step(np.zeros(1), np.zeros(1), command, 0.01)
     # A servo calls it for a hand that has come up to the speed of its twist and that nothing holds back.
     way = StraightWay()

@@ -8,8 +8,8 @@ import pytest
 
 from motion_planning.constraints.regions import rotation_vector
 from moveit_servo import straight
-from moveit_servo.limits import JointLimits, Motion
-from moveit_servo.servo import Command
+from moveit_servo.limits import ServoLimits, ServoMotion
+from moveit_servo.servo import ServoCommand
 from moveit_servo.straight import StraightWay
 from urdf_model.transforms import axis_rotation
 
@@ -27,7 +27,7 @@ def off_its_way(model, seconds=1.0):
     driven = Driven(model, "left_arm", {"left_s1": -1.0, "left_e1": 1.7, "left_w1": 0.8}, max_acceleration=10.0)
     twist, tips = np.array((-0.2, 0.2, 0.2, 0.0, -0.5, 0.8)), []
     for _ in range(round(seconds / DT)):
-        driven.go(Command(twist=twist), DT)
+        driven.go(ServoCommand(twist=twist), DT)
         assert not driven.steps[-1].reason
         tips.append(driven.tip[:3, 3])
     way = np.array(tips[round(0.2 / DT):]) - tips[round(0.2 / DT)]
@@ -65,11 +65,11 @@ def test_a_turn_of_more_than_half_a_circle_is_one_way():
 
 def test_a_joint_that_brakes_quickly_does_not_uncover_what_it_made_up_for():
     """Joint 0 moves towards something, joint 1 away from it as fast; both are to stop, and joint 1 could sooner."""
-    limits = JointLimits(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 1.0), np.array((10.0, 40.0)),
+    limits = ServoLimits(np.full(2, -9.0), np.full(2, 9.0), np.full(2, 1.0), np.array((10.0, 40.0)),
                          np.array((600.0, 2400.0)))
     slope, least, worst = np.ones((1, 2)), np.zeros(1), {}
     for keeps in (False, True):
-        motion = Motion(np.zeros(2), limits)
+        motion = ServoMotion(np.zeros(2), limits)
         motion.velocity, speeds = np.array((-0.6, 0.6)), []
         for _ in range(20):
             motion.follow(np.zeros(2), DT, False, *((slope, least) if keeps else ()))

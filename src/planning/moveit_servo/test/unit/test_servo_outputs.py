@@ -12,7 +12,7 @@ from baxter_core_msgs.msg import JointCommand
 from joint_trajectory.action_edge import command_of
 from joint_trajectory.follower import Follower
 from moveit_servo.outputs import message_of, message_type
-from moveit_servo.servo import Command, Status, Step
+from moveit_servo.servo import ServoCommand, ServoStep, Status
 from moveit_servo.settings import ARRAY, BAXTER, TRAJECTORY, ServoSettings, SettingsError
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -21,7 +21,7 @@ from steered_arms import Driven, probot_model  # noqa: E402
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 SPEED, BEGUN_RAD = 0.25, 1e-4
 JOINTS = ("a", "b")
-STEP = Step(np.array((0.1, 0.2)), np.array((0.5, -0.5)), np.zeros(2), Status.NO_WARNING, "", False, False)
+STEP = ServoStep(np.array((0.1, 0.2)), np.array((0.5, -0.5)), np.zeros(2), Status.NO_WARNING, "", False, False)
 MEASURED = np.array((0.1, 0.1))
 
 
@@ -63,7 +63,7 @@ def speeds_of_a_controller(settings):
     while made < 2.0:
         seconds = settings.publish_period * (1.0 if chance.random() < 0.95 else 3.0)
         made, position = made + seconds, position + SPEED * seconds
-        step = Step(np.array([position]), np.array([SPEED]), np.zeros(1), Status.NO_WARNING, "", False, False)
+        step = ServoStep(np.array([position]), np.array([SPEED]), np.zeros(1), Status.NO_WARNING, "", False, False)
         comes = max(comes, made + chance.exponential(0.001))
         coming.append((comes, message_of(step, step.position, ("a",), settings, seconds, made)))
     follower, speeds = Follower(["a"]), []
@@ -99,7 +99,7 @@ def motion_from_rest(settings, with_lead):
                     max_acceleration=settings.max_acceleration)
     follower, still, commanded = Follower(driven.servo.joints), np.zeros(6), []
     follower.start(0.0, still, still)
-    for number, step in enumerate(driven.go(Command(joints=np.array([SPEED, *5 * [0.0]])), 0.4)):
+    for number, step in enumerate(driven.go(ServoCommand(joints=np.array([SPEED, *5 * [0.0]])), 0.4)):
         made = number * settings.publish_period
         step = step if with_lead else step._replace(moving=np.inf)
         message = message_of(step, step.position, driven.servo.joints, settings, settings.publish_period, made)

@@ -9,7 +9,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from motion_planning.scene import WorldObject
-from moveit_servo.servo import Command
+from moveit_servo.servo import ServoCommand
 from moveit_servo.warming import warm_up
 from urdf_model import Box, Cylinder, Sphere
 
@@ -24,8 +24,9 @@ def at(x, y):
 
 
 @pytest.mark.parametrize("command", [
-    Command(twist=np.array((-0.2, 0.1, 0.0, 0.0, 0.0, 0.3))), Command(twist=np.array((0.0, 0.3, 0.0, 0.0, 0.0, 0.0))),
-    Command(joints=np.full(3, 0.2)), Command(pose=at(0.6, 0.5))], ids=["twist", "shift", "joints", "pose"])
+    ServoCommand(twist=np.array((-0.2, 0.1, 0.0, 0.0, 0.0, 0.3))),
+    ServoCommand(twist=np.array((0.0, 0.3, 0.0, 0.0, 0.0, 0.0))),
+    ServoCommand(joints=np.full(3, 0.2)), ServoCommand(pose=at(0.6, 0.5))], ids=["twist", "shift", "joints", "pose"])
 def test_all_that_a_step_calls_was_called_before(monkeypatch, command):
     things = [WorldObject(name, np.eye(4), ((shape, at(0.8, y)),)) for name, shape, y in (
         ("box", Box((0.2, 0.2, 0.2)), 0.9), ("can", Cylinder(0.05, 0.3), 0.7), ("ball", Sphere(0.1), -0.4))]

@@ -10,7 +10,7 @@ from .action_edge import (
     rows_of_points,
     tolerances_of,
 )
-from .command import Command, joint_indices
+from .command import TrajectoryCommand, joint_indices
 from .errors import (
     AllPointsInPast,
     BeforeTrajectory,
@@ -30,7 +30,7 @@ from .errors import (
     WrongSize,
 )
 from .follower import Follower
-from .goal_monitor import GoalMonitor, Outcome, Verdict
+from .goal_monitor import GoalMonitor, GoalOutcome, GoalVerdict
 from .limits import Limits
 from .replacement import Replacement, replace
 from .segment import smooth_velocities
@@ -43,7 +43,7 @@ __all__ = [
     "BeyondLimit",
     "BeyondPosition",
     "BeyondVelocity",
-    "Command",
+    "TrajectoryCommand",
     "ErrorCode",
     "Follower",
     "GoalMonitor",
@@ -55,7 +55,7 @@ __all__ = [
     "NoPoints",
     "NoPositions",
     "NotFinite",
-    "Outcome",
+    "GoalOutcome",
     "RepeatedJoints",
     "Replacement",
     "TimesNotIncreasing",
@@ -63,7 +63,7 @@ __all__ = [
     "Trajectory",
     "TrajectoryError",
     "UnknownJoints",
-    "Verdict",
+    "GoalVerdict",
     "WrongSize",
     "bounds",
     "code_of_error",

@@ -9,9 +9,9 @@ import enum
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-from .command import Command, Point
+from .command import Point, TrajectoryCommand
 from .errors import AllPointsInPast, JointNamesError
-from .goal_monitor import Outcome
+from .goal_monitor import GoalOutcome
 from .tolerances import Row
 
 
@@ -27,9 +27,9 @@ class ErrorCode(enum.IntEnum):
 
 
 _OF_OUTCOME = {
-    Outcome.SUCCEEDED: ErrorCode.SUCCESSFUL,
-    Outcome.PATH_TOLERANCE_VIOLATED: ErrorCode.PATH_TOLERANCE_VIOLATED,
-    Outcome.GOAL_TOLERANCE_VIOLATED: ErrorCode.GOAL_TOLERANCE_VIOLATED,
+    GoalOutcome.SUCCEEDED: ErrorCode.SUCCESSFUL,
+    GoalOutcome.PATH_TOLERANCE_VIOLATED: ErrorCode.PATH_TOLERANCE_VIOLATED,
+    GoalOutcome.GOAL_TOLERANCE_VIOLATED: ErrorCode.GOAL_TOLERANCE_VIOLATED,
 }
 
 
@@ -44,8 +44,8 @@ class GoalTolerances(NamedTuple):
     goal_time_s: float = 0.0
 
 
-def code_of_outcome(outcome: Outcome) -> int:
-    """Return the ErrorCode of a goal that ended with an Outcome, a plain number."""
+def code_of_outcome(outcome: GoalOutcome) -> int:
+    """Return the ErrorCode of a goal that ended with an GoalOutcome, a plain number."""
     return _OF_OUTCOME[outcome].value
 
 
@@ -69,9 +69,10 @@ def rows_of_points(points: Iterable[Any]) -> list[Point]:
             for point in points]
 
 
-def command_of(trajectory: Any, start_time: float | None = None) -> Command:
-    """Return the :class:`Command` of a trajectory_msgs/JointTrajectory. Raises TrajectoryError, as Command does."""
-    return Command(trajectory.joint_names, rows_of_points(trajectory.points), start_time)
+def command_of(trajectory: Any, start_time: float | None = None) -> TrajectoryCommand:
+    """Return the :class:`TrajectoryCommand` of a trajectory_msgs/JointTrajectory. Raises TrajectoryError, as
+    TrajectoryCommand does."""
+    return TrajectoryCommand(trajectory.joint_names, rows_of_points(trajectory.points), start_time)
 
 
 def tolerances_of(goal: Any) -> GoalTolerances:

@@ -44,7 +44,7 @@ def joint_indices(names: Sequence[str], known: Sequence[str], allow_partial: boo
     return np.array([index[name] for name in names])
 
 
-class Command:
+class TrajectoryCommand:
     """m points for k joints, checked; no points means: stop.
 
     Attributes

@@ -9,8 +9,8 @@ from typing import Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from .command import Command
-from .goal_monitor import GoalMonitor, Verdict
+from .command import TrajectoryCommand
+from .goal_monitor import GoalMonitor, GoalVerdict
 from .limits import Limits
 from .replacement import Replacement, replace
 from .segment import Floats
@@ -71,7 +71,7 @@ class Follower(Generic[Goal]):
         self.error[:] = 0.0
         self.trajectory = stop(time_s, np.array(position), np.array(velocity), self._stop_duration_s)
 
-    def accept(self, command: Command, now: float, position: npt.ArrayLike, goal: Goal | None = None,
+    def accept(self, command: TrajectoryCommand, now: float, position: npt.ArrayLike, goal: Goal | None = None,
                tolerances: Tolerances | None = None) -> Replacement | None:
         """Follow ``command`` from now on; returns the :class:`Replacement`, or None for a command without points.
 
@@ -115,11 +115,11 @@ class Follower(Generic[Goal]):
         self._ahead_of = self.trajectory, time_s
         return self.trajectory.sample(time_s, self._ahead)
 
-    def update(self, time_s: float, position: npt.ArrayLike, velocity: npt.ArrayLike) -> Verdict | None:
+    def update(self, time_s: float, position: npt.ArrayLike, velocity: npt.ArrayLike) -> GoalVerdict | None:
         """Fill ``desired`` and ``error`` for the measured ``position``, ``velocity`` (n,) of ``time_s``.
 
-        Returns the goal's :class:`Verdict` when it ends now, else None. After a violation the joints go on along their
-        trajectory.
+        Returns the goal's :class:`GoalVerdict` when it ends now, else None. After a violation the joints go on along
+        their trajectory.
         """
         desired = self.desired
         if self._ahead_of == (self.trajectory, time_s):

@@ -16,7 +16,7 @@ Flags = npt.NDArray[np.bool_]
 _QUANTITIES = ("position", "velocity", "acceleration")
 
 
-class Outcome(enum.Enum):
+class GoalOutcome(enum.Enum):
     """How a goal ended."""
 
     SUCCEEDED = "succeeded"
@@ -24,11 +24,11 @@ class Outcome(enum.Enum):
     GOAL_TOLERANCE_VIOLATED = "goal"
 
 
-class Verdict(NamedTuple):
+class GoalVerdict(NamedTuple):
     """The end of a goal. After a failure: which ``joint``, by which ``quantity`` and ``error``, beyond which
     ``tolerance`` [rad or m, per s, per s^2]. ``text`` says it in words and is empty for success."""
 
-    outcome: Outcome
+    outcome: GoalOutcome
     text: str = ""
     joint: str = ""
     quantity: str = ""
@@ -56,8 +56,8 @@ class GoalMonitor:
         self._size = np.empty((3, len(joint_names)))
         self._within = np.empty((3, len(joint_names)), dtype=bool)
 
-    def check(self, time_s: float, error: Floats) -> Verdict | None:
-        """The :class:`Verdict`, or None while it is open. ``error`` (3, n): desired minus actual at ``time_s``."""
+    def check(self, time_s: float, error: Floats) -> GoalVerdict | None:
+        """The :class:`GoalVerdict`, or None while it is open. ``error`` (3, n): desired minus actual at ``time_s``."""
         if time_s < self._begin:
             return None
         size = np.abs(error, out=self._size)
@@ -75,24 +75,25 @@ class GoalMonitor:
         off_goal = ~(size <= self._tolerances.goal) & (ended & ~self._done)
         self._done |= ended & ~off_goal.any(axis=0)
         if self._done.all():
-            return Verdict(Outcome.SUCCEEDED)
+            return GoalVerdict(GoalOutcome.SUCCEEDED)
         off_goal &= time_s >= self._ends + self._tolerances.goal_time_s
         if off_goal.any():
             return self._goal_verdict(time_s, error, off_goal)
         return None
 
-    def _path_verdict(self, time_s: float, error: Floats, where: Flags) -> Verdict:
+    def _path_verdict(self, time_s: float, error: Floats, where: Flags) -> GoalVerdict:
         joint, row = np.argwhere(where.T)[0]
-        return self._verdict(Outcome.PATH_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.path,
+        return self._verdict(GoalOutcome.PATH_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.path,
                              "at %.3f s" % (time_s - self._begin))
 
-    def _goal_verdict(self, time_s: float, error: Floats, where: Flags) -> Verdict:
+    def _goal_verdict(self, time_s: float, error: Floats, where: Flags) -> GoalVerdict:
         joint, row = np.argwhere(where.T)[0]
-        return self._verdict(Outcome.GOAL_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.goal,
+        return self._verdict(GoalOutcome.GOAL_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.goal,
                              "%.3f s after the end" % (time_s - self._ends[joint]))
 
-    def _verdict(self, outcome: Outcome, joint: int, row: int, error: Floats, tolerances: Floats, when: str) -> Verdict:
+    def _verdict(self, outcome: GoalOutcome, joint: int, row: int, error: Floats, tolerances: Floats,
+                 when: str) -> GoalVerdict:
         name, quantity = self._joint_names[joint], _QUANTITIES[row]
         found, allowed = float(error[row, joint]), float(tolerances[row, joint])
         text = "%s %s error %f (%s, tolerance %g) %s" % (name, outcome.value, found, quantity, allowed, when)
-        return Verdict(outcome, text, name, quantity, found, allowed)
+        return GoalVerdict(outcome, text, name, quantity, found, allowed)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .command import Command, Indices, joint_indices
+from .command import Indices, TrajectoryCommand, joint_indices
 from .errors import AllPointsInPast
 from .goal_monitor import Flags
 from .segment import CUBIC, LINEAR, QUINTIC, Floats, constant, shifted, smooth_velocities, splines
@@ -28,13 +28,13 @@ class Replacement(NamedTuple):
     late_s: float
 
 
-def replace(current: Trajectory, command: Command, now: float, joint_names: Sequence[str], continuous: Flags,
+def replace(current: Trajectory, command: TrajectoryCommand, now: float, joint_names: Sequence[str], continuous: Flags,
             allow_partial: bool = False, smooth: bool = False) -> Replacement:
     """Follow ``current`` until ``command`` begins, then the command: a :class:`Replacement`.
 
-    ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`Command` with points; ``now`` [s]: the
-    first time that can still be changed, not before the start of ``current``; ``continuous`` (n,) bool: joints without
-    position limits.
+    ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`TrajectoryCommand` with points; ``now``
+    [s]: the first time that can still be changed, not before the start of ``current``; ``continuous`` (n,) bool: joints
+    without position limits.
 
     Points at or before ``now`` are left out. A bridge leads from the current trajectory, at the start of the command
     or ``now``, whichever is later, to the first point that is left. Continuous joints take the shorter way round: all

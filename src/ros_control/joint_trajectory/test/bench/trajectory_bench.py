@@ -9,7 +9,7 @@ import timeit
 
 import numpy as np
 
-from joint_trajectory import Command, Follower, Tolerances, bounds
+from joint_trajectory import Follower, Tolerances, TrajectoryCommand, bounds
 
 
 def microseconds(function, repetitions):
@@ -29,7 +29,7 @@ def main():
     still = np.zeros(count)
     follower = Follower(names)
     follower.start(0.0, still, still)
-    command = Command(names, points)
+    command = TrajectoryCommand(names, points)
     tolerances = Tolerances(bounds(count, position=100.0), bounds(count, position=0.1, velocity=0.01), 0.0)
     out = np.empty((3, count))
     middle = arguments.points / 2 + 0.3
@@ -41,7 +41,7 @@ def main():
     print("%d joints, %d points [us]" % (count, arguments.points))
     print("sample              %8.2f" % microseconds(lambda: follower.trajectory.sample(middle, out), 20000))
     print("update with a goal  %8.2f" % microseconds(lambda: follower.update(middle, still, still), 20000))
-    print("check a command     %8.1f" % microseconds(lambda: Command(names, points), 50))
+    print("check a command     %8.1f" % microseconds(lambda: TrajectoryCommand(names, points), 50))
     print("accept a command    %8.1f" % microseconds(accept, 200))
 
 

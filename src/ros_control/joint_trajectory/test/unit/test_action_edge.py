@@ -7,9 +7,9 @@ import pytest
 from joint_trajectory import (
     AllPointsInPast,
     ErrorCode,
+    GoalOutcome,
     GoalTolerances,
     NoPoints,
-    Outcome,
     UnknownJoints,
     code_of_error,
     code_of_outcome,
@@ -50,7 +50,7 @@ def test_code_of_a_goal_that_is_refused(error, was_given, code):
     assert found == code and type(found) is int  # as the message has it
 
 
-@pytest.mark.parametrize("outcome", Outcome)
+@pytest.mark.parametrize("outcome", GoalOutcome)
 def test_every_outcome_has_its_code(outcome):
     found = code_of_outcome(outcome)
-    assert type(found) is int and (found == 0) == (outcome is Outcome.SUCCEEDED)
+    assert type(found) is int and (found == 0) == (outcome is GoalOutcome.SUCCEEDED)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import joint_trajectory
-from joint_trajectory import Command, TrajectoryError, hold, joint_indices, replace
+from joint_trajectory import TrajectoryCommand, TrajectoryError, hold, joint_indices, replace
 
 NAMES = ["a", "b", "c"]
 NO_TURNS = np.zeros(3, dtype=bool)
@@ -14,7 +14,7 @@ NO_TURNS = np.zeros(3, dtype=bool)
 
 def linear(*points, names=NAMES, start_time=None):
     """A command of (time, positions) points."""
-    return Command(names, [(time, positions, [], []) for time, positions in points], start_time)
+    return TrajectoryCommand(names, [(time, positions, [], []) for time, positions in points], start_time)
 
 
 def moving():
@@ -71,13 +71,13 @@ P, BAD = [0.0, 0.0, 0.0], [0.0, math.nan, 0.0]
 ])
 def test_wrong_points_are_refused(points, error, text):
     with pytest.raises(getattr(joint_trajectory, error), match=text) as caught:
-        Command(NAMES, points)
+        TrajectoryCommand(NAMES, points)
     assert isinstance(caught.value, TrajectoryError)
 
 
 def test_accelerations_without_velocities_do_not_count():
-    trajectory = replace(hold(0.0, np.zeros(3)), Command(NAMES, [(1.0, [1.0] * 3, [], [9.0] * 3)]), 0.0, NAMES,
-                         NO_TURNS).trajectory
+    trajectory = replace(hold(0.0, np.zeros(3)), TrajectoryCommand(NAMES, [(1.0, [1.0] * 3, [], [9.0] * 3)]), 0.0,
+                         NAMES, NO_TURNS).trajectory
     np.testing.assert_allclose(trajectory.sample(0.5), [[0.5] * 3, [1.0] * 3, P])
 
 
@@ -110,7 +110,7 @@ def test_between_the_end_of_the_old_and_a_future_start_it_stands():
 
 
 def test_bridge_begins_with_the_state_of_the_old_trajectory():
-    command = Command(NAMES, [(2.0, P, P, P)])
+    command = TrajectoryCommand(NAMES, [(2.0, P, P, P)])
     trajectory = replace(moving(), command, 4.0, NAMES, NO_TURNS).trajectory
     np.testing.assert_allclose(trajectory.sample(4.0), [[4.0, 8.0, 12.0], [1.0, 2.0, 3.0], P], atol=1e-12)
     np.testing.assert_allclose(trajectory.sample(6.0), [P, P, P], atol=1e-12)
@@ -118,7 +118,7 @@ def test_bridge_begins_with_the_state_of_the_old_trajectory():
 
 @pytest.mark.parametrize("fields, velocity_goes_on", [((P, [], []), False), ((P, P, []), True), ((P, P, P), True)])
 def test_first_point_decides_the_degree_of_the_bridge(fields, velocity_goes_on):
-    trajectory = replace(moving(), Command(NAMES, [(2.0, *fields)]), 4.0, NAMES, NO_TURNS).trajectory
+    trajectory = replace(moving(), TrajectoryCommand(NAMES, [(2.0, *fields)]), 4.0, NAMES, NO_TURNS).trajectory
     expected = [1.0, 2.0, 3.0] if velocity_goes_on else [-2.0, -4.0, -6.0]
     np.testing.assert_allclose(trajectory.sample(4.0)[1], expected, atol=1e-12)
 
@@ -181,7 +181,8 @@ def test_partial_command_with_a_future_start_begins_for_its_joints_only():
 
 def test_quintics_cut_by_partial_commands_stay_what_they_are():
     rng = np.random.default_rng(1)
-    old = replace(hold(0.0, np.zeros(3)), Command(NAMES, [(t, *rng.normal(size=(3, 3))) for t in (1.0, 2.0, 4.0)]), 0.0,
+    old = replace(hold(0.0, np.zeros(3)),
+                  TrajectoryCommand(NAMES, [(t, *rng.normal(size=(3, 3))) for t in (1.0, 2.0, 4.0)]), 0.0,
                   NAMES, NO_TURNS).trajectory
     cut = old
     for now in (0.3, 0.7, 1.4, 2.2):

@@ -7,12 +7,12 @@ import pytest
 
 from joint_trajectory import (
     AllPointsInPast,
-    Command,
     Follower,
     GoalMonitor,
+    GoalOutcome,
     MissingJoints,
-    Outcome,
     Tolerances,
+    TrajectoryCommand,
     bounds,
     merge_tolerances,
 )
@@ -65,7 +65,7 @@ def monitor(begins=(1.0, 1.0), ends=(3.0, 3.0), tolerances=DEFAULTS):
 
 def test_path_violation_names_joint_error_tolerance_and_time():
     verdict = monitor().check(2.5, error((-0.2, 0.0)))
-    assert verdict.outcome is Outcome.PATH_TOLERANCE_VIOLATED
+    assert verdict.outcome is GoalOutcome.PATH_TOLERANCE_VIOLATED
     assert (verdict.joint, verdict.quantity, verdict.error, verdict.tolerance) == ("a", "position", -0.2, 0.1)
     assert verdict.text == "a path error -0.200000 (position, tolerance 0.1) at 1.500 s"
 
@@ -92,7 +92,7 @@ def test_nothing_is_watched_before_the_goal_begins():
 def test_success_on_the_first_check_after_the_end():
     watch = monitor()
     assert watch.check(2.999, error()) is None
-    assert watch.check(3.0, error((0.01, -0.01))).outcome is Outcome.SUCCEEDED
+    assert watch.check(3.0, error((0.01, -0.01))).outcome is GoalOutcome.SUCCEEDED
 
 
 def test_success_has_no_text():
@@ -103,26 +103,26 @@ def test_goal_may_be_reached_late_within_the_goal_time():
     watch = monitor()
     assert watch.check(3.2, error((0.05, 0.0))) is None
     assert watch.check(3.4999, error((0.05, 0.0))) is None
-    assert watch.check(3.4999, error()).outcome is Outcome.SUCCEEDED
+    assert watch.check(3.4999, error()).outcome is GoalOutcome.SUCCEEDED
 
 
 def test_goal_violation_after_the_goal_time():
     watch = monitor()
     assert watch.check(3.25, error((0.0, 0.3))) is None
     verdict = watch.check(3.5, error((0.0, 0.3)))
-    assert verdict.outcome is Outcome.GOAL_TOLERANCE_VIOLATED
+    assert verdict.outcome is GoalOutcome.GOAL_TOLERANCE_VIOLATED
     assert verdict.text == "b goal error 0.300000 (position, tolerance 0.02) 0.500 s after the end"
 
 
 def test_without_a_goal_time_the_first_check_decides():
     strict = merge_tolerances(DEFAULTS, NAMES, goal_time_s=-1.0)
     verdict = monitor(tolerances=strict).check(3.0, error((0.0, 0.3)))
-    assert verdict.outcome is Outcome.GOAL_TOLERANCE_VIOLATED
+    assert verdict.outcome is GoalOutcome.GOAL_TOLERANCE_VIOLATED
 
 
 def test_joint_that_still_moves_has_not_arrived():
     verdict = monitor().check(3.5, error(velocity=(0.02, 0.0)))
-    assert (verdict.outcome, verdict.quantity) == (Outcome.GOAL_TOLERANCE_VIOLATED, "velocity")
+    assert (verdict.outcome, verdict.quantity) == (GoalOutcome.GOAL_TOLERANCE_VIOLATED, "velocity")
 
 
 def test_path_tolerance_does_not_bind_after_the_end():
@@ -132,7 +132,7 @@ def test_path_tolerance_does_not_bind_after_the_end():
 def test_joint_that_was_there_once_counts_as_arrived():
     watch = monitor()
     assert watch.check(3.1, error((0.0, 0.3))) is None
-    assert watch.check(3.2, error((0.3, 0.0))).outcome is Outcome.SUCCEEDED
+    assert watch.check(3.2, error((0.3, 0.0))).outcome is GoalOutcome.SUCCEEDED
 
 
 def test_joints_with_their_own_times_are_each_in_their_own_phase():
@@ -140,14 +140,14 @@ def test_joints_with_their_own_times_are_each_in_their_own_phase():
     assert watch.check(1.5, error((0.0, 9.0))) is None
     assert watch.check(3.1, error()) is None
     assert watch.check(4.5, error((0.05, 0.05))) is None
-    assert watch.check(5.0, error()).outcome is Outcome.SUCCEEDED
+    assert watch.check(5.0, error()).outcome is GoalOutcome.SUCCEEDED
     late = monitor(begins=(1.0, 2.0), ends=(3.0, 5.0), tolerances=Tolerances(bounds(2, 0.1), bounds(2, 0.02), 0.5))
     assert late.check(4.0, error((0.05, 0.05))).joint == "a"
-    assert late.check(4.0, error((0.0, 0.2))).outcome is Outcome.PATH_TOLERANCE_VIOLATED
+    assert late.check(4.0, error((0.0, 0.2))).outcome is GoalOutcome.PATH_TOLERANCE_VIOLATED
 
 
-@pytest.mark.parametrize("time, outcome", [(2.0, Outcome.PATH_TOLERANCE_VIOLATED),
-                                           (4.0, Outcome.GOAL_TOLERANCE_VIOLATED)])
+@pytest.mark.parametrize("time, outcome", [(2.0, GoalOutcome.PATH_TOLERANCE_VIOLATED),
+                                           (4.0, GoalOutcome.GOAL_TOLERANCE_VIOLATED)])
 def test_position_that_is_no_number_is_beyond_every_tolerance(time, outcome):
     assert monitor().check(time, error((math.nan, 0.0))).outcome is outcome
 
@@ -161,7 +161,7 @@ def follower(**options):
 
 
 def go(names=NAMES, to=(1.0, 2.0), after=1.0):
-    return Command(names, [(after, to, [], [])])
+    return TrajectoryCommand(names, [(after, to, [], [])])
 
 
 def test_starts_by_standing():
@@ -178,14 +178,14 @@ def test_goal_is_followed_and_reached():
     assert arm.update(0.502, np.array([0.5, 1.0]), np.array([1.0, 2.0])) is None
     np.testing.assert_allclose(arm.desired, [[0.5, 1.0], [1.0, 2.0], [0, 0]])
     np.testing.assert_allclose(arm.error, 0.0, atol=1e-12)
-    assert arm.update(1.002, np.array([1.0, 2.0]), NOBODY).outcome is Outcome.SUCCEEDED
+    assert arm.update(1.002, np.array([1.0, 2.0]), NOBODY).outcome is GoalOutcome.SUCCEEDED
     assert arm.update(1.004, np.array([1.0, 2.0]), NOBODY) is None
 
 
 def test_joints_go_on_after_a_violation():
     arm = follower()
     arm.accept(go(), 0.0, NOBODY, goal="g", tolerances=DEFAULTS)
-    assert arm.update(0.5, NOBODY, NOBODY).outcome is Outcome.PATH_TOLERANCE_VIOLATED
+    assert arm.update(0.5, NOBODY, NOBODY).outcome is GoalOutcome.PATH_TOLERANCE_VIOLATED
     assert arm.update(0.6, NOBODY, NOBODY) is None
     np.testing.assert_allclose(arm.desired[0], [0.6, 1.2])
 
@@ -202,7 +202,7 @@ def test_new_goal_takes_the_place_of_the_old():
     arm.accept(go(), 0.0, NOBODY, goal="old", tolerances=DEFAULTS)
     arm.accept(go(to=(0.0, 0.0)), 0.5, NOBODY, goal="new", tolerances=DEFAULTS)
     assert arm.goal == "new"
-    assert arm.update(1.5, NOBODY, NOBODY).outcome is Outcome.SUCCEEDED
+    assert arm.update(1.5, NOBODY, NOBODY).outcome is GoalOutcome.SUCCEEDED
 
 
 def test_refused_command_changes_nothing():
@@ -219,9 +219,9 @@ def test_refused_command_changes_nothing():
 def test_no_points_stop_where_the_joints_are_and_the_goal_is_reached():
     arm = follower()
     arm.accept(go(), 0.0, NOBODY)
-    arm.accept(Command(NAMES, []), 0.5, np.array([0.4, 0.9]), goal="stop", tolerances=DEFAULTS)
+    arm.accept(TrajectoryCommand(NAMES, []), 0.5, np.array([0.4, 0.9]), goal="stop", tolerances=DEFAULTS)
     verdict = arm.update(0.502, np.array([0.4, 0.9]), np.array([1.0, 1.0]))
-    assert verdict.outcome is Outcome.SUCCEEDED
+    assert verdict.outcome is GoalOutcome.SUCCEEDED
     np.testing.assert_array_equal(arm.desired, [[0.4, 0.9], [0, 0], [0, 0]])
 
 
@@ -232,7 +232,7 @@ def test_stop_with_a_duration_is_smooth_and_reached_at_its_end():
     assert arm.update(2.0, NOBODY, NOBODY) is None
     np.testing.assert_allclose(arm.desired, [[2.0, 4.0], [1.0, 2.0], [0, 0]])
     assert arm.update(2.499, NOBODY, NOBODY) is None
-    assert arm.update(2.5, NOBODY, NOBODY).outcome is Outcome.SUCCEEDED
+    assert arm.update(2.5, NOBODY, NOBODY).outcome is GoalOutcome.SUCCEEDED
     np.testing.assert_allclose(arm.desired[1:], 0.0, atol=1e-12)
 
 
@@ -284,7 +284,7 @@ def test_partial_goal_watches_the_other_joints_too():
     tolerances = Tolerances(bounds(2, position=0.1), bounds(2), 0.0)
     arm.accept(go(names=["b"], to=[0.0], after=2.0), 0.5, NOBODY, goal="part", tolerances=tolerances)
     verdict = arm.update(0.75, np.array([0.0, 0.875]), NOBODY)
-    assert (verdict.outcome, verdict.joint) == (Outcome.PATH_TOLERANCE_VIOLATED, "a")
+    assert (verdict.outcome, verdict.joint) == (GoalOutcome.PATH_TOLERANCE_VIOLATED, "a")
 
 
 def test_partial_goal_is_reached_when_every_joint_has_arrived():
@@ -293,4 +293,4 @@ def test_partial_goal_is_reached_when_every_joint_has_arrived():
     arm.accept(go(names=["b"], to=[0.0], after=2.0), 0.5, NOBODY, goal="part", tolerances=DEFAULTS)
     there = np.array([1.0, 0.0])
     assert arm.update(1.2, there, NOBODY) is None
-    assert arm.update(2.5, there, NOBODY).outcome is Outcome.SUCCEEDED
+    assert arm.update(2.5, there, NOBODY).outcome is GoalOutcome.SUCCEEDED

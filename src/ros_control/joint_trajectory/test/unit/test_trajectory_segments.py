@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from joint_trajectory import BeforeTrajectory, Command, hold, replace, stop
+from joint_trajectory import BeforeTrajectory, TrajectoryCommand, hold, replace, stop
 from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, shifted, splines
 
 START = np.array([0.3, -0.2, 0.5]), np.array([1.0, 0.4, -0.3]), np.array([0.2, -2.0, 0.7])
@@ -61,7 +61,8 @@ def five_points():
     rng = np.random.default_rng(3)
     points = [(time, *rng.normal(size=(3, 2))) for time in (1.0, 1.5, 2.5, 3.0, 4.5)]
     current = hold(0.0, np.zeros(2))
-    return replace(current, Command(["a", "b"], points), 0.5, ["a", "b"], np.zeros(2, dtype=bool)).trajectory, points
+    return replace(current, TrajectoryCommand(["a", "b"], points), 0.5, ["a", "b"],
+                   np.zeros(2, dtype=bool)).trajectory, points
 
 
 def test_trajectory_passes_through_its_points():

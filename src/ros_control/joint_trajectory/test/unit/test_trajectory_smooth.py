@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from joint_trajectory import BeyondPosition, BeyondVelocity, Command, Follower, Limits, replace, smooth_velocities
+from joint_trajectory import (
+    BeyondPosition,
+    BeyondVelocity,
+    Follower,
+    Limits,
+    TrajectoryCommand,
+    replace,
+    smooth_velocities,
+)
 from joint_trajectory.trajectory import hold
 
 NAMES = ["a", "b"]
@@ -12,7 +20,7 @@ NO_TURNS = np.zeros(2, dtype=bool)
 
 def smooth(points, now=0.5, current=None, start_time=None):
     current = hold(0.0, np.zeros(2)) if current is None else current
-    return replace(current, Command(NAMES, points, start_time), now, NAMES, NO_TURNS, smooth=True).trajectory
+    return replace(current, TrajectoryCommand(NAMES, points, start_time), now, NAMES, NO_TURNS, smooth=True).trajectory
 
 
 def samples(trajectory, begin, end, count=2001):
@@ -85,7 +93,7 @@ def accept(points, **options):
     made = follower(**options)
     before = made.trajectory
     try:
-        made.accept(Command(NAMES, points), 0.25, np.zeros(2), goal="goal")
+        made.accept(TrajectoryCommand(NAMES, points), 0.25, np.zeros(2), goal="goal")
     except BaseException:
         assert made.trajectory is before and made.goal is None
         raise
@@ -128,5 +136,5 @@ def test_a_joint_that_is_out_may_come_back_but_go_no_farther():
 
 def test_joints_that_a_partial_command_leaves_out_are_no_hindrance():
     made = follower(allow_partial=True)
-    made.accept(Command(["b"], [(1.0, [1.0], [], [])]), 0.25, np.zeros(2))
+    made.accept(TrajectoryCommand(["b"], [(1.0, [1.0], [], [])]), 0.25, np.zeros(2))
     assert made.trajectory.sample(2.0)[0].tolist() == [0.0, 1.0]

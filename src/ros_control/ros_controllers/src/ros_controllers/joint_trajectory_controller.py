@@ -23,10 +23,10 @@ from controller_manager import EFFORT, POS_VEL, POS_VEL_ACC, POSITION, VELOCITY,
 from controller_manager.pid_tuning import TunablePids
 from joint_trajectory import (
     Follower,
-    Outcome,
+    GoalOutcome,
+    GoalVerdict,
     Tolerances,
     TrajectoryError,
-    Verdict,
     bounds,
     code_of_error,
     code_of_outcome,
@@ -225,10 +225,10 @@ class JointTrajectoryController(Controller):
                           % (self.context.namespace, replacement.dropped, counted(len(message.points), "point"),
                              replacement.late_s))
 
-    def _conclude(self, handle: GoalHandle, verdict: Verdict) -> None:
+    def _conclude(self, handle: GoalHandle, verdict: GoalVerdict) -> None:
         self._follower.release()
         result = FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), verdict.text)
-        if verdict.outcome is Outcome.SUCCEEDED:
+        if verdict.outcome is GoalOutcome.SUCCEEDED:
             handle.succeed(result)
         else:
             self.log.error("%s: goal aborted: %s" % (self.context.namespace, verdict.text))

@@ -4,7 +4,7 @@
 One thread owns a World and all its Models; nothing here locks.
 """
 
-from .contact import Contact
+from .contact import ContactPoint
 from .errors import LOG, BulletSimError
 from .model import Model
 from .pose import Pose
@@ -12,4 +12,5 @@ from .shapes import MeshCache, MeshFiles
 from .stand_ins import with_stand_ins
 from .world import World
 
-__all__ = ["LOG", "BulletSimError", "Contact", "MeshCache", "MeshFiles", "Model", "Pose", "World", "with_stand_ins"]
+__all__ = ["LOG", "BulletSimError", "ContactPoint", "MeshCache", "MeshFiles", "Model", "Pose", "World",
+           "with_stand_ins"]

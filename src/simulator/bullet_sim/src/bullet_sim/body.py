@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from urdf_model import MergedFrame, MergedLink
 
     from .builder import Blueprint
-    from .multibodies import Motion, Parts
+    from .multibodies import Multibodies, MultibodyState
     from .world import World
 
 BASE = -1  # PyBullet's index of the root link
@@ -39,7 +39,7 @@ class Body:
     #: For how many checks of ``StateWatch`` the base has not moved.
     still_for = 0
 
-    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Parts,
+    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Multibodies,
                  root_offsets: list[np.ndarray]) -> None:
         """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``parts``, ``root_offsets``:
         what ``builder.build`` returned for it."""
@@ -377,11 +377,11 @@ class Body:
                 motion.loose[index] = base, twist
         self._rebuild(motion)
 
-    def motion(self) -> Motion:
+    def motion(self) -> MultibodyState:
         """In Model: the state that it needs to continue the present motion when it is rebuilt."""
         raise NotImplementedError
 
-    def _rebuild(self, motion: Motion | None = None) -> None:
+    def _rebuild(self, motion: MultibodyState | None = None) -> None:
         """In Model: rebuild the multibodies; they go on with ``motion``, by default the present one."""
         raise NotImplementedError
 
@@ -468,7 +468,7 @@ class Body:
         place = self.parts.all_places(number).index((body, index)) if index >= 0 else 0
         return (link.patches[place - 1].surface if place else link.surface) or Surface()
 
-    def frame_of(self, motion: Motion) -> Pose:
+    def frame_of(self, motion: MultibodyState) -> Pose:
         """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
         return Pose.from_matrix(Pose(*motion.base).matrix() @ self._offsets[BASE][1])
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from urdf_model import Cylinder, MergedRobot, Patch, Robot, Sphere, Surface, bounds
+from urdf_model import Cylinder, MergedRobot, Robot, Sphere, Surface, SurfacePatch, bounds
 from urdf_model.model import ALL_BITS
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .directions import directed, is_off, scales, turned
 from .mass_matrix import moving_inertial
-from .multibodies import Parts, Place, limbs, patches
+from .multibodies import LinkPlace, Multibodies, limbs, patches
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from urdf_model import Joint, MergedLink, Shape
 
-    from .multibodies import Limb
+    from .multibodies import Multibody
     from .shapes import ShapeStore
 
 _JOINT_TYPES = {
@@ -81,10 +81,10 @@ class Blueprint(NamedTuple):
 
 
 def build(client: int, blueprint: Blueprint, pose: Pose, shapes: ShapeStore,
-          warn: Callable[[str], None]) -> tuple[Parts, list[np.ndarray]]:
+          warn: Callable[[str], None]) -> tuple[Multibodies, list[np.ndarray]]:
     """Create the multibodies of a :class:`Blueprint` with its root bodies at ``pose``, its shapes from a ShapeStore.
 
-    Returns (Parts, [inertial offset (4, 4) of each root]). ``warn(text)`` is called for missing masses.
+    Returns (Multibodies, [inertial offset (4, 4) of each root]). ``warn(text)`` is called for missing masses.
     """
     merged, bodies, offsets = blueprint.merged, [], []
     found, start = limbs(merged, blueprint.static and blueprint.in_limbs), Pose.from_matrix(pose.matrix())
@@ -93,10 +93,10 @@ def build(client: int, blueprint: Blueprint, pose: Pose, shapes: ShapeStore,
         made, offset = _build_tree(client, blueprint, own, start, shapes, warn)
         bodies += made
         offsets.append(offset)
-    return Parts(client, bodies, merged, found), offsets
+    return Multibodies(client, bodies, merged, found), offsets
 
 
-def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose, shapes: ShapeStore,
+def _build_tree(client: int, blueprint: Blueprint, own: list[Multibody], start: Pose, shapes: ShapeStore,
                 warn: Callable[[str], None]) -> tuple[list[int], np.ndarray]:
     """Create the multibodies of the Limbs ``own``, which have one root, at Pose ``start``.
 
@@ -132,13 +132,14 @@ def _build_tree(client: int, blueprint: Blueprint, own: list[Limb], start: Pose,
         pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(),
                                 sleepThreshold=_ASLEEP_M2_PER_S2, physicsClientId=client)
     pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0, root_offset[:3, :3]), physicsClientId=client)
-    set_collision_filter(client, Place(bodies[0], -1), root.surface)
+    set_collision_filter(client, LinkPlace(bodies[0], -1), root.surface)
     return bodies, root_offset
 
 
-def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, Any],
-                further: list[tuple[str, Patch]], shapes: ShapeStore, warn: Callable[[str], None]) -> int:
-    """Create the multibody of a Limb; ``base``: createMultiBody's arguments for the root, ``further``: its patches.
+def _build_limb(client: int, blueprint: Blueprint, limb: Multibody, base: dict[str, Any],
+                further: list[tuple[str, SurfacePatch]], shapes: ShapeStore, warn: Callable[[str], None]) -> int:
+    """Create the multibody of a Multibody; ``base``: createMultiBody's arguments for the root, ``further``: its
+    patches.
 
     Returns PyBullet's number of it.
     """
@@ -188,19 +189,19 @@ def _build_limb(client: int, blueprint: Blueprint, limb: Limb, base: dict[str, A
         surface = merged.links[joint.child].surface
         pybullet.changeDynamics(body, local, **_contact(surface, most_friction(joint), turns[local]),
                                 physicsClientId=client)
-        set_collision_filter(client, Place(body, local), surface)
+        set_collision_filter(client, LinkPlace(body, local), surface)
     for local, ((name, patch), axes) in enumerate(zip(further, axes_of, strict=True), len(limb.joints)):
         pybullet.changeDynamics(body, local, **calm)
         pybullet.changeDynamics(body, local, **_contact(patch.surface, most_friction(by_child.get(name)), axes),
                                 physicsClientId=client)
-        set_collision_filter(client, Place(body, local), patch.surface)
+        set_collision_filter(client, LinkPlace(body, local), patch.surface)
     return body
 
 
-def _add_patch(columns: dict[str, list], parent: int, patch: Patch, shapes: ShapeStore, blueprint: Blueprint,
+def _add_patch(columns: dict[str, list], parent: int, patch: SurfacePatch, shapes: ShapeStore, blueprint: Blueprint,
                name: str) -> np.ndarray:
-    """Add a Patch of body ``name`` to createMultiBody's ``columns``. Returns the axes (3, 3) of its inertial frame,
-    which are those of its friction."""
+    """Add a SurfacePatch of body ``name`` to createMultiBody's ``columns``. Returns the axes (3, 3) of its inertial
+    frame, which are those of its friction."""
     merged = blueprint.merged
     static = blueprint.static and name == merged.root
     axes = np.eye(3)
@@ -250,9 +251,9 @@ def is_wheel(joint: Joint) -> bool:
     return joint.type == "continuous"
 
 
-def set_collision_filter(client: int, place: Place, surface: Surface | None, renew: bool = False) -> None:
-    """Let the link at a Place collide with those that share a bit with it (``Surface.bitmask``); ``renew``: also where
-    it collides with all, so that Bullet drops the link's contacts."""
+def set_collision_filter(client: int, place: LinkPlace, surface: Surface | None, renew: bool = False) -> None:
+    """Let the link at a LinkPlace collide with those that share a bit with it (``Surface.bitmask``); ``renew``: also
+    where it collides with all, so that Bullet drops the link's contacts."""
     if surface is not None and surface.bitmask is not None:
         # PyBullet's own groups are 1, and 2 for bodies without mass.
         group = surface.bitmask << 2
@@ -324,7 +325,7 @@ def join_patches(merged: MergedRobot) -> list[str]:
             if built in left:
                 left[built].collisions.extend(patch.collisions)
             else:
-                left[built] = Patch(patch.surface, list(patch.collisions))
+                left[built] = SurfacePatch(patch.surface, list(patch.collisions))
         link.patches[:] = left.values()
     root_of, room = {root: root for root in merged.roots}, dict.fromkeys(merged.roots, _MAX_LINKS)
     for joint in merged.joints.values():  # parents first

@@ -4,7 +4,7 @@
 from typing import NamedTuple
 
 
-class Contact(NamedTuple):
+class ContactPoint(NamedTuple):
     """A point where two bodies touch. Links by their merged names, world coordinates, SI units."""
 
     model_a: str

@@ -34,7 +34,7 @@ _BALL_POINTS = 800
 _ORDER = (Sphere, Cylinder, Box, Mesh)
 
 
-class Part(NamedTuple):
+class BulletShape(NamedTuple):
     """A shape in PyBullet's terms."""
 
     geometry: Any  # of urdf_model; of a mesh only the scale counts here
@@ -43,7 +43,7 @@ class Part(NamedTuple):
     hollow: bool  # triangles, instead of convex bodies
 
 
-def gathered(parts: list[Part], keep: Callable[[bytes, Callable[[], list[str]]], str]) -> list[Part]:
+def gathered(parts: list[BulletShape], keep: Callable[[bytes, Callable[[], list[str]]], str]) -> list[BulletShape]:
     """Return a list of at most MAX_SHAPES Parts with the same collision geometry as ``parts``.
 
     ``keep(key, lines)`` returns the path of a file that holds the result of ``lines()``, cached under ``key``.
@@ -60,11 +60,11 @@ def gathered(parts: list[Part], keep: Callable[[bytes, Callable[[], list[str]]],
             key = repr([(part.geometry, part.file) for part in chosen] + [hollow]).encode()
             key += b"".join(part.origin.tobytes() for part in chosen)
             file = keep(key, lambda lines=lines, chosen=chosen: lines(chosen))
-            few.append(Part(Mesh(file), file, np.eye(4), hollow))
+            few.append(BulletShape(Mesh(file), file, np.eye(4), hollow))
     return few
 
 
-def _bodies(parts: Iterable[Part]) -> list[str]:
+def _bodies(parts: Iterable[BulletShape]) -> list[str]:
     """Return the lines of a Wavefront file with one object for each convex body."""
     return parts_as_wavefront(
         [
@@ -75,8 +75,8 @@ def _bodies(parts: Iterable[Part]) -> list[str]:
     )
 
 
-def _convex(part: Part) -> list[np.ndarray]:
-    """Return for each convex body of a Part its points (n, 3), in the Part's own axes."""
+def _convex(part: BulletShape) -> list[np.ndarray]:
+    """Return for each convex body of a BulletShape its points (n, 3), in the Part's own axes."""
     geometry = part.geometry
     if isinstance(geometry, Mesh):
         return [points * geometry.scale for points, _ in _objects(part.file)]
@@ -91,9 +91,9 @@ def _convex(part: Part) -> list[np.ndarray]:
     return [_less(geometry.radius) * even_directions(_BALL_POINTS)]
 
 
-def without_margin(part: Part) -> Part:
-    """Return a Part of a mesh that is as large with the margin that Bullet adds as ``part`` is without; any other part
-    as it is."""
+def without_margin(part: BulletShape) -> BulletShape:
+    """Return a BulletShape of a mesh that is as large with the margin that Bullet adds as ``part`` is without; any
+    other part as it is."""
     if part.hollow or not isinstance(part.geometry, Mesh):
         return part
     scale = np.asarray(part.geometry.scale, dtype=float)
@@ -111,7 +111,7 @@ def _less(half_m: float) -> float:
     return half_m - _MARGIN_M if half_m > 2.0 * _MARGIN_M else half_m
 
 
-def _triangles(parts: Iterable[Part]) -> list[str]:
+def _triangles(parts: Iterable[BulletShape]) -> list[str]:
     """Return the lines of a Wavefront file with all triangles of ``parts``."""
     vertices, faces, first = [], [], 1
     for part in parts:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from urdf_model import MergedRobot
 
-    from .multibodies import Parts, Place
+    from .multibodies import LinkPlace, Multibodies
 
 # A hinge is two points on its axis, so far from the joint [m].
 _HALF_HINGE_M = 0.05
@@ -24,8 +24,8 @@ _HALF_HINGE_M = 0.05
 _FORCE = 1e6
 
 
-def close_loops(client: int, merged: MergedRobot, parts: Parts) -> list[int]:
-    """Create the constraints of a urdf_model.MergedRobot on its Parts, in a posture where the loops are closed.
+def close_loops(client: int, merged: MergedRobot, parts: Multibodies) -> list[int]:
+    """Create the constraints of a urdf_model.MergedRobot on its Multibodies, in a posture where the loops are closed.
 
     ``client``: PyBullet's. Returns PyBullet's numbers of them.
     """
@@ -50,7 +50,7 @@ def close_loops(client: int, merged: MergedRobot, parts: Parts) -> list[int]:
     return found
 
 
-def _inertial(client: int, place: Place) -> np.ndarray:
+def _inertial(client: int, place: LinkPlace) -> np.ndarray:
     """The frame (4, 4) of a link in its inertial one, which Bullet's constraints refer to."""
     info = pybullet.getDynamicsInfo(*place, physicsClientId=client)
     return inverse(Pose(info[3], info[4]).matrix())

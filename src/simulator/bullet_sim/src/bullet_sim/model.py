@@ -16,11 +16,11 @@ from .body import Body
 from .damping import JointDamping
 from .errors import BulletSimError, within
 from .loops import close_loops
-from .multibodies import Motion
+from .multibodies import MultibodyState
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .springs import JointSprings
-from .state_watch import Fault, out_of_bounds
+from .state_watch import ImpossibleState, out_of_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from urdf_model import Joint
 
     from .builder import Blueprint
-    from .multibodies import Parts
+    from .multibodies import Multibodies
     from .world import World
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
@@ -59,7 +59,7 @@ class Model(Body):
     A drive holds until another one replaces it, except efforts, which last one step.
     """
 
-    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Parts,
+    def __init__(self, client: int, world: World, blueprint: Blueprint, parts: Multibodies,
                  root_offsets: list[np.ndarray]) -> None:
         super().__init__(client, world, blueprint, parts, root_offsets)
         self._gravity_key = None
@@ -383,8 +383,8 @@ class Model(Body):
 
     # -- for World: when the physics has failed -----------------------------------------------------------------
 
-    def fault(self) -> Fault | None:
-        """Return the Fault of the present state, or None if it is good; then it is kept as the last good one.
+    def fault(self) -> ImpossibleState | None:
+        """Return the ImpossibleState of the present state, or None if it is good; then it is kept as the last good one.
 
         Called after every step, so one sum checks all numbers.
         """
@@ -406,7 +406,7 @@ class Model(Body):
             found = out_of_bounds({self._link_names[-1]: base, **{self._link_names[i]: b for i, b in loose.items()}},
                                   self.joint_names, self.read_joints())
             if found:
-                return Fault(found, math.isfinite(total))
+                return ImpossibleState(found, math.isfinite(total))
         if self._all and quick > _QUICK:
             joints = self._stop_at_limits(joints, velocity)
         self.still_for = self.still_for + 1 if base == self._good[0] else 0
@@ -426,7 +426,7 @@ class Model(Body):
         self._reading = None
         return self.read_joints()[0]
 
-    def motion(self) -> Motion:
+    def motion(self) -> MultibodyState:
         """Return the state that :meth:`take_parts` needs to continue the present motion."""
         twist = None if self.static else pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
         base = self._good[0]
@@ -435,13 +435,13 @@ class Model(Body):
         position, velocity, _ = self.read_joints()
         loose = {index: (centre, pybullet.getBaseVelocity(self.parts.places[index].body, physicsClientId=self._client))
                  for index, centre in self._loose_centres().items()}
-        return Motion(base, position, twist, velocity, loose)
+        return MultibodyState(base, position, twist, velocity, loose)
 
-    def last_good(self) -> Motion:
+    def last_good(self) -> MultibodyState:
         """Return the state that :meth:`take_parts` needs to put the model at its last good state, at rest."""
         loose = {index: (centre, None) for index, centre in self._good_loose.items()}
         base, joints = self._good
-        return Motion(base, joints, None, np.zeros(len(self._all)), loose)
+        return MultibodyState(base, joints, None, np.zeros(len(self._all)), loose)
 
     def put_back(self) -> None:
         """Restore the last good state, at rest."""
@@ -454,7 +454,7 @@ class Model(Body):
             self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.set_joint_positions(np.arange(len(self._all)), joints)
 
-    def take_parts(self, parts: Parts, motion: Motion) -> None:
+    def take_parts(self, parts: Multibodies, motion: MultibodyState) -> None:
         """Continue with ``parts``, the rebuilt copy of the previous ones."""
         base, joints, twist, velocity, loose = motion
         client = {"physicsClientId": self._client}
@@ -482,7 +482,7 @@ class Model(Body):
 
     # -- inside -------------------------------------------------------------------------------------------------
 
-    def _rebuild(self, motion: Motion | None = None) -> None:
+    def _rebuild(self, motion: MultibodyState | None = None) -> None:
         self._world.rebuild([self], None if motion is None else {self: motion})
 
     def _refuse_nan(self, index: np.ndarray, values: list[float], what: str) -> None:

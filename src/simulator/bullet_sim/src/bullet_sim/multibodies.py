@@ -16,7 +16,7 @@ from .quiet_pybullet import pybullet
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from urdf_model import MergedRobot, Patch
+    from urdf_model import MergedRobot, SurfacePatch
 
 # A limb with fewer joints joins another one: a multibody costs something, too.
 _MIN_JOINTS = 4
@@ -24,14 +24,14 @@ _MIN_JOINTS = 4
 _MAX_SHARES = 64
 
 
-class Place(NamedTuple):
+class LinkPlace(NamedTuple):
     """Where Bullet has a link and the joint before it."""
 
     body: int  # PyBullet's number of the multibody
     index: int  # in it; -1 is its root
 
 
-class Motion(NamedTuple):
+class MultibodyState(NamedTuple):
     """The state of a model: PyBullet's (position, quaternion) of its base and (linear, angular) velocity of that, None
     for one that is fixed or at rest; positions and velocities of the joints (n,); {index: the same two of its loose
     roots}."""
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
     loose: dict
 
 
-class Limb(NamedTuple):
+class Multibody(NamedTuple):
     """A multibody: its root, a body of a urdf_model.MergedRobot, and the numbers of its joints, ascending."""
 
     root: str
@@ -57,7 +57,7 @@ def link_indices(merged: MergedRobot) -> dict[str, int]:
             **{joint.child: number for number, joint in enumerate(merged.joints.values())}}
 
 
-def limbs(merged: MergedRobot, separate: bool) -> list[Limb]:
+def limbs(merged: MergedRobot, separate: bool) -> list[Multibody]:
     """The Limbs that a urdf_model.MergedRobot is built as: those on its root first.
 
     One for each root, unless ``separate`` and several limbs with some joints are on the first, which must be fixed.
@@ -68,7 +68,7 @@ def limbs(merged: MergedRobot, separate: bool) -> list[Limb]:
         trees[root_of[joint.child]].append(number)
     first = trees.pop(merged.root)
     on_root = _limbs_on_root(merged, first) if separate else [first]
-    return [*(Limb(merged.root, numbers) for numbers in on_root), *(Limb(*tree) for tree in trees.items())]
+    return [*(Multibody(merged.root, numbers) for numbers in on_root), *(Multibody(*tree) for tree in trees.items())]
 
 
 def _limbs_on_root(merged: MergedRobot, tree: list[int]) -> list[list[int]]:
@@ -86,32 +86,32 @@ def _limbs_on_root(merged: MergedRobot, tree: list[int]) -> list[list[int]]:
     return [sorted(limb + small) if limb is least else limb for limb in large]
 
 
-def patches(merged: MergedRobot, limb: Limb, with_root: bool) -> list[tuple[str, Patch]]:
-    """[(body, its urdf_model Patch)] of a Limb: further links of its multibody, fixed to those of the joints and behind
-    them. ``with_root``: with those of the root."""
+def patches(merged: MergedRobot, limb: Multibody, with_root: bool) -> list[tuple[str, SurfacePatch]]:
+    """[(body, its urdf_model SurfacePatch)] of a Multibody: further links of its multibody, fixed to those of the
+    joints and behind them. ``with_root``: with those of the root."""
     joints = list(merged.joints.values())
     bodies = [limb.root] * with_root + [joints[number].child for number in limb.joints]
     return [(body, patch) for body in bodies for patch in merged.links[body].patches]
 
 
-class Parts:
+class Multibodies:
     """Reads and commands the joints of several multibodies as those of one."""
 
-    def __init__(self, client: int, bodies: Iterable[int], merged: MergedRobot, found: Sequence[Limb]) -> None:
+    def __init__(self, client: int, bodies: Iterable[int], merged: MergedRobot, found: Sequence[Multibody]) -> None:
         """``client``: PyBullet's; ``bodies``: its numbers of the multibodies, the first has the root's shape;
         ``found``: what :func:`limbs` returned for ``merged``, one for each of them."""
         self._client = client
         self.bodies = tuple(bodies)
-        #: {index of :func:`link_indices`: Place}
-        self.places = {-1: Place(self.bodies[0], -1)}
+        #: {index of :func:`link_indices`: LinkPlace}
+        self.places = {-1: LinkPlace(self.bodies[0], -1)}
         joints = [limb.joints for limb in found]
         self._joints, self._local = joints, [list(range(len(numbers))) for numbers in joints]
         indices = link_indices(merged)
         self._roots = {body: indices[limb.root] for body, limb in zip(self.bodies, found, strict=True)}
         for body, numbers in zip(self.bodies, joints, strict=True):
             if self._roots[body] != -1:
-                self.places[self._roots[body]] = Place(body, -1)
-            self.places.update((number, Place(body, local)) for local, number in enumerate(numbers))
+                self.places[self._roots[body]] = LinkPlace(body, -1)
+            self.places.update((number, LinkPlace(body, local)) for local, number in enumerate(numbers))
         in_turn = [number for numbers in joints for number in numbers]
         self._order = None
         if in_turn != sorted(in_turn):
@@ -122,7 +122,7 @@ class Parts:
         seen = set()
         for body, limb in zip(self.bodies, found, strict=True):
             for further, (name, _) in enumerate(patches(merged, limb, limb.root not in seen), len(limb.joints)):
-                self.patches.setdefault(indices[name], []).append(Place(body, further))
+                self.patches.setdefault(indices[name], []).append(LinkPlace(body, further))
                 self._indices[body, further] = indices[name]
             seen.add(limb.root)
         self._shares = {}
@@ -131,8 +131,8 @@ class Parts:
         """The model's index of the link that PyBullet has as ``local`` of ``body``."""
         return self._roots[body] if local == -1 else self._indices[body, local]
 
-    def all_places(self, index: int) -> tuple[Place, ...]:
-        """The Place of a link and those of its patches."""
+    def all_places(self, index: int) -> tuple[LinkPlace, ...]:
+        """The LinkPlace of a link and those of its patches."""
         return (self.places[index], *self.patches.get(index, ()))
 
     def joint_states(self) -> Sequence[tuple]:
@@ -189,8 +189,9 @@ class Parts:
             if self._roots[body] == index:
                 pybullet.resetBasePositionAndOrientation(body, position, quaternion, physicsClientId=self._client)
 
-    def contacts(self, other: Parts | None = None) -> list[tuple]:
-        """PyBullet's contacts of the multibodies, with those of ``other`` (Parts) where it is given; each once."""
+    def contacts(self, other: Multibodies | None = None) -> list[tuple]:
+        """PyBullet's contacts of the multibodies, with those of ``other`` (Multibodies) where it is given; each
+        once."""
         if other is None:
             found = []
             for number, body in enumerate(self.bodies):

@@ -19,7 +19,7 @@ from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, check_file, read_file
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import LOG, BulletSimError
-from .gathered import Part, corners, gathered, without_margin
+from .gathered import BulletShape, corners, gathered, without_margin
 from .limited_process import MESHES, LimitError
 from .mesh_loading import MAX_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from urdf_model import Shape
 
 NO_SHAPE = -1
-# Part of the names of cached files: increase it when the result for the same mesh changes.
+# BulletShape of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = b"4"
 #: Largest number for one body; with more, making it takes the loop more than 50 ms.
 _MAX_SHAPES_OF_BODY = 1000
@@ -180,8 +180,9 @@ class MeshFiles:
         return self._cache.wavefront(self.path(mesh), planes, hollow, (mesh.submesh, mesh.centred))
 
     def parts(self, shapes: Sequence[Shape], concave: bool,
-              mesh_cuts: dict[str, tuple[tuple, ...]] | None = None) -> list[Part]:
-        """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MAX_SHAPES`` Part.
+              mesh_cuts: dict[str, tuple[tuple, ...]] | None = None) -> list[BulletShape]:
+        """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MAX_SHAPES``
+        BulletShape.
 
         ``concave``, ``mesh_cuts``: as for ``ShapeStore.compound``. Raises BulletSimError for too many shapes, and for a
         mesh that cannot be found or read.
@@ -197,7 +198,7 @@ class MeshFiles:
                 file = self.wavefront(geometry, planes, concave)
             elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
                 geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
-            parts.append(Part(geometry, file, origin, bool(file and concave and not planes)))
+            parts.append(BulletShape(geometry, file, origin, bool(file and concave and not planes)))
         return gathered(parts, self._cache.keep)
 
 
@@ -229,7 +230,7 @@ class ShapeStore:
             self._shapes[key] = self._create(parts)
         return self._shapes[key]
 
-    def _create(self, parts: list[Part]) -> int:
+    def _create(self, parts: list[BulletShape]) -> int:
         if isinstance(parts[0][0], Plane):
             return pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
         columns = {

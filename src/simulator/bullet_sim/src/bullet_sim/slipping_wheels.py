@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .model import Model
-    from .multibodies import Place
+    from .multibodies import LinkPlace
 
 # A force of the slip takes over from a compliance on that is stable, and lets go below this part of it.
 _LETS_GO = 0.8
@@ -130,7 +130,7 @@ class SlippingWheels:
                 if touch.other is not None:
                     self._apply(touch.other, -force, touch.place)
 
-    def _place(self, wheel: Slip) -> Place:
+    def _place(self, wheel: Slip) -> LinkPlace:
         return self._model.parts.places[self._numbers[wheel.body]]
 
     def _apply(self, where: tuple[int, int], force: np.ndarray, place: np.ndarray) -> None:

@@ -33,7 +33,7 @@ _ASLEEP_STEPS = 50
 _TURNS = 50
 
 
-class Fault(NamedTuple):
+class ImpossibleState(NamedTuple):
     """An impossible state."""
 
     text: str  # which value is out of its bound

@@ -12,7 +12,7 @@ import numpy as np
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
 from .builder import Blueprint, build, is_wheel, join_patches, link_collisions
-from .contact import Contact
+from .contact import ContactPoint
 from .errors import LOG, BulletSimError, within
 from .hanging import Hanging
 from .model import Model
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from urdf_model import MergedLink, MergedRobot
 
     from .body import Body
-    from .multibodies import Motion
+    from .multibodies import MultibodyState
     from .sliding_wheels import SlidingWheels
     from .slipping_wheels import Slip
 
@@ -379,7 +379,7 @@ class World:
                 model.reapply_wrenches()
         self._watch.look()
 
-    def rebuild(self, models: Collection[Model], motions: Mapping[Model, Motion] | None = None) -> None:
+    def rebuild(self, models: Collection[Model], motions: Mapping[Model, MultibodyState] | None = None) -> None:
         """Rebuild the multibodies of ``models``.
 
         ``motions``: {model: result of ``Model.motion`` or ``Model.last_good``}. All bodies are removed before the first
@@ -408,8 +408,9 @@ class World:
         self._put_contact_ahead()
         pybullet.performCollisionDetection(physicsClientId=self._client)
 
-    def contacts(self, model: Model | None = None, other: Model | None = None) -> list[Contact]:
-        """Return the contacts of the last step as a list of Contact; all, or those of one Model, or between two."""
+    def contacts(self, model: Model | None = None, other: Model | None = None) -> list[ContactPoint]:
+        """Return the contacts of the last step as a list of ContactPoint; all, or those of one Model, or between
+        two."""
         if model is None:
             points = pybullet.getContactPoints(physicsClientId=self._client) or ()
         else:
@@ -419,7 +420,7 @@ class World:
         for point in points:
             a, b = names[point[1]], names[point[2]]
             found.append(
-                Contact(
+                ContactPoint(
                     a.name, a.link_name(point[1], point[3]), b.name, b.link_name(point[2], point[4]),
                     point[5], point[7], point[8], point[9],
                     tuple(point[10] * u + point[12] * v for u, v in zip(point[11], point[13], strict=True)),
@@ -427,7 +428,7 @@ class World:
             )
         return found
 
-    def touching(self, model: Model) -> list[Contact]:
+    def touching(self, model: Model) -> list[ContactPoint]:
         """Return the contacts of ``model`` at the present poses, as :meth:`contacts` does; no time passes."""
         self.detect_contacts()
         return self.contacts(model)

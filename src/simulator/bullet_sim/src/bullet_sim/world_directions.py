@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from .model import Model
-    from .multibodies import Place
+    from .multibodies import LinkPlace
 
 # Scales that differ by less are the same, as are axes whose slopes do [1].
 _SAME, _LEVEL = 1e-3, 0.01
@@ -28,7 +28,7 @@ _SAME, _LEVEL = 1e-3, 0.01
 class _Footing(NamedTuple):
     """A link in Bullet whose friction has the world's directions: coefficients along the world's y axis and x axis."""
 
-    place: Place
+    place: LinkPlace
     along: float
     across: float
 
@@ -82,7 +82,7 @@ class WorldDirections:
                 self._scales[footing.place] = scales
                 pybullet.changeDynamics(*footing.place, anisotropicFriction=scales, physicsClientId=self._client)
 
-    def _turn(self, place: Place) -> tuple[float, ...]:
+    def _turn(self, place: LinkPlace) -> tuple[float, ...]:
         """The quaternion of a link's inertial frame in the world."""
         if place.index < 0:
             return pybullet.getBasePositionAndOrientation(place.body, physicsClientId=self._client)[1]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _WORLD = ("", "world", "map")
 
 
-class Playback:
+class PosePlayback:
     """Decides which point of a trajectory is next, and when.
 
     :param points: list of (positions (n,), seconds until the point after it)
@@ -62,7 +62,7 @@ class JointPoseTrajectory(ModelPlugin):
     def __init__(self, context: PluginContext) -> None:
         super().__init__(context)
         self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
-        self._playback: Playback | None = None
+        self._playback: PosePlayback | None = None
         # Of the trajectory: its joints in the model and in its points, the link that stays where it is.
         self._index = context.model.index([])
         self._columns: list[int] = []
@@ -140,7 +140,7 @@ class JointPoseTrajectory(ModelPlugin):
         self._index = model.index(known)
         self._columns = [names.index(name) for name in known]
         self._anchor = None if frame in _WORLD else frame
-        self._playback = Playback(points, max(trajectory.header.stamp.to_sec(), self._now_s))
+        self._playback = PosePlayback(points, max(trajectory.header.stamp.to_sec(), self._now_s))
         return ""
 
     def reset(self) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _PERIOD_S = 1.0 / 30.0  # of the poses, as in Gazebo
 
 
-class Trajectory:
+class ActorTrajectory:
     """Poses by time: straight between waypoints."""
 
     def __init__(self, waypoints: Iterable[tuple[float, Sequence[float]]]) -> None:
@@ -60,7 +60,7 @@ class ActorMotion(ModelPlugin):
         waypoints = [(self._number(point, "time"), self._pose(point))
                      for point in context.element.iterfind("trajectory/waypoint")]
         moves = bool(waypoints) and self._flag("auto_start")
-        self._trajectory = Trajectory(waypoints) if moves else None
+        self._trajectory = ActorTrajectory(waypoints) if moves else None
         self._loops = self._flag("loop")
         self._delay_s = self._number(context.element, "delay_start")
         self._began_s, self._next_s = context.world.time_s, 0.0

@@ -16,7 +16,7 @@ from urdf_model.transforms import inverse
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-    from bullet_sim import Contact, Model, World
+    from bullet_sim import ContactPoint, Model, World
 
 
 class CollisionNames:
@@ -60,7 +60,7 @@ def _full(model_name: str, name: CollisionName) -> str:
     return "%s::%s::%s" % (model_name, *name)
 
 
-def contact_states(contacts: Iterable[Contact], names: CollisionNames,
+def contact_states(contacts: Iterable[ContactPoint], names: CollisionNames,
                    about: Collection[str] | None = None) -> list[ContactState]:
     """List of ContactState, one for each pair of collisions among ``contacts``, a list of ``bullet_sim.Contact``.
 
@@ -79,7 +79,7 @@ def contact_states(contacts: Iterable[Contact], names: CollisionNames,
     return [_contact_state(mine, other, points) for (mine, other), points in touching.items()]
 
 
-def _contact_state(mine: str, other: str, points: list[tuple[Contact, float]]) -> ContactState:
+def _contact_state(mine: str, other: str, points: list[tuple[ContactPoint, float]]) -> ContactState:
     state = ContactState(collision1_name=mine, collision2_name=other)
     state.info = "%d contact points" % len(points)
     total = np.zeros(3)

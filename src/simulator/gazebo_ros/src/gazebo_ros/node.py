@@ -25,9 +25,9 @@ from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
 from gazebo_ros.picture_process import PictureProcess
 from gazebo_ros.plugin_table import PluginTable
-from gazebo_ros.publications import Publications
+from gazebo_ros.publications import SimulationPublications
 from gazebo_ros.simulation import Simulation
-from gazebo_ros.spawning import Library, Spawner
+from gazebo_ros.spawning import Spawner, SpawnLookups
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
 from loop_ros.faults import Faults
@@ -135,8 +135,9 @@ def _build(log: LoopLog, cleanup: contextlib.ExitStack, line: CommandLine, threa
     simulation = Simulation(world, requests, log, faults,
                             real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
                             paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
-    publications = Publications(simulation, ros, writer, log,
-                                clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
+    publications = SimulationPublications(simulation, ros, writer, log,
+                                          clock_rate=float(rospy.get_param("~clock_rate",
+                                                                           1.0 / description.time_step_s)))
     lights = WorldLights(description.lights, description.scene)
 
     pictures = _picture_process(line, log)
@@ -151,7 +152,7 @@ def _build(log: LoopLog, cleanup: contextlib.ExitStack, line: CommandLine, threa
             log.error_throttle(60.0, str(error))
         publications.write_snapshot()
 
-    library = Library(table, finder, folders)
+    library = SpawnLookups(table, finder, folders)
     spawner = Spawner(simulation, library, ros, log, on_change=tell_viewers, folder=writer.folder)
     services = GazeboServices(simulation, spawner, lights, ros, log)
     spawner.spawn_world(description.models)

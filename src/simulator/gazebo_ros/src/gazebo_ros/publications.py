@@ -44,7 +44,7 @@ CONTACTS_RATE = 25.0
 PAUSED_SNAPSHOT_RATE = 20.0
 
 
-class Publications:
+class SimulationPublications:
     """Call :meth:`on_tick` after each tick, :meth:`on_turn` at each turn of the loop."""
 
     def __init__(self, simulation: Simulation, ros: RosObjects, snapshot: SnapshotWriter | NoSnapshot, log: Log,

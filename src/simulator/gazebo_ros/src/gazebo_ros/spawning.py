@@ -80,7 +80,7 @@ class Prepared:
     origin: np.ndarray | None = None
 
 
-class Library(NamedTuple):
+class SpawnLookups(NamedTuple):
     """The look-ups of a :class:`Spawner`: plugin classes, files, models of SDF."""
 
     plugins: PluginTable
@@ -91,9 +91,9 @@ class Library(NamedTuple):
 class Spawner:
     """Makes models and their plugins, and keeps the list for viewers."""
 
-    def __init__(self, simulation: Simulation, library: Library, ros: LoopRos, log: Log,
+    def __init__(self, simulation: Simulation, library: SpawnLookups, ros: LoopRos, log: Log,
                  on_change: Callable[[], object], folder: str | Path | None = None) -> None:
-        """``library``: :class:`Library`; ``on_change()``: models changed.
+        """``library``: :class:`SpawnLookups`; ``on_change()``: models changed.
 
         ``folder``: where viewers find the pictures of screens.
         """

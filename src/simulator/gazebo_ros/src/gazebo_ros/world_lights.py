@@ -9,7 +9,7 @@ import numpy as np
 from lxml import etree
 
 from gazebo_ros.entities import UnknownEntity
-from sdf_model import Scene, SdfError, parse_light
+from sdf_model import SceneLook, SdfError, parse_light
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -27,10 +27,10 @@ _MOST = 1e9
 class WorldLights:
     """Lights by name."""
 
-    def __init__(self, lights: Sequence[Light], scene: Scene | None = None) -> None:
+    def __init__(self, lights: Sequence[Light], scene: SceneLook | None = None) -> None:
         """``lights``: list of ``sdf_model.Light``; ``scene``: ``sdf_model.Scene``."""
         self._lights = {light.name: light for light in lights}
-        self._scene = scene or Scene()
+        self._scene = scene or SceneLook()
         # A world file without lights is not dark: viewers choose the light. A world whose lights were deleted is dark.
         self._unlit = not lights
         #: Called when the list for viewers has changed.

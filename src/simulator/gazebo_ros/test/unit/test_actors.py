@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import Pose, World
-from gazebo_ros.actors import ActorMotion, Trajectory
+from gazebo_ros.actors import ActorMotion, ActorTrajectory
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
 from gazebo_ros.urdf_extras import plugins
 from loop_ros.testing import FakeLog, FakeRos
@@ -19,7 +19,7 @@ SCRIPT = """<robot name="r"><link name="link"/><gazebo><plugin filename="libacto
 
 
 def test_a_trajectory_is_straight_between_waypoints_and_turns_the_short_way():
-    way = Trajectory([(2.0, (4, 0, 1, 0, 0, math.radians(350))), (1.0, (0, 2, 1, 0, 0, math.radians(10)))])
+    way = ActorTrajectory([(2.0, (4, 0, 1, 0, 0, math.radians(350))), (1.0, (0, 2, 1, 0, 0, math.radians(10)))])
     assert way.length_s == 2.0
     assert way.pose(0.0).position == pytest.approx((0, 2, 1)) and way.pose(9.0).position == pytest.approx((4, 0, 1))
     middle = way.pose(1.5)

@@ -4,16 +4,17 @@ from types import SimpleNamespace
 
 import pytest
 
-from bullet_sim import Contact
+from bullet_sim import ContactPoint
 from gazebo_ros import publications
 from gazebo_ros.pacing import RateMeter
 
 STEP_S = 0.002
-TOUCH = Contact("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0), -0.001, 5.0, (1.0, 0.0, 0.0))
+TOUCH = ContactPoint("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0), -0.001, 5.0, (1.0, 0.0, 0.0))
 
 
 class World:
-    """The part of the world that Publications looks at, run at a factor of wall time that the test chooses."""
+    """The part of the world that SimulationPublications looks at, run at a factor of wall time that the test
+    chooses."""
 
     def __init__(self, monkeypatch, factor, paused=False, asked=None, clock_rate=500.0):
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
@@ -29,8 +30,8 @@ class World:
         ros = SimpleNamespace(publisher=lambda topic, *arguments, **options: (
             self.contacts if topic == "/gazebo/contacts" else publisher))
         self.snapshot = SimpleNamespace(write=self._write, resets=0)
-        self.publications = publications.Publications(self.simulation, ros, self.snapshot, log=None,
-                                                      clock_rate=clock_rate)
+        self.publications = publications.SimulationPublications(self.simulation, ros, self.snapshot, log=None,
+                                                                clock_rate=clock_rate)
         self.clocks = 0
 
     def _count(self, data):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import Pose, World
-from gazebo_ros.publications import Publications
+from gazebo_ros.publications import SimulationPublications
 from sdf_model import parse_sdf_model
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import blended
@@ -39,7 +39,7 @@ def test_a_viewer_shows_all_links_where_the_world_has_them(falling, tmp_path):
     written = []
     fake = SimpleNamespace(_simulation=SimpleNamespace(world=world, tick=0, time_s=0.0, paused=False),
                            _snapshot=SimpleNamespace(write=lambda tick, time_s, parts, paused: written.extend(parts)))
-    Publications.write_snapshot(fake)
+    SimulationPublications.write_snapshot(fake)
     values = np.concatenate(written)
     mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
     mirror.set_scene([{"name": "boxes", "urdf": drawing_urdf(model.merged), "joints": list(model.joint_names),

@@ -10,7 +10,7 @@ from gazebo_ros.entities import UnknownEntity
 from gazebo_ros.light_services import LightServices
 from gazebo_ros.world_lights import WorldLights, lights_of_links
 from loop_ros.testing import FakeRos
-from sdf_model import Light, ModelFolders, Scene, parse_sdf_model
+from sdf_model import Light, ModelFolders, SceneLook, parse_sdf_model
 from urdf_model import merge_fixed, parse_urdf
 from urdf_model.transforms import pose_matrix
 from world_picture.shared_picture import PictureReader, PictureWriter
@@ -21,7 +21,7 @@ SUN = Light("sun", "directional", pose_matrix((1.0, 2.0, 3.0), (0.0, 0.0, np.pi 
 
 
 def test_viewers_are_told_in_the_frame_of_the_world_and_of_each_change():
-    lights, told = WorldLights([SUN], Scene(ambient=(0.1, 0.2, 0.3))), []
+    lights, told = WorldLights([SUN], SceneLook(ambient=(0.1, 0.2, 0.3))), []
     lights.on_change = lambda: told.append(lights.listed())
     listed = lights.listed()
     assert listed["ambient"] == (0.1, 0.2, 0.3) and listed["background"] is None and listed["shadows"]

@@ -39,14 +39,14 @@ def _camera_settings(noise):
     ]
 
 
-class CameraSettings:
+class ServedCameraSettings:
     """The settings of one camera; closed like a topic."""
 
     #: These topics need no picture.
     has_listeners = False
 
-    def __init__(self, name: str, apply: Callable[[CameraSettings], object], noise: tuple[float, float] = (0.0, 0.0),
-                 more: Iterable[Setting] = ()) -> None:
+    def __init__(self, name: str, apply: Callable[[ServedCameraSettings], object],
+                 noise: tuple[float, float] = (0.0, 0.0), more: Iterable[Setting] = ()) -> None:
         """``name``: the camera's in ROS; ``apply(self)`` is called now, and in a service's thread after each change;
         ``noise``: (mean, standard deviation) as the description has it; ``more``: further settings. Raises
         :class:`SensorError` for a parameter that is of no use."""

@@ -19,7 +19,7 @@ from world_picture.results import ResultCache
 if TYPE_CHECKING:
     import moderngl
 
-    from sensor_renderer.mirror import Material, Mirror, Part
+    from sensor_renderer.mirror import DrawnPart, Mirror, PartLook
     from sensor_renderer.pinhole import Pinhole
     from sensor_renderer.programs import Programs
     from sensor_renderer.sides import Sides
@@ -33,13 +33,13 @@ _MAX_IN_DEPTH_M = 0.001
 # be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
 _CASTER_SHARE, _CASTER_MIN = 0.2, 60
 _CASTER_M = 0.003
-# Part of the names of cached results: increase it when other triangles cast shadows or show their backs.
+# DrawnPart of the names of cached results: increase it when other triangles cast shadows or show their backs.
 _VERSION = 1
 Entry = TypeVar("Entry")
 
 
 @dataclass
-class Link:
+class DrawnLink:
     """The geometry of one draw call: a bounding box, by its centre (3,) and half of its size (3,), and the radius of a
     sphere about the same centre [m]; its parts; whether it has meshes; the array that casts its
     shadow. :class:`Arrays` are made of a level of detail when it is first needed, by the numbers of the parts' levels;
@@ -49,7 +49,7 @@ class Link:
     half: np.ndarray
     radius: float
     is_floor: bool
-    parts: tuple[Part, ...] = ()
+    parts: tuple[DrawnPart, ...] = ()
     is_mesh: bool = False
     caster: VertexArray | None = None
     by_level: dict[tuple[int, ...], Arrays] = field(default_factory=dict)
@@ -64,13 +64,13 @@ class Link:
 
 class Arrays(NamedTuple):
     """Vertex arrays of a level of detail, for ``colour`` and for ``depth`` only; how many ``corners`` has the former
-    without the backs that follow. ``textured``: (:class:`sensor_renderer.mirror.Material`, vertex array) for each
+    without the backs that follow. ``textured``: (:class:`sensor_renderer.mirror.PartLook`, vertex array) for each
     material; ``colour`` is of the parts without one, or None."""
 
     colour: VertexArray | None
     depth: VertexArray
     corners: int = -1
-    textured: tuple[tuple[Material, VertexArray], ...] = ()
+    textured: tuple[tuple[PartLook, VertexArray], ...] = ()
 
 
 class VertexArray:
@@ -108,15 +108,15 @@ class Links:
         self._links = {}
         self._links_of.clear()
 
-    def everything(self, mirror: Mirror) -> list[tuple[Link, np.ndarray, np.ndarray]]:
-        """The links to draw: (:class:`Link`, matrix, the same as OpenGL reads it), one for each link that has
+    def everything(self, mirror: Mirror) -> list[tuple[DrawnLink, np.ndarray, np.ndarray]]:
+        """The links to draw: (:class:`DrawnLink`, matrix, the same as OpenGL reads it), one for each link that has
         shapes."""
         found = []
         for body in mirror.bodies.values():
             found += [entry for entry in self._of(body) if entry[0] is not None]
         return found
 
-    def named(self, mirror: Mirror) -> list[tuple[Link, np.ndarray, tuple[tuple[str, int], np.ndarray]]]:
+    def named(self, mirror: Mirror) -> list[tuple[DrawnLink, np.ndarray, tuple[tuple[str, int], np.ndarray]]]:
         """The same, with ((model's name, link's number), the packed matrix) in place of the packed matrix."""
         return [(link, matrix, ((name, number), packed)) for name, body in mirror.bodies.items()
                 for number, (link, matrix, packed) in enumerate(self._of(body)) if link is not None]
@@ -145,7 +145,7 @@ class Links:
             for error_m in (0.0, *link.steps):
                 self._level(link, error_m)
 
-    def arrays(self, link: Link, distance: float, pinhole: Pinhole, depth: bool = False) -> Arrays:
+    def arrays(self, link: DrawnLink, distance: float, pinhole: Pinhole, depth: bool = False) -> Arrays:
         """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
         for a picture of ``depth``."""
         error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, pinhole.near) / pinhole.fx
@@ -172,9 +172,9 @@ class Links:
             # A level may be as far outside of this one.
             error_m = max((level.error_m for part in parts for level in part.levels), default=0.0)
             radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()) + error_m
-            found = self._links[key] = Link(centre, (high - low) / 2.0 + error_m, radius,
-                                            any(part.is_floor for part in parts), tuple(parts),
-                                            any(part.is_mesh for part in parts))
+            found = self._links[key] = DrawnLink(centre, (high - low) / 2.0 + error_m, radius,
+                                                 any(part.is_floor for part in parts), tuple(parts),
+                                                 any(part.is_mesh for part in parts))
             found.caster = self._caster_of(found)
         return found
 
@@ -241,7 +241,7 @@ class Links:
 
 
 def _release(link):
-    """Release all arrays of a :class:`Link`."""
+    """Release all arrays of a :class:`DrawnLink`."""
     arrays = link.by_level.values()
     textured = (array for level in arrays for _, array in level.textured)
     for array in {link.caster, *textured, *(array for level in arrays for array in level[:2])}:
@@ -268,10 +268,10 @@ def _factor(part):
     return part.material.factor if part.material is not None else part.colour[:3]
 
 
-def visible(listed: Sequence[tuple[Link, np.ndarray, Entry]], pinhole: Pinhole,
-            view: np.ndarray) -> list[tuple[Link, np.ndarray, Entry, float]]:
-    """The entries of ``listed``, (:class:`Link`, matrix, anything), whose boxes and spheres intersect the view frustum,
-    near ones first; each with the distance of the sphere from the eye [m], negative inside."""
+def visible(listed: Sequence[tuple[DrawnLink, np.ndarray, Entry]], pinhole: Pinhole,
+            view: np.ndarray) -> list[tuple[DrawnLink, np.ndarray, Entry, float]]:
+    """The entries of ``listed``, (:class:`DrawnLink`, matrix, anything), whose boxes and spheres intersect the view
+    frustum, near ones first; each with the distance of the sphere from the eye [m], negative inside."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.
     left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
     top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy

@@ -15,11 +15,11 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from loop_ros.reconfigure import Setting
 from sensor_renderer import convert
 from sensor_renderer.camera_sensor import CameraSensor
-from sensor_renderer.camera_settings import CameraSettings
+from sensor_renderer.camera_settings import ServedCameraSettings
 from sensor_renderer.errors import SensorError
 from sensor_renderer.pictures import Cloud, millimetres, within
 from sensor_renderer.structured_light import StructuredLight
-from sensor_renderer.topics import ColourTopics, LearningTopics, Topic, Trigger
+from sensor_renderer.topics import ColourTopics, LearningTopics, Trigger, WatchedTopic
 from sim_time.pace import Pace
 
 if TYPE_CHECKING:
@@ -109,8 +109,8 @@ class Camera(Driver):
             self._cameras.append((CameraSensor(camera, self.seed(camera.name)), topics, learning, info))
             self.topics += [*topics.all, learning]
         first = cameras[0]
-        self._settings = CameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
-                                        more=[self.rate_setting])
+        self._settings = ServedCameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
+                                              more=[self.rate_setting])
         self.topics.append(self._settings)
 
     def takes(self, number: int) -> bool:
@@ -167,7 +167,7 @@ class DepthCamera(Driver):
         self._in_millimetres = entry.text("useDepth16UC1Format", "false").lower() in ("1", "true")
 
         def topic(tag, default, message_class):
-            return Topic(self.under_camera(entry.text(tag, default), base), message_class)
+            return WatchedTopic(self.under_camera(entry.text(tag, default), base), message_class)
 
         colour_name = self.under_camera(entry.text("imageTopicName", "rgb/image_raw"), base)
         info_name = self.under_camera(entry.text("cameraInfoTopicName", "rgb/camera_info"), base)
@@ -183,7 +183,8 @@ class DepthCamera(Driver):
         stated = entry.stated(pinhole)
         self._info = convert.camera_info(stated, entry.baseline_m(self._camera), distortion)
         self._plain_info = convert.camera_info(stated, 0.0, distortion)
-        settings = CameraSettings(self.name(base), self._apply, (self._camera.noise_mean, self._camera.noise), more=[
+        settings = ServedCameraSettings(self.name(base), self._apply, (self._camera.noise_mean, self._camera.noise),
+                                        more=[
             self.rate_setting, Setting("depth_noise", False, meaning="depth as the first Kinect measures it")])
         self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self._learning, settings]
 

@@ -18,7 +18,7 @@ from sensor_renderer.programs import Programs, draw, draw_textured, matrix_bytes
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
 from sensor_renderer.sides import Sides
-from sensor_renderer.targets import Targets
+from sensor_renderer.targets import Framebuffers
 from sensor_renderer.textures import Textures
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class GlRenderer:
         self._sky = self._context.vertex_array(
             self._programs.sky, [(self._context.buffer(_grid(_SKY_CELLS).tobytes()), "2f", "corner")])
         # In software, each sample of a pixel costs as much as a pixel.
-        self._targets = Targets(self._context, 1 if software and not still else min(4, self._context.max_samples))
+        self._targets = Framebuffers(self._context, 1 if software and not still else min(4, self._context.max_samples))
         self._lit_by = None
         self._context.enable(moderngl.DEPTH_TEST)
         # A picture's rows go downwards.
@@ -174,7 +174,7 @@ class GlRenderer:
 
     def _draw(self, seen, textured, pinhole):
         """Draw ``seen``, (:class:`sensor_renderer.drawn_links.Arrays`, matrix, packed matrix,
-        :class:`sensor_renderer.drawn_links.Link`, distance of its sphere), ``textured`` as
+        :class:`sensor_renderer.drawn_links.DrawnLink`, distance of its sphere), ``textured`` as
         :func:`sensor_renderer.programs.draw_textured` takes them, and the floor last."""
         draw(self._programs.solid, [(arrays.colour, packed) for arrays, _, packed, link, _ in seen
                                     if not link.is_mesh and arrays.colour is not None])

@@ -80,7 +80,7 @@ def classes_of_parameter(value: object) -> list[tuple[str, list[str]]]:
     return found
 
 
-class Motion:
+class OpticalFlow:
     """Optical flow between the pictures of one camera."""
 
     def __init__(self) -> None:

@@ -60,7 +60,7 @@ class Lamp(NamedTuple):
                 "lamp_depth": (*depth, float(self.shadow or 0), float(MAX_SHADOWS))}
 
 
-class Light(NamedTuple):
+class SceneLight(NamedTuple):
     """``ambient``, ``background`` (3); ``sky``: whether there is one instead of the background; ``to_sun`` (3): the
     unit vector to the sun, which is the first directional light that casts shadows; ``sun``, ``sun_shine`` (3): its
     diffuse and specular colour, black for none; ``shadows``: whether it casts any; ``lamps``: all others,
@@ -79,7 +79,7 @@ class Light(NamedTuple):
     zenith = property(lambda self: _ZENITH if self.sky else self.background, doc="The sky's colour overhead.")
 
     @classmethod
-    def of_scene(cls, listed: Mapping[str, Any], more: Iterable[Mapping[str, Any]] = ()) -> Light:
+    def of_scene(cls, listed: Mapping[str, Any], more: Iterable[Mapping[str, Any]] = ()) -> SceneLight:
         """``listed`` as from :meth:`gazebo_ros.world_lights.WorldLights.listed`; missing values get the defaults.
         ``more``: lights beside those, in the same form."""
         lights = listed.get("lights")

@@ -11,7 +11,7 @@ import numpy as np
 
 from bullet_sim import MeshCache
 from sensor_renderer import triangles
-from sensor_renderer.light import Light
+from sensor_renderer.light import SceneLight
 from urdf_model import Box, Finish, Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
 from world_picture.background import NotReady
@@ -38,7 +38,7 @@ FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 
-class Level(NamedTuple):
+class DetailLevel(NamedTuple):
     """A level of detail of a part: its distance from the original [m]; ``make()`` -> its triangles (3 m, 6);
     ``uv()`` -> the corners' places in a picture (3 m, 2), for parts with a material."""
 
@@ -47,7 +47,7 @@ class Level(NamedTuple):
     uv: Callable[[], np.ndarray]
 
 
-class Material(NamedTuple):
+class PartLook(NamedTuple):
     """The look of parts that have more than a colour. ``texture``: the path of a picture, or ""; ``factor`` of its
     colours, and ``emission``, light of its own: red, green, blue from 0 to 1; ``repeats``: how often the picture lies
     side by side, and one below the other; ``cut_out``: whether its transparent pixels are holes; ``two_sided``: whether
@@ -62,7 +62,7 @@ class Material(NamedTuple):
     opacity: float = 1.0
 
 
-class Part(NamedTuple):
+class DrawnPart(NamedTuple):
     """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``levels``: of
     the same shape, the finest first; none for shapes that have no other. ``gloss``: strength of its highlights, from 0
     to 1. ``material``: None for a colour alone; else ``colour`` is about the mean. ``uv`` (3 m, 2): the corners' places
@@ -72,9 +72,9 @@ class Part(NamedTuple):
     triangles: np.ndarray
     colour: tuple[float, ...]
     is_floor: bool = False
-    levels: tuple[Level, ...] = ()
+    levels: tuple[DetailLevel, ...] = ()
     gloss: float = GLOSS
-    material: Material | None = None
+    material: PartLook | None = None
     uv: np.ndarray | None = None
     is_mesh: bool = False
 
@@ -95,7 +95,7 @@ class Part(NamedTuple):
         return uv * self.material.repeats
 
 
-class Screen(NamedTuple):
+class DrawnScreen(NamedTuple):
     """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: the frame of its centre, x to the
     right and y up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
     :class:`world_picture.shared_picture.PictureReader`; ``glows``: whether it is a light, whose black pixels show what
@@ -110,10 +110,11 @@ class Screen(NamedTuple):
     radius: float = 0.0
 
 
-class Body:
+class DrawnModel:
     """A model: its links as parts, its screens, and their poses."""
 
-    def __init__(self, links: Sequence[tuple[str, list[Part]]], joints: Sequence[Joint], screens: Sequence[Screen] = (),
+    def __init__(self, links: Sequence[tuple[str, list[DrawnPart]]], joints: Sequence[Joint],
+                 screens: Sequence[DrawnScreen] = (),
                  static: bool = False, lights: Sequence[Mapping[str, Any]] = ()) -> None:
         """``links``: list of (name, parts), the roots first, then one for each ``urdf_model.Joint`` of ``joints``,
         parents first; ``static``: whether its first root is fixed in the world; ``lights``: as in the scene's entry, in
@@ -222,7 +223,7 @@ class _Built(NamedTuple):
 
     key: tuple[object, ...]
     entry: Mapping[str, Any]
-    body: Body
+    body: DrawnModel
     waits_for: frozenset[str]
 
 
@@ -248,8 +249,8 @@ class Mirror:
         self.left = 0
         #: Bodies by name, in the scene's order.
         self.bodies = {}
-        #: The light: :class:`sensor_renderer.light.Light`.
-        self.light = Light.of_scene({})
+        #: The light: :class:`sensor_renderer.light.SceneLight`.
+        self.light = SceneLight.of_scene({})
         self._world_light = {}
         #: Counts visible changes, except pictures on screens.
         self.version = 0
@@ -303,7 +304,7 @@ class Mirror:
 
     def _light_up(self):
         lights = [light for body in self.bodies.values() for light in body.lights()]
-        self.light = Light.of_scene(self._world_light, lights)
+        self.light = SceneLight.of_scene(self._world_light, lights)
 
     @property
     def picture_versions(self) -> tuple[int, ...]:
@@ -317,13 +318,13 @@ class Mirror:
 
     def _body(self, entry):
         if entry["urdf"] is None:
-            return Body([("", [_floor()])], [], static=True)
+            return DrawnModel([("", [_floor()])], [], static=True)
         merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]), held=not entry.get("loose"))
         joints = list(merged.joints.values())
         order = [*merged.roots, *(joint.child for joint in joints)]
         links = [(name, self._parts_of_link(merged.links[name])) for name in order]
         screens = [screen for screen in map(self._screen, entry.get("screens", ())) if screen]
-        return Body(links, joints, screens, bool(entry.get("static")), entry.get("lights", ()))
+        return DrawnModel(links, joints, screens, bool(entry.get("static")), entry.get("lights", ()))
 
     def _screen(self, listed):
         try:
@@ -331,8 +332,8 @@ class Mirror:
         except SnapshotError as error:
             self._warn(str(error))
             return None
-        return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture,
-                      bool(listed.get("glows")), float(listed.get("radius", 0.0)))
+        return DrawnScreen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture,
+                           bool(listed.get("glows")), float(listed.get("radius", 0.0)))
 
     def _parts_of_link(self, link):
         """The parts of a link; with its collision shapes as long as meshes of it are not ready."""
@@ -349,8 +350,8 @@ class Mirror:
         return parts
 
     def _stand_ins(self, shape, colour):
-        """A list of the :class:`Part` of a collision shape, in ``colour``; empty where it is a mesh that no world has
-        converted yet."""
+        """A list of the :class:`DrawnPart` of a collision shape, in ``colour``; empty where it is a mesh that no world
+        has converted yet."""
         geometry = shape.geometry
         if not isinstance(geometry, Mesh):
             return [self._placed((geometry,), lambda: _at(shape.origin, triangles.of_primitive(geometry)), shape.origin,
@@ -363,7 +364,7 @@ class Mirror:
         return [self._placed(("collision", path), lambda: _at(origin, triangles.flat(corners)), origin, colour=colour)]
 
     def _parts_of(self, shape):
-        """The list of :class:`Part` of a visual shape. Raises NotReady."""
+        """The list of :class:`DrawnPart` of a visual shape. Raises NotReady."""
         if shape.colour is not None and shape.colour[3] <= 0.0:
             return []  # nobody sees it
         geometry, colour, finish = shape.geometry, shape.colour or DEFAULT_COLOUR, shape.finish or Finish()
@@ -385,7 +386,7 @@ class Mirror:
         return [self._part_of_mesh(part, shape, texture, path) for part in found]
 
     def _part_of_mesh(self, part, shape, texture, path):
-        """The :class:`Part` of a ``world_picture.drawing.MeshPart`` in the mesh file at ``path``; ``texture``: the
+        """The :class:`DrawnPart` of a ``world_picture.drawing.MeshPart`` in the mesh file at ``path``; ``texture``: the
         picture that the description lays over it, or None."""
         colour, factor = part.colour or shape.colour or DEFAULT_COLOUR, shape.colour or _WHITE
         opacity = factor[3]
@@ -401,8 +402,8 @@ class Mirror:
                 colour = shape.colour or DEFAULT_COLOUR
         origin = shape.origin @ np.diag([*shape.geometry.scale, 1.0])
         size = float(np.linalg.norm(origin[:3, :3], axis=0).max())
-        levels = tuple(Level(level.error * size, lambda path=level.path: _at(origin, _read(path)),
-                             lambda path=level.path: _uv(path))
+        levels = tuple(DetailLevel(level.error * size, lambda path=level.path: _at(origin, _read(path)),
+                                   lambda path=level.path: _uv(path))
                        for level in part.levels)
         # A mirrored mesh shows its backs; they are its outside.
         finish = replace(finish, two_sided=finish.two_sided or np.linalg.det(origin[:3, :3]) < 0.0)
@@ -428,33 +429,34 @@ class Mirror:
         key = (*what, origin.tobytes())
         if key not in self._parts:
             self._parts[key] = make()
-        return Part(key, self._parts[key], **look)
+        return DrawnPart(key, self._parts[key], **look)
 
 
 def _round_levels(geometry, origin):
-    """The :class:`Level` of each of ``triangles.CIRCLES`` of a Cylinder or Sphere at ``origin`` (4, 4); () of a Box."""
+    """The :class:`DetailLevel` of each of ``triangles.CIRCLES`` of a Cylinder or Sphere at ``origin`` (4, 4); () of a
+    Box."""
     def made(corners):
         return triangles.of_primitive(geometry, corners)
 
     if isinstance(geometry, Box):
         return ()
-    return tuple(Level(_SLANTED * triangles.circle_error(geometry.radius, corners),
-                       lambda corners=corners: _at(origin, made(corners)),
-                       lambda corners=corners: triangles.uv_on_primitive(geometry, made(corners)))
+    return tuple(DetailLevel(_SLANTED * triangles.circle_error(geometry.radius, corners),
+                             lambda corners=corners: _at(origin, made(corners)),
+                             lambda corners=corners: triangles.uv_on_primitive(geometry, made(corners)))
                  for corners in triangles.CIRCLES)
 
 
 def _look(finish, colour, factor, texture, emission):
-    """Colour, gloss and material of a :class:`Part`. ``colour``: where ``texture`` is None; ``factor``: of the colours
-    of the texture; the fourth number of both: the opacity."""
+    """Colour, gloss and material of a :class:`DrawnPart`. ``colour``: where ``texture`` is None; ``factor``: of the
+    colours of the texture; the fourth number of both: the opacity."""
     gloss = GLOSS if finish.gloss is None else finish.gloss
     opacity = min(colour[3] if texture is None else factor[3], 1.0)
     if texture is not None:
-        material = Material(texture.path, tuple(factor[:3]), tuple(emission), finish.repeats, finish.cut_out,
+        material = PartLook(texture.path, tuple(factor[:3]), tuple(emission), finish.repeats, finish.cut_out,
                             finish.two_sided, opacity)
         colour = (*(a * b for a, b in zip(texture.colour, factor, strict=False)), factor[3])
     elif any(emission) or opacity < 1.0:
-        material = Material("", tuple(colour[:3]), tuple(emission), two_sided=opacity >= 1.0, opacity=opacity)
+        material = PartLook("", tuple(colour[:3]), tuple(emission), two_sided=opacity >= 1.0, opacity=opacity)
     else:
         material = None
     return {"colour": tuple(colour), "gloss": gloss, "material": material}
@@ -481,4 +483,4 @@ def _floor():
     half = FLOOR_HALF_M
     corners = [(-half, -half), (half, -half), (half, half), (-half, -half), (half, half), (-half, half)]
     sheet = np.array([(x, y, 0.0, 0.0, 0.0, 1.0) for x, y in corners], dtype=np.float32)
-    return Part(("floor",), sheet, FLOOR_COLOUR, is_floor=True)
+    return DrawnPart(("floor",), sheet, FLOOR_COLOUR, is_floor=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sensor_renderer.tiny_renderer import TinyRenderer
 
 
-class World:
+class DrawnMoments:
     """A mirror, what draws it, the states of the last moments, and the numbers that masks show."""
 
     def __init__(self, mirror: Mirror, make_renderer: Callable[[], GlRenderer | TinyRenderer],
@@ -75,8 +75,9 @@ class World:
 class Moment:
     """The world at one time, for the sensors of one link."""
 
-    def __init__(self, world: World, model: str, link: str, time_s: float) -> None:
-        """``world``: :class:`World`, which knows a state; ``model``, ``link``: names of the sensor's body and link."""
+    def __init__(self, world: DrawnMoments, model: str, link: str, time_s: float) -> None:
+        """``world``: :class:`DrawnMoments`, which knows a state; ``model``, ``link``: names of the sensor's body and
+        link."""
         self._world, self._model, self._link, self.time_s = world, model, link, time_s
 
     def at(self, time_s: float) -> Moment:

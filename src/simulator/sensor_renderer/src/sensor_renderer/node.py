@@ -24,7 +24,7 @@ from sensor_renderer.best import best_renderer
 from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter
 from sensor_renderer.mirror import Mirror
-from sensor_renderer.moments import Moment, World
+from sensor_renderer.moments import DrawnMoments, Moment
 from sensor_renderer.priority import DRAWING
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.background import BackgroundDrawings
@@ -64,7 +64,7 @@ class SensorRenderer:
         self._drivers = drivers
         self._finder = ResourceFinder()
         self._mirror = Mirror(BackgroundDrawings(), self._finder, rospy.logwarn)
-        self._world = World(self._mirror, make_renderer, labels)
+        self._world = DrawnMoments(self._mirror, make_renderer, labels)
         self._sensors = {}
         self._refused = set()
         self._failed_at = {}  # of sensors that failed: simulation times [s]

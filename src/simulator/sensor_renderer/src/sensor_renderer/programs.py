@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import moderngl
 
     from sensor_renderer.drawn_links import VertexArray
-    from sensor_renderer.light import Light
-    from sensor_renderer.mirror import Material
+    from sensor_renderer.light import SceneLight
+    from sensor_renderer.mirror import PartLook
     from sensor_renderer.shadows import Shadows
     from sensor_renderer.textures import Textures
 
@@ -47,14 +47,14 @@ class Programs:
         self._lit: tuple[moderngl.Program, ...] = ()
         self._textured: moderngl.Program | None = None
         self._kinds: _Kinds | None = None
-        self._light: Light
+        self._light: SceneLight
         self._shadows: Shadows | None = None
 
-    def fit(self, light: Light) -> bool:
+    def fit(self, light: SceneLight) -> bool:
         """Whether the programs are the ones for ``light`` already."""
         return self._kinds == _kinds(light)
 
-    def compile(self, light: Light) -> None:
+    def compile(self, light: SceneLight) -> None:
         """Make the programs for ``light``; vertex arrays of the old ones must have been released."""
         for old in self._lit:
             old.release()
@@ -79,7 +79,7 @@ class Programs:
                 self._shadow_by(self._shadows, self._textured)
         return self._textured
 
-    def light_by(self, light: Light) -> None:
+    def light_by(self, light: SceneLight) -> None:
         """Set the uniforms of ``light``."""
         self._light = light
         for program in self._lit:
@@ -134,7 +134,7 @@ def set_uniform(program: moderngl.Program, name: str, value: float | tuple[float
         uniform(program, name).value = value
 
 
-def _kinds(light: Light) -> _Kinds:
+def _kinds(light: SceneLight) -> _Kinds:
     """The parts of the light that the programs depend on."""
     return light.shadows and any(light.sun), light.sky, tuple(lamp.kind for lamp in light.lamps)
 
@@ -153,10 +153,10 @@ def draw(program: moderngl.Program,
         array.render(vertices=corners[0] if corners else -1)
 
 
-def draw_textured(program: moderngl.Program, listed: Sequence[tuple[VertexArray, np.ndarray, Material]],
+def draw_textured(program: moderngl.Program, listed: Sequence[tuple[VertexArray, np.ndarray, PartLook]],
                   textures: Textures) -> None:
     """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, its
-    :class:`sensor_renderer.mirror.Material`), whose materials are all opaque or all transparent; the latter are drawn
+    :class:`sensor_renderer.mirror.PartLook`), whose materials are all opaque or all transparent; the latter are drawn
     over what is behind them, in their order. ``textures``: :class:`sensor_renderer.textures.Textures`.
 
     As in Gazebo, pictures are seen from the front: signs have one sheet for each side, in the same place.

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sensor_renderer.drawn_links import Link, visible
+from sensor_renderer.drawn_links import DrawnLink, visible
 from sensor_renderer.programs import matrix_bytes, uniform
 
 if TYPE_CHECKING:
     import moderngl
 
-    from sensor_renderer.mirror import Mirror, Screen
+    from sensor_renderer.mirror import DrawnScreen, Mirror
     from sensor_renderer.pinhole import Pinhole
 
 # A bent screen is drawn as so many flat stripes.
@@ -37,7 +37,7 @@ class Screens:
         corners = np.array([(x, y) for x in edges for y in (0.5, -0.5)], dtype=np.float32)
         return self._context.vertex_array(self._program, [(self._context.buffer(corners.tobytes()), "2f", "corner")])
 
-    def draw(self, screens: Sequence[tuple[moderngl.Texture, np.ndarray, Screen]], to_clip: np.ndarray) -> None:
+    def draw(self, screens: Sequence[tuple[moderngl.Texture, np.ndarray, DrawnScreen]], to_clip: np.ndarray) -> None:
         """Draw ``screens``, as :meth:`visible` lists them."""
         if screens:
             uniform(self._program, "to_clip").write(matrix_bytes(to_clip))
@@ -53,9 +53,9 @@ class Screens:
                 self._context.disable(self._context.BLEND)
 
     def visible(self, mirror: Mirror, pinhole: Pinhole,
-                view: np.ndarray) -> list[tuple[moderngl.Texture, np.ndarray, Screen]]:
+                view: np.ndarray) -> list[tuple[moderngl.Texture, np.ndarray, DrawnScreen]]:
         """The screens that show their faces, lights last: (texture, matrix of the screen's frame,
-        :class:`sensor_renderer.mirror.Screen`)."""
+        :class:`sensor_renderer.mirror.DrawnScreen`)."""
         faces = []
         for body in mirror.bodies.values():
             for screen in body.screens:
@@ -63,7 +63,7 @@ class Screens:
                 local = view @ matrix
                 if screen.radius or local[:3, 2] @ local[:3, 3] < 0.0:
                     half = np.array([*screen.size, 0.0]) / 2.0 + screen.radius
-                    faces.append((Link(np.zeros(3), half, float(np.linalg.norm(half)), False), matrix, screen))
+                    faces.append((DrawnLink(np.zeros(3), half, float(np.linalg.norm(half)), False), matrix, screen))
         seen = [(self._texture(mirror, screen.picture), matrix, screen)
                 for _, matrix, screen, _ in visible(faces, pinhole, view)]
         return sorted((entry for entry in seen if not entry[2].glows or entry[2].picture in self._lit),

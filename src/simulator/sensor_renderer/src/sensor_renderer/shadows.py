@@ -15,8 +15,8 @@ from sensor_renderer.programs import draw, matrix_bytes, uniform
 if TYPE_CHECKING:
     import moderngl
 
-    from sensor_renderer.drawn_links import Link
-    from sensor_renderer.light import Light
+    from sensor_renderer.drawn_links import DrawnLink
+    from sensor_renderer.light import SceneLight
     from sensor_renderer.mirror import Mirror
     from sensor_renderer.pinhole import Pinhole
 
@@ -64,7 +64,7 @@ class Shadows:
         self.to_map, self.margin_m, self.lamp_matrices = np.eye(4), 0.0, {}
         self.corners = np.zeros((4, 3)), np.array((0.0, 0.0, 1.0))
 
-    def light_by(self, light: Light) -> None:
+    def light_by(self, light: SceneLight) -> None:
         """Point the maps along the light of ``light``."""
         self._drawn = self._lamps_drawn = None
         self._away = away = np.array(light.to_sun)
@@ -75,7 +75,7 @@ class Shadows:
             side = self._pixels // 2
             self._lamp_map, self._lamp_buffer = self._depth_map(6 * side, MAX_SHADOWS * side)
 
-    def draw(self, mirror: Mirror, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]], pinhole: Pinhole,
+    def draw(self, mirror: Mirror, casters: Sequence[tuple[DrawnLink, np.ndarray, np.ndarray]], pinhole: Pinhole,
              pose: np.ndarray) -> bool:
         """Draw the maps for the view of a camera at ``pose`` (4, 4). ``casters``: (link, matrix, packed matrix) of all
         that casts shadows. Returns whether the matrices have changed."""
@@ -202,11 +202,11 @@ class Shadows:
 class _Poses:
     """The poses that a map was drawn of."""
 
-    def __init__(self, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]]) -> None:
+    def __init__(self, casters: Sequence[tuple[DrawnLink, np.ndarray, np.ndarray]]) -> None:
         self._links = [link for link, _, _ in casters]
         self._matrices = np.array([matrix for _, matrix, _ in casters])
 
-    def moved(self, casters: Sequence[tuple[Link, np.ndarray, np.ndarray]], tolerance_m: float) -> bool:
+    def moved(self, casters: Sequence[tuple[DrawnLink, np.ndarray, np.ndarray]], tolerance_m: float) -> bool:
         """Whether ``casters`` are others, or some point of them is more than ``tolerance_m`` away from where it was."""
         if len(casters) != len(self._links):
             return True

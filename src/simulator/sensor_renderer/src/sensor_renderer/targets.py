@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import moderngl
 
 
-class Targets:
+class Framebuffers:
     """The targets of one context, one for each size."""
 
     def __init__(self, context: moderngl.Context, samples: int) -> None:
@@ -20,10 +20,10 @@ class Targets:
         self._targets = {}
         self._numbered = {}
 
-    def of(self, width: int, height: int) -> Target:
-        """The :class:`Target` of this size [pixels]."""
+    def of(self, width: int, height: int) -> Framebuffer:
+        """The :class:`Framebuffer` of this size [pixels]."""
         if (width, height) not in self._targets:
-            self._targets[width, height] = Target(self._context, (width, height), self._samples)
+            self._targets[width, height] = Framebuffer(self._context, (width, height), self._samples)
         return self._targets[width, height]
 
     def numbered(self, width: int, height: int) -> tuple[moderngl.Framebuffer, moderngl.Texture]:
@@ -35,7 +35,7 @@ class Targets:
         return self._numbered[width, height]
 
 
-class Target:
+class Framebuffer:
     """A framebuffer: colour and depth."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:

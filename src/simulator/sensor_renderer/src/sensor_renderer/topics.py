@@ -14,7 +14,7 @@ from std_msgs.msg import Empty, String
 
 from loop_ros.reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
-from sensor_renderer.labels import Motion
+from sensor_renderer.labels import OpticalFlow
 
 if TYPE_CHECKING:
     from genpy import Message
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _MAX_TRIGGERS = 1000
 
 
-class Topic:
+class WatchedTopic:
     """A publisher that knows whether it has subscribers. A service's thread may close it at any time."""
 
     def __init__(self, name: str, message_class: type[Message], latch: bool = False) -> None:
@@ -126,9 +126,9 @@ class ColourTopics:
     """Image, compressed image and camera_info of one colour camera."""
 
     def __init__(self, image_topic: str, info_topics: Iterable[str]) -> None:
-        self.image = Topic(image_topic, Image)
-        self.compressed = Topic(image_topic + "/compressed", CompressedImage)
-        self.infos = [Topic(name, CameraInfo) for name in info_topics]
+        self.image = WatchedTopic(image_topic, Image)
+        self.compressed = WatchedTopic(image_topic + "/compressed", CompressedImage)
+        self.infos = [WatchedTopic(name, CameraInfo) for name in info_topics]
         self._quality = convert.JPEG_QUALITY
         settings = ReconfigureServer(image_topic + "/compressed", [
             Setting("jpeg_quality", self._quality, 1, 100, "of the pictures, in percent")], self._apply)
@@ -162,7 +162,7 @@ class LearningTopics:
         self._folder = folder
         self._topics = {}
         self._sent = {}
-        self._motion = Motion()
+        self._motion = OpticalFlow()
 
     def open(self, is_open: bool) -> None:
         """Open or close the topics; any thread may call it."""
@@ -171,11 +171,11 @@ class LearningTopics:
         if not is_open:
             self.close()
             return
-        self._sent, self._motion = {}, Motion()
+        self._sent, self._motion = {}, OpticalFlow()
         self._topics = {
-            **{name: Topic("%s/%s" % (self._folder, name), Image)
+            **{name: WatchedTopic("%s/%s" % (self._folder, name), Image)
                for name in ("semantic/image_raw", "instance/image_raw", "ideal_depth/image_raw", "flow/image_raw")},
-            **{name: Topic("%s/%s" % (self._folder, name), String, latch=True)
+            **{name: WatchedTopic("%s/%s" % (self._folder, name), String, latch=True)
                for name in ("semantic/labels", "instance/labels")}}
 
     def close(self) -> None:

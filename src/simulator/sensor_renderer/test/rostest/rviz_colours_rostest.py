@@ -20,7 +20,7 @@ import xacro
 from lab_testing import virtual_screen
 from model_files.resources import ResourceFinder
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.light import Light
+from sensor_renderer.light import SceneLight
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import Pinhole
 from urdf_model import Mesh, parse_urdf
@@ -144,7 +144,7 @@ class ColoursTest(unittest.TestCase):
         pose[2, 3] = HEIGHT_M
         renderer, pictures = GlRenderer(still=True), []
         for background in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)):
-            dark = Light.of_scene({"ambient": (0.0, 0.0, 0.0), "background": background, "lights": []})
+            dark = SceneLight.of_scene({"ambient": (0.0, 0.0, 0.0), "background": background, "lights": []})
             mirror.light = dark._replace(to_sun=(0.0, 0.0, 1.0), sun=(1.0, 1.0, 1.0), sun_shine=(0.0, 0.0, 0.0))
             pictures.append(renderer.render(mirror, pinhole, pose)[0])
         renderer.close()

@@ -8,7 +8,7 @@ from sensor_renderer.camera_sensor import CameraSensor
 from sensor_renderer.exposure import Exposure, ExposureSettings
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
-from sensor_renderer.moments import Moment, World, blended
+from sensor_renderer.moments import DrawnMoments, Moment, blended
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.sensor_element import CameraElement
 from sensor_renderer.structured_light import StructuredLight, shadowed
@@ -88,12 +88,12 @@ def test_a_state_between_two_is_between_them():
 
 @pytest.fixture
 def passing(tmp_path):
-    """A World in which a red cube of 0.1 m flies past a camera at 1 m, from left to right with 2 m/s."""
+    """A DrawnMoments in which a red cube of 0.1 m flies past a camera at 1 m, from left to right with 2 m/s."""
     mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
     mirror.set_scene([{"name": "eye", "urdf": EYE, "joints": []}, {"name": "ball", "urdf": BALL, "joints": []}],
                      {"background": (0.0, 0.0, 0.0)})
     renderer = GlRenderer()
-    world = World(mirror, lambda: renderer)
+    world = DrawnMoments(mirror, lambda: renderer)
     for step in range(11):
         time_s = 0.004 * step
         world.remember(time_s, np.array([0, 0, 0, 0, 0, 0, 1.0, 1.05, -2.0 * (time_s - 0.03), 0, 0, 0, 0, 1.0]), 0.1)

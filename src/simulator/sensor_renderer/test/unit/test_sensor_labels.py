@@ -7,10 +7,10 @@ import pytest
 
 from sensor_renderer import topics
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.labels import Labels, Motion, classes_of_parameter
+from sensor_renderer.labels import Labels, OpticalFlow, classes_of_parameter
 from sensor_renderer.lens import Distortion, Lens
 from sensor_renderer.mirror import Mirror
-from sensor_renderer.moments import Moment, World
+from sensor_renderer.moments import DrawnMoments, Moment
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.sensor_element import CameraElement
 from sensor_renderer.tiny_renderer import TinyRenderer
@@ -32,10 +32,10 @@ def renderer(request):
 
 
 def scene(renderer, tmp_path, cubes, labels=None):
-    """A World of a camera at the origin that looks along x, and cubes {name: y [m]}, their faces 1 m away."""
+    """A DrawnMoments of a camera at the origin that looks along x, and cubes {name: y [m]}, their faces 1 m away."""
     mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
     mirror.set_scene([{"name": name, "urdf": EYE if name == "eye" else CUBE, "joints": []} for name in ("eye", *cubes)])
-    world = World(mirror, lambda: renderer, labels)
+    world = DrawnMoments(mirror, lambda: renderer, labels)
     world.remember(0.0, state(cubes.values()))
     return world
 
@@ -97,7 +97,7 @@ def test_flow_says_where_each_point_was(tmp_path, distortion):
     """A cube goes to the left, and the camera goes back: by projecting points, without pictures."""
     renderer = GlRenderer()
     world, eye = scene(renderer, tmp_path, {"cube": 0.1, "wall": -0.25}), camera(distortion)
-    motion = Motion()
+    motion = OpticalFlow()
 
     def flow(time_s):
         moment = Moment(world, "eye", "eye", time_s)
@@ -123,7 +123,7 @@ def test_flow_takes_one_picture_to_the_next(tmp_path):
     import cv2
 
     renderer = GlRenderer()
-    world, eye, motion = scene(renderer, tmp_path, {"cube": 0.1, "wall": -0.25}), camera(), Motion()
+    world, eye, motion = scene(renderer, tmp_path, {"cube": 0.1, "wall": -0.25}), camera(), OpticalFlow()
     pictures = []
     for time_s, places, x in ((0.0, (0.1, -0.25), 0.0), (0.1, (0.13, -0.25), -0.03)):
         world.remember(time_s, state(places, eye=[x, 0, 0, 0, 0, 0, 1.0]))
@@ -156,7 +156,7 @@ class Heard:
 def test_topics_for_learning(tmp_path, monkeypatch, turned):
     renderer = GlRenderer()
     world = scene(renderer, tmp_path, {"block_1": 0.3})
-    monkeypatch.setattr(topics, "Topic", Heard)
+    monkeypatch.setattr(topics, "WatchedTopic", Heard)
     Heard.wanted = {"/eye/semantic/image_raw", "/eye/instance/labels", "/eye/flow/image_raw",
                     "/eye/ideal_depth/image_raw"}
     learning = topics.LearningTopics("/eye")
@@ -182,7 +182,7 @@ def test_topics_for_learning(tmp_path, monkeypatch, turned):
 
 
 def test_without_subscribers_nothing_is_drawn(monkeypatch):
-    monkeypatch.setattr(topics, "Topic", Heard)
+    monkeypatch.setattr(topics, "WatchedTopic", Heard)
     Heard.wanted = set()
     learning = topics.LearningTopics("/eye")
     learning.open(True)

@@ -5,7 +5,7 @@ import pytest
 
 from sensor_renderer.floor import on_floor
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.light import MAX_LAMPS, Light
+from sensor_renderer.light import MAX_LAMPS, SceneLight
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model.transforms import pose_matrix
@@ -143,8 +143,8 @@ def test_a_lamp_in_a_link_moves_with_it(renderer, tmp_path):
 def test_only_the_strongest_lamps_have_shadow_maps():
     lamps = [lamp("point", diffuse=[value] * 3, cast_shadows=casts)
              for value, casts in ((0.2, True), (0.9, False), (0.5, True), (0.4, True))]
-    assert [made.shadow for made in Light.of_scene({"lights": lamps}).lamps] == [None, None, 0, 1]
-    assert not any(made.kind[1] for made in Light.of_scene({"lights": lamps, "shadows": False}).lamps)
+    assert [made.shadow for made in SceneLight.of_scene({"lights": lamps}).lamps] == [None, None, 0, 1]
+    assert not any(made.kind[1] for made in SceneLight.of_scene({"lights": lamps, "shadows": False}).lamps)
 
 
 def test_glossy_things_have_a_highlight_where_the_mirror_image_of_the_lamp_is(renderer, tmp_path):
@@ -229,11 +229,11 @@ def test_the_shaded_part_of_the_floor_is_where_the_light_meets_it():
 def test_strange_lights_do_no_harm():
     nowhere = lamp("directional", direction=[0, 0, 0], cast_shadows=True)
     many = [lamp("point") for _ in range(MAX_LAMPS + 5)]
-    light = Light.of_scene({"lights": [nowhere, *many, lamp("spot", spot=None)]})
+    light = SceneLight.of_scene({"lights": [nowhere, *many, lamp("spot", spot=None)]})
     assert light.sun == (0.0, 0.0, 0.0) and len(light.lamps) == MAX_LAMPS
     assert np.isfinite(light.to_sun).all()
     first, second = lamp("directional"), lamp("directional", diffuse=[1, 0, 0], cast_shadows=True)
-    light = Light.of_scene({"lights": [first, second]})
+    light = SceneLight.of_scene({"lights": [first, second]})
     assert light.sun[1] == 0.0 and len(light.lamps) == 1, "the sun is the one that casts shadows"
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lab_testing.meshes import sphere
-from sensor_renderer.drawn_links import Link, visible
+from sensor_renderer.drawn_links import DrawnLink, visible
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
@@ -130,5 +130,5 @@ def test_rows_are_numbered_in_the_order_of_their_use():
 @pytest.mark.parametrize(("place", "seen"), [((0.0, 0.0, 1.0), True), ((0.9, 0.0, 1.0), False),
                                              ((0.0, 0.0, -0.1), False)], ids=["ahead", "beside", "behind"])
 def test_a_long_link_is_drawn_if_its_box_is_in_view_not_its_sphere(place, seen):
-    rod = Link(np.zeros(3), np.array([0.02, 1.0, 0.02]), 1.0, False)
+    rod = DrawnLink(np.zeros(3), np.array([0.02, 1.0, 0.02]), 1.0, False)
     assert bool(visible([(rod, pose_matrix(place, (0.0, 0.0, 0.0)), None)], PINHOLE, np.eye(4))) == seen

@@ -42,7 +42,7 @@ _MATERIALS = re.compile(rb"^mtllib[ \t]+(\S.*?)[ \t]*\r?$", re.MULTILINE)
 
 class LevelFile(NamedTuple):
     """A level of detail, for :func:`read_level`; its distance from the original in the mesh's unit, as
-    :class:`world_picture.reduction.Level` has it."""
+    :class:`world_picture.reduction.ReducedMesh` has it."""
 
     path: str
     error: float

@@ -55,7 +55,7 @@ _MIN_IN_PICTURE = _SAME_UV ** 2
 _STRIP = 0.02
 
 
-class Level(NamedTuple):
+class ReducedMesh(NamedTuple):
     """``vertices`` (n, 3), ``normals`` (n, 3), ``faces`` (m, 3): a vertex at a crease appears once for each side.
     ``error``: the distance from the original that :data:`COUNTED` of its surface keeps, in the unit of the vertices; a
     picture is shifted on the surface by no more. ``uv`` (n, 2): the vertices' places in the picture, or None."""
@@ -83,8 +83,8 @@ class _Mesh(NamedTuple):
 
 
 def levels(vertices: npt.ArrayLike, faces: np.ndarray, size: float | None = None,
-           uv: npt.ArrayLike | None = None) -> list[Level]:
-    """Return the list of :class:`Level` of a mesh, the finest first: vertices (n, 3) and faces (m, 3).
+           uv: npt.ArrayLike | None = None) -> list[ReducedMesh]:
+    """Return the list of :class:`ReducedMesh` of a mesh, the finest first: vertices (n, 3) and faces (m, 3).
 
     ``size``: the longest side of the object that the mesh belongs to; by default its own. Borders of open meshes stay
     within the tolerance, too. Triangles without area are left out; a mesh without any other has no levels.
@@ -247,13 +247,13 @@ def _on_vertices(mesh, moved, replaced_by):
 
 
 def _level(original, mesh):
-    """The :class:`Level` of ``mesh``, with its distance from ``original``."""
+    """The :class:`ReducedMesh` of ``mesh``, with its distance from ``original``."""
     # A hundredth of a unit is a third of a degree; what is nearly equal need not be drawn twice.
     rows = np.hstack([mesh.vertices[mesh.faces.ravel()], np.round(mesh.corner_normals.reshape(-1, 3), 2),
                       *([] if mesh.uv is None else [mesh.uv[mesh.faces.ravel()]])])
     rows, corner = np.unique(rows.astype(np.float32), axis=0, return_inverse=True)
-    return Level(rows[:, :3], _unit(rows[:, 3:6].astype(float)).astype(np.float32), corner.reshape(-1, 3),
-                 _distance(original, mesh), None if mesh.uv is None else rows[:, 6:])
+    return ReducedMesh(rows[:, :3], _unit(rows[:, 3:6].astype(float)).astype(np.float32), corner.reshape(-1, 3),
+                       _distance(original, mesh), None if mesh.uv is None else rows[:, 6:])
 
 
 def _distance(original, mesh):

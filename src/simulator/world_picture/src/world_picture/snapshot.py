@@ -252,7 +252,7 @@ class SnapshotWriter:
         self._file.close()
 
 
-class Scene(NamedTuple):
+class WrittenScene(NamedTuple):
     """The arguments of :meth:`SnapshotWriter.write_scene`, and the count of its calls."""
 
     revision: int
@@ -309,11 +309,11 @@ class SnapshotReader:
             if _NUMBER.unpack_from(self._memory, offset)[0] == number:
                 return Snapshot(revision, resets, tick, time_s, values, bool(paused))
 
-    def scene(self) -> Scene:
-        """The :class:`Scene` as it is now."""
+    def scene(self) -> WrittenScene:
+        """The :class:`WrittenScene` as it is now."""
         try:
             with open_shared(self._folder / "scene.json") as file:
                 scene = json.loads(file.read().decode("utf-8"))
         except (OSError, ValueError) as error:
             raise SnapshotError("no scene in %s: %s" % (self._folder, error)) from error
-        return Scene(scene["revision"], scene["bodies"], scene["light"])
+        return WrittenScene(scene["revision"], scene["bodies"], scene["light"])

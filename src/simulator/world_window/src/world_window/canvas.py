@@ -25,7 +25,7 @@ _PER_NOTCH = 120.0  # of Qt's wheel
 
 class Canvas(QWidget):
     """``events``: has ``press``, ``move``, ``release``, ``wheel`` and ``resize`` with the arguments of
-    :class:`world_window.stage.Stage`'s."""
+    :class:`world_window.stage.WindowStage`'s."""
 
     def __init__(self, events: CanvasEvents, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -95,7 +95,7 @@ class Canvas(QWidget):
 
 
 def _paint(painter, shape):
-    if isinstance(shape, overlay.Line):
+    if isinstance(shape, overlay.ScreenLine):
         painter.setPen(QPen(QColor(*shape.colour), shape.width))
         painter.drawLine(QPointF(shape.x0, shape.y0), QPointF(shape.x1, shape.y1))
     elif isinstance(shape, overlay.Dot):

@@ -85,7 +85,7 @@ def _show(ending):
 
     from world_window.picture_topic import PictureTopic
     from world_window.simulator import Simulator
-    from world_window.stage import Stage
+    from world_window.stage import WindowStage
     from world_window.viewer import Viewer
     from world_window.window import Window
 
@@ -101,7 +101,7 @@ def _show(ending):
         window.frame(frame)
         topic.take(frame)
 
-    simulator = Simulator(window.tell, lambda contacts: viewer.post(Stage.take_contacts, contacts))
+    simulator = Simulator(window.tell, lambda contacts: viewer.post(WindowStage.take_contacts, contacts))
     viewer = Viewer(_folder, _renderer, take, simulator.pull, rospy.logwarn)
     window.build(viewer, simulator)
     viewer.start()

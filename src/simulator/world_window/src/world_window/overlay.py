@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sensor_renderer.mirror import Part
+    from sensor_renderer.mirror import DrawnPart
     from sensor_renderer.pinhole import Pinhole
 
 #: Axes x, y, z as everywhere in ROS; other colours [red, green, blue].
@@ -22,7 +22,7 @@ _LENGTH_PER_N, _SHORTEST_M, _LONGEST_M = 0.002, 0.03, 0.3
 _EDGES = [(a, b) for a, b in itertools.combinations(range(8), 2) if bin(a ^ b).count("1") == 1]
 
 
-class Line(NamedTuple):
+class ScreenLine(NamedTuple):
     """From ``x0``, ``y0`` to ``x1``, ``y1`` [pixels]."""
 
     x0: float
@@ -50,10 +50,10 @@ class Text(NamedTuple):
     words: str
 
 
-Shape = Line | Dot | Text
+Shape = ScreenLine | Dot | Text
 
 
-class Contact(NamedTuple):
+class ShownContact(NamedTuple):
     """``position`` and unit ``normal`` (3,) in the world; ``force`` along it [N]."""
 
     position: tuple[float, float, float]
@@ -82,7 +82,7 @@ class Overlay:
         elif b[2] < near:
             b = b + (a - b) * (near - b[2]) / (a[2] - b[2])
         (x0, y0), (x1, y1) = self._pinhole.project([a, b]).tolist()
-        self.shapes.append(Line(x0, y0, x1, y1, colour, width))
+        self.shapes.append(ScreenLine(x0, y0, x1, y1, colour, width))
 
     def dot(self, point: Sequence[float] | np.ndarray, colour: tuple[int, int, int], radius: float = 3.0) -> None:
         """A dot; nothing behind the eye."""
@@ -110,7 +110,7 @@ class Overlay:
         for a, b in _EDGES:
             self.line(corners[a], corners[b], colour, 1.0)
 
-    def contact(self, contact: Contact) -> None:
+    def contact(self, contact: ShownContact) -> None:
         """A point of contact, with a line along the normal that is longer for a larger force."""
         self.dot(contact.position, CONTACT)
         length = min(max(_LENGTH_PER_N * abs(contact.force), _SHORTEST_M), _LONGEST_M)
@@ -129,7 +129,7 @@ class Overlay:
         return self._pinhole.project([local])[0].tolist()
 
 
-def bounds_of(parts: Iterable[Part]) -> tuple[np.ndarray, np.ndarray] | None:
+def bounds_of(parts: Iterable[DrawnPart]) -> tuple[np.ndarray, np.ndarray] | None:
     """(low, high) of the triangles of a link, in its frame; None without any but the floor's."""
     points = [part.triangles[:, :3] for part in parts if not part.is_floor and len(part.triangles)]
     if not points:

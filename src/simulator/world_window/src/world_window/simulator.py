@@ -16,7 +16,7 @@ from gazebo_msgs.srv import DeleteModel
 from geometry_msgs.msg import Point
 from std_srvs.srv import Empty
 
-from world_window.overlay import Contact
+from world_window.overlay import ShownContact
 
 if TYPE_CHECKING:
     from world_window.stage import Pull
@@ -30,9 +30,9 @@ MAX_STEPS = 100000
 class Simulator:
     """Clients of ``/gazebo``'s services."""
 
-    def __init__(self, tell: Callable[[str], object], take_contacts: Callable[[list[Contact]], object]) -> None:
+    def __init__(self, tell: Callable[[str], object], take_contacts: Callable[[list[ShownContact]], object]) -> None:
         """``tell(text)``: a line for the user, called in a thread of this class; ``take_contacts(contacts)``: a list of
-        :class:`Contact`, called in a thread of rospy."""
+        :class:`ShownContact`, called in a thread of rospy."""
         self._tell, self._take_contacts = tell, take_contacts
         self._drag = rospy.Publisher("/gazebo/drag", Drag, queue_size=1)
         self._pulled = None
@@ -92,7 +92,7 @@ class Simulator:
                 direction = (normal.x, normal.y, normal.z)
                 force = wrench.force
                 along = force.x * normal.x + force.y * normal.y + force.z * normal.z
-                found.append(Contact((position.x, position.y, position.z), direction, along))
+                found.append(ShownContact((position.x, position.y, position.z), direction, along))
         self._take_contacts(found)
 
     def _call(self, *call):

@@ -20,8 +20,8 @@ from world_window.overlay import Overlay, bounds_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sensor_renderer.mirror import Body, Mirror
-    from world_window.overlay import Contact, Shape
+    from sensor_renderer.mirror import DrawnModel, Mirror
+    from world_window.overlay import Shape, ShownContact
 
 LEFT, MIDDLE, RIGHT = "left", "middle", "right"
 #: What may be drawn over the picture.
@@ -57,7 +57,7 @@ class _Gesture(NamedTuple):
     point: np.ndarray  # under the pointer at the press
 
 
-class Stage:
+class WindowStage:
     """The eye, the selection, a pull, and the layers; ``version`` counts changes of the picture that they cause."""
 
     def __init__(self, width: int = 1000, height: int = 700) -> None:
@@ -71,7 +71,7 @@ class Stage:
         #: Whether the left button pulls without control.
         self.pulls_by_left = False
         self.layers: dict[str, bool] = dict.fromkeys(LAYERS, False)
-        self._contacts: Sequence[Contact] = ()
+        self._contacts: Sequence[ShownContact] = ()
         self._mirror: Mirror | None = None
         self._gesture: _Gesture | None = None
         self._pointer = (0.0, 0.0)
@@ -241,15 +241,15 @@ class Stage:
         self.layers[layer] = on
         self.version += 1
 
-    def take_contacts(self, contacts: Sequence[Contact]) -> None:
-        """The present contacts, a list of :class:`world_window.overlay.Contact`; shown by the layer "contacts"."""
+    def take_contacts(self, contacts: Sequence[ShownContact]) -> None:
+        """The present contacts, a list of :class:`world_window.overlay.ShownContact`; shown by the layer "contacts"."""
         self._contacts = contacts
         self.version += self.layers["contacts"]
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
     @property
-    def _bodies(self) -> Mapping[str, Body]:
+    def _bodies(self) -> Mapping[str, DrawnModel]:
         return {} if self._mirror is None else self._mirror.bodies
 
     def _look(self, eye):

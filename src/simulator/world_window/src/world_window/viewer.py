@@ -16,7 +16,7 @@ from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError
 from world_window.clock import Clock
 from world_window.sharpness import Sharpness
-from world_window.stage import Stage
+from world_window.stage import WindowStage
 
 if TYPE_CHECKING:
     import os
@@ -61,7 +61,7 @@ class Viewer(threading.Thread):
         simulator's spring, a :class:`world_window.stage.Pull` or None for its end; ``warn(text)``. All are called in
         this thread."""
         super().__init__(name="viewer", daemon=True)
-        self.stage = Stage()
+        self.stage = WindowStage()
         self._find_folder, self._make_renderer, self._on_frame = find_folder, make_renderer, on_frame
         self._pull, self._warn = pull, warn
         self._work = queue.SimpleQueue()

@@ -23,7 +23,7 @@ from PyQt5.QtWidgets import (
 
 from world_window.canvas import Canvas
 from world_window.simulator import MAX_STEPS
-from world_window.stage import RIGHT, Stage
+from world_window.stage import RIGHT, WindowStage
 
 if TYPE_CHECKING:
     from PyQt5.QtCore import QEvent
@@ -60,16 +60,16 @@ class CanvasEvents:
         self._post, self._on_menu = viewer.post, on_menu
 
     def resize(self, width: int, height: int) -> None:
-        self._post(Stage.resize, width, height)
+        self._post(WindowStage.resize, width, height)
 
     def press(self, button: str, x: int, y: int, shift: bool, control: bool) -> None:
-        self._post(Stage.press, button, x, y, shift, control)
+        self._post(WindowStage.press, button, x, y, shift, control)
 
     def move(self, x: int, y: int) -> None:
-        self._post(Stage.move, x, y)
+        self._post(WindowStage.move, x, y)
 
     def wheel(self, steps: float, x: int, y: int) -> None:
-        self._post(Stage.wheel, steps, x, y)
+        self._post(WindowStage.wheel, steps, x, y)
 
     def release(self, button: str, x: int, y: int) -> None:
         self._post(self._release, button, x, y)
@@ -184,10 +184,10 @@ class Window(QMainWindow):
         self._follow = self._action(bar, "Follow", "F", "the view moves along with the selected thing",
                                     lambda on: post(_follow_selected, on), checkable=True)
         self._go = self._action(None, "Go to", "G", "look at the selected thing from nearby",
-                                lambda: post(Stage.go_to_selected))
+                                lambda: post(WindowStage.go_to_selected))
         self._delete = self._action(None, "Delete", "Del", "take the selected model out of the world",
                                     self._delete_selected)
-        self._action(bar, "Home", "H", "look at the whole world", lambda: post(Stage.home))
+        self._action(bar, "Home", "H", "look at the whole world", lambda: post(WindowStage.home))
         bar.addSeparator()
         for layer, key in (("frames", "X"), ("contacts", "C"), ("names", "N")):
             self._action(bar, layer.capitalize(), key, "show or hide %s" % layer,
@@ -215,8 +215,8 @@ class Window(QMainWindow):
         self._tree = QTreeWidget()
         self._tree.setHeaderHidden(True)
         self._tree.itemClicked.connect(
-            lambda item: self._viewer.post(Stage.select, *item.data(0, Qt.ItemDataRole.UserRole)))
-        self._tree.itemDoubleClicked.connect(lambda *_: self._viewer.post(Stage.go_to_selected))
+            lambda item: self._viewer.post(WindowStage.select, *item.data(0, Qt.ItemDataRole.UserRole)))
+        self._tree.itemDoubleClicked.connect(lambda *_: self._viewer.post(WindowStage.go_to_selected))
         dock = QDockWidget("Models", self)
         dock.setWidget(self._tree)
         self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, dock)
@@ -245,7 +245,7 @@ class Window(QMainWindow):
         (self._simulator.go_on if self._paused else self._simulator.pause)()
 
     def _show_layer(self, layer, on):
-        self._viewer.post(Stage.show, layer, on)
+        self._viewer.post(WindowStage.show, layer, on)
         if layer == "contacts":
             self._simulator.show_contacts(on)
 
@@ -256,8 +256,8 @@ class Window(QMainWindow):
     def _stop(self):
         self._pulls.setChecked(False)
         self._viewer.post(_set_pulls, False)
-        self._viewer.post(Stage.let_go)
-        self._viewer.post(Stage.select, None)
+        self._viewer.post(WindowStage.let_go)
+        self._viewer.post(WindowStage.select, None)
 
     def _full_screen(self):
         (self.showNormal if self.isFullScreen() else self.showFullScreen)()

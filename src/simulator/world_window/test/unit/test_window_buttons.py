@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from world_window.stage import Stage
+from world_window.stage import WindowStage
 from world_window.viewer import Frame
 
 os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
@@ -18,7 +18,7 @@ class FakeViewer:
     """Does what is posted when the test says so, as the viewer's thread does it later."""
 
     def __init__(self):
-        self.stage, self._posted = Stage(), []
+        self.stage, self._posted = WindowStage(), []
 
     def post(self, function, *arguments):
         self._posted.append((function, arguments))

@@ -8,7 +8,7 @@ from sensor_renderer.mirror import Mirror
 from world_picture.drawing import DrawingCache
 from world_window import overlay, picking
 from world_window.eye import NEAREST_M
-from world_window.stage import FIRST_EYE, LEFT, MIDDLE, RIGHT, Stage
+from world_window.stage import FIRST_EYE, LEFT, MIDDLE, RIGHT, WindowStage
 
 BLOCK = "block", "body"
 
@@ -23,7 +23,7 @@ def mirror():
 
 @pytest.fixture
 def stage(mirror):
-    stage = Stage(800, 600)
+    stage = WindowStage(800, 600)
     stage.take(mirror, True)
     return stage
 
@@ -79,7 +79,7 @@ def test_a_ray_meets_a_plane_ahead_only():
 
 
 def test_an_empty_world_is_seen_as_by_gazebo_and_the_first_model_is_looked_at(mirror):
-    stage, empty = Stage(800, 600), Mirror(DrawingCache(), lambda uri: None, pytest.fail)
+    stage, empty = WindowStage(800, 600), Mirror(DrawingCache(), lambda uri: None, pytest.fail)
     empty.set_scene([FLOOR])
     stage.take(empty, True)
     assert stage.eye == FIRST_EYE
@@ -146,7 +146,7 @@ def test_a_click_selects_and_a_drag_does_not(stage):
 def test_the_selection_goes_with_its_model(stage, mirror):
     stage.select(*BLOCK)
     stage.follow(BLOCK)
-    assert any(isinstance(shape, overlay.Line) for shape in stage.shapes())
+    assert any(isinstance(shape, overlay.ScreenLine) for shape in stage.shapes())
     mirror.set_scene(SCENE[:2])
     stage.take(mirror, True)
     assert stage.selected is None and stage.followed is None
@@ -227,7 +227,7 @@ def test_layers_draw_frames_names_and_contacts(stage):
     assert {shape.words for shape in stage.shapes() if isinstance(shape, overlay.Text)} == {
         "top", "body", "foot", "rod"}
     stage.show("frames", False)
-    stage.take_contacts([overlay.Contact((0.2, 0.1, 0.5), (0.0, 0.0, 1.0), 9.81)])
+    stage.take_contacts([overlay.ShownContact((0.2, 0.1, 0.5), (0.0, 0.0, 1.0), 9.81)])
     assert stage.shapes() == []
     stage.show("contacts", True)
     dot, line = stage.shapes()

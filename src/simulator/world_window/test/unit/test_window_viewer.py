@@ -11,7 +11,7 @@ from sensor_renderer.best import best_renderer
 from world_picture.shared_picture import PictureWriter
 from world_window.clock import Clock
 from world_window.sharpness import GOAL_S, SCALES, Sharpness
-from world_window.stage import LEFT, Stage
+from world_window.stage import LEFT, WindowStage
 from world_window.viewer import Viewer
 
 DEADLINE_S = 30.0
@@ -35,7 +35,7 @@ class Watched:
 @contextlib.contextmanager
 def watched(folder, size=(320, 240)):
     seen = Watched(folder)
-    seen.viewer.post(Stage.resize, *size)
+    seen.viewer.post(WindowStage.resize, *size)
     seen.viewer.start()
     try:
         yield seen
@@ -73,7 +73,7 @@ def test_a_world_at_rest_is_not_drawn_again(tmp_path):
             simulator.write(ticks, 0.01 * ticks, [values()])
             seen.wait(lambda now=0.01 * ticks: seen.frames[-1].clock[0] == pytest.approx(now), "the time")
         assert len(seen.pictures()) == before
-        seen.viewer.post(Stage.show, "names", True)
+        seen.viewer.post(WindowStage.show, "names", True)
         seen.wait(lambda: len(seen.pictures()) > before, "another picture")
         assert seen.pictures()[-1].shapes
 
@@ -133,7 +133,7 @@ def test_a_pull_is_repeated_until_it_ends(tmp_path):
         seen.viewer.post(press)
         seen.wait(lambda: len(seen.pulls) > 3, "repeated pulls")
         assert (seen.pulls[0].model, seen.pulls[0].link) == ("block", "body")
-        seen.viewer.post(Stage.let_go)
+        seen.viewer.post(WindowStage.let_go)
         seen.wait(lambda: seen.pulls[-1] is None, "the end of the pull")
 
 

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from foxglove_bridge.parameters import read_parameters
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.foxglove.rules import CAPABILITIES
 from web_bridge.parameters import ParameterError
 
@@ -22,7 +22,7 @@ def test_without_parameters_only_this_machine_is_served():
     assert (found.endpoint[:3], found.warnings) == ((8765, "localhost", None), ())
     assert (found.longest_look_s, found.probe_s, found.socket.buffer_bytes) == (5.0, 0.25, 10_000_000)
     assert found.socket.rules.capabilities == CAPABILITIES
-    with pytest.raises(Refused):
+    with pytest.raises(RequestForbidden):
         found.socket.access.check_origin("https://app.foxglove.dev", "localhost:8765")
 
 
@@ -37,7 +37,7 @@ def test_lists_are_regular_expressions_for_whole_names():
     assert [rules.shows_topic(name) for name in ("/robot/state", "/tf", "/tf_static")] == [True, True, False]
     assert not rules.shows_service("/a")
     rules.check_publish("/cmd")
-    with pytest.raises(Refused):
+    with pytest.raises(RequestForbidden):
         rules.check_publish("/cmd_vel")
 
 

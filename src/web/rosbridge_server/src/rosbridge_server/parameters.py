@@ -11,7 +11,7 @@ from web_bridge.session import BridgeOptions
 from web_bridge.websocket import SocketOptions
 
 
-class ServerParameters(NamedTuple):
+class RosbridgeParameters(NamedTuple):
     """Parameters of the node; ``warnings`` for its log."""
 
     endpoint: Endpoint
@@ -20,7 +20,7 @@ class ServerParameters(NamedTuple):
     warnings: tuple
 
 
-def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
+def read_parameters(get: Callable[[str, Any], Any]) -> RosbridgeParameters:
     """``get(name, default)`` returns a parameter of the node. Raises ParameterError."""
     address, access = str(get("address", "localhost")), access_of(get)
     _refuse_what_is_not_served(get)
@@ -32,7 +32,7 @@ def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
     bridge = BridgeOptions(number(get, "unregister_timeout", 10.0), number(get, "fragment_timeout", 600.0))
     endpoint = Endpoint(port_of(get, 9090), address, tls_of(get, "ssl"),
                         max(0.1, number(get, "retry_startup_delay", 5.0)))
-    return ServerParameters(endpoint, bridge, socket, warnings_of(address, access))
+    return RosbridgeParameters(endpoint, bridge, socket, warnings_of(address, access))
 
 
 def _refuse_what_is_not_served(get: Callable[[str, Any], Any]) -> None:

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import pytest
 
 from rosbridge_server.parameters import read_parameters
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.parameters import ParameterError
 
 LAUNCH = Path(__file__).parents[2] / "launch" / "rosbridge_websocket.launch"
@@ -19,7 +19,7 @@ def test_without_parameters_only_this_machine_is_served():
     found = read()
     assert (found.endpoint, found.warnings) == ((9090, "localhost", None, 5.0), ())
     assert found.bridge == (10.0, 600.0) and found.socket.rules.topics == ()
-    with pytest.raises(Refused):
+    with pytest.raises(RequestForbidden):
         found.socket.access.check_origin("null", "localhost:9090")
 
 

@@ -14,7 +14,7 @@ from actionlib.server_goal_handle import ServerGoalHandle
 from rospy_nodes.start import end_on_signals, limit_ports
 from tf2_web_republisher.msg import TFArray, TFSubscriptionAction, TFSubscriptionFeedback
 from tf2_web_republisher.srv import RepublishTFs, RepublishTFsRequest
-from tf2_web_republisher.watch import Audience, Found, FrameWatch, Schedule, period_of
+from tf2_web_republisher.watch import Audience, Found, FrameWatch, WallSchedule, period_of
 
 # A goal ends when nobody has listened to the feedback for this long [s]: pages go without cancelling theirs.
 GONE_S = 10.0
@@ -27,7 +27,7 @@ class Republisher:
 
     def __init__(self) -> None:
         self._buffer = tf2_ros.Buffer()
-        self._schedule = Schedule()
+        self._schedule = WallSchedule()
         self._numbers = itertools.count()
         self._goals: dict[str, tuple[ServerGoalHandle, Callable[[], None]]] = {}  # by id
         self._server = ActionServer("tf2_web_republisher", TFSubscriptionAction, self._begin, self._cancel,

@@ -77,7 +77,7 @@ def period_of(rate: float) -> float:
     return 1 / min(max(rate, SLOWEST_HZ), FASTEST_HZ)
 
 
-class Schedule:
+class WallSchedule:
     """Calls functions periodically in one thread, in wall time: a page that opens while the simulation is paused sees
     the robot, too.
     """

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from tf2_web_republisher.watch import Audience, FrameWatch, Schedule, angle_between, period_of
+from tf2_web_republisher.watch import Audience, FrameWatch, WallSchedule, angle_between, period_of
 
 STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -53,7 +53,7 @@ def test_a_rate_is_kept_within_bounds(rate, period):
 
 
 def test_jobs_run_until_they_end_or_are_removed():
-    schedule, often, thrice, failed = Schedule(), [], [], []
+    schedule, often, thrice, failed = WallSchedule(), [], [], []
     done, enough = threading.Event(), threading.Event()
 
     def until_three():

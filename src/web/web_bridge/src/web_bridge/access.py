@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
-from web_bridge.errors import Refused, shown
+from web_bridge.errors import RequestForbidden, shown
 
 #: The last part of the names of parameters that hold a server's tokens: whoever reads the first one may move the robot.
 _TOKENS = {"token", "view_token"}
@@ -34,22 +34,22 @@ class Rules(NamedTuple):
     may_act: bool = True
 
     def check_topic(self, topic: str) -> None:
-        """Raise Refused unless a pattern allows the topic."""
+        """Raise RequestForbidden unless a pattern allows the topic."""
         if self.topics and not any(fnmatch.fnmatchcase(topic, pattern) for pattern in self.topics):
-            raise Refused("topics_glob of this server does not allow the topic %s" % topic)
+            raise RequestForbidden("topics_glob of this server does not allow the topic %s" % topic)
 
     def check_service(self, service: str) -> None:
-        """Raise Refused unless a pattern allows the service; rosapi's are always allowed."""
+        """Raise RequestForbidden unless a pattern allows the service; rosapi's are always allowed."""
         patterns = (*self.services, "/rosapi/*")
         if self.services and not any(fnmatch.fnmatchcase(service, pattern) for pattern in patterns):
-            raise Refused("services_glob of this server does not allow the service %s" % service)
+            raise RequestForbidden("services_glob of this server does not allow the service %s" % service)
         if not self.may_act and (not service.startswith("/rosapi/") or service.startswith(_CHANGING)):
-            raise Refused("the view token does not allow to call %s" % service)
+            raise RequestForbidden("the view token does not allow to call %s" % service)
 
     def check_may_act(self, what: str) -> None:
-        """Raise Refused for a client that may only watch."""
+        """Raise RequestForbidden for a client that may only watch."""
         if not self.may_act:
-            raise Refused("the view token does not allow to %s" % what)
+            raise RequestForbidden("the view token does not allow to %s" % what)
 
 
 def is_token(name: str) -> bool:
@@ -120,43 +120,44 @@ class Access:
         return bool(self._tokens)
 
     def check_origin(self, origin: str | None, host: str) -> None:
-        """Raise Refused unless a page of this origin (a header's text, None: no browser) may connect to this ``host``
-        header.
+        """Raise RequestForbidden unless a page of this origin (a header's text, None: no browser) may connect to this
+        ``host`` header.
         """
         if origin is None or "*" in self._origins or origin.rstrip("/").lower() in self._origins:
             return
         if origin == "null":
             if not self._null_origin:
-                raise Refused("a page without an origin (a file, a frame in a sandbox) may not connect; serve it over "
-                              "HTTP from this machine, or set websocket_null_origin:=true")
+                raise RequestForbidden("a page without an origin (a file, a frame in a sandbox) may not connect; "
+                                       "serve it over HTTP from this machine, or set websocket_null_origin:=true")
             return
         page, server = host_of(origin), host_of(host or "")
         if not self._is_own(server) or not (page == server or (is_loopback(page) and is_loopback(server))):
-            raise Refused("a page of %s may not connect to %s; the parameter ~allowed_origins lists those that may"
-                          % (origin, host))
+            raise RequestForbidden("a page of %s may not connect to %s; the parameter ~allowed_origins lists those "
+                                   "that may"
+                                   % (origin, host))
 
     def check_host(self, host: str) -> None:
-        """Raise Refused unless the ``host`` header of a request without an origin names this machine; who has a token
-        may use any name.
+        """Raise RequestForbidden unless the ``host`` header of a request without an origin names this machine; who has
+        a token may use any name.
         """
         server = host_of(host or "")
         if not (self._tokens or "*" in self._origins or self._is_own(server)
                 or server in {host_of(origin) for origin in self._origins}):
-            raise Refused("%s is no name of this machine that is known; use its address, or list http://%s in the "
-                          "parameter ~allowed_origins" % (shown(host), host))
+            raise RequestForbidden("%s is no name of this machine that is known; use its address, or list http://%s "
+                                   "in the parameter ~allowed_origins" % (shown(host), host))
 
     def _is_own(self, server: str) -> bool:
         """Is it a name of this machine? A foreign name that resolves to it must not pass as its own."""
         return is_loopback(server) or server in self._names or _is_address(server)
 
     def may_act(self, token: str) -> bool:
-        """Whether a client with this token ("": none) may act. Raises Refused where the token is wrong."""
+        """Whether a client with this token ("": none) may act. Raises RequestForbidden where the token is wrong."""
         if not self._tokens:
             return True
         for known, may_act in self._tokens.items():
             if hmac.compare_digest(known.encode(), token.encode("utf-8", "surrogateescape")):
                 return may_act
-        raise Refused("the token is wrong" if token else "a token is needed: ws://host:port/?token=…")
+        raise RequestForbidden("the token is wrong" if token else "a token is needed: ws://host:port/?token=…")
 
 
 def _is_address(name: str) -> bool:

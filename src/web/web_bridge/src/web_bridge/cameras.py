@@ -12,12 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Protocol
 
 from web_bridge.errors import BridgeError, NoSuchTopic
-from web_bridge.pictures import Picture
+from web_bridge.pictures import EncodedImage
 
 if TYPE_CHECKING:
     from web_bridge.codec import Codec
     from web_bridge.feeds import Arrival
-    from web_bridge.graph import Graph, Subscription
+    from web_bridge.graph import Graph, SubscribedTopic
     from web_bridge.loop_thread import LoopThread
 
 IMAGE, COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
@@ -25,19 +25,19 @@ IMAGE, COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
 LINGER_S = 5.0
 
 
-class Viewer(Protocol):
+class CameraViewer(Protocol):
     """Somebody who looks at a camera."""
 
-    def show(self, picture: Picture) -> None:
+    def show(self, picture: EncodedImage) -> None:
         """Show this picture next, in place of one that was not looked at."""
         ...
 
 
 class _Camera:
     def __init__(self) -> None:
-        self.viewers: set[Viewer] = set()
-        self.subscription: asyncio.Future[Subscription] | None = None
-        self.last: Picture | None = None  # the newest
+        self.viewers: set[CameraViewer] = set()
+        self.subscription: asyncio.Future[SubscribedTopic] | None = None
+        self.last: EncodedImage | None = None  # the newest
         self.is_latched = False
         self.timer: asyncio.TimerHandle | None = None
 
@@ -70,7 +70,7 @@ class Cameras:
             raise BridgeError("%s has the type %s, not %s" % (topic, published[topic], " or ".join(kinds)))
         return topic
 
-    async def join(self, topic: str, viewer: Viewer) -> None:
+    async def join(self, topic: str, viewer: CameraViewer) -> None:
         """Show the images of a topic from now on. Raises BridgeError."""
         camera = self._cameras.get(topic)
         if camera is None:
@@ -90,12 +90,12 @@ class Cameras:
                 del self._cameras[topic]
             raise
 
-    def last(self, topic: str, is_latched: bool = False) -> Picture | None:
+    def last(self, topic: str, is_latched: bool = False) -> EncodedImage | None:
         """The newest image of a topic that is looked at, or None; ``is_latched``: only one that will stay so."""
         camera = self._cameras.get(topic)
         return camera.last if camera is not None and (camera.is_latched or not is_latched) else None
 
-    def leave(self, topic: str, viewer: Viewer) -> None:
+    def leave(self, topic: str, viewer: CameraViewer) -> None:
         """Show no more; also where the viewer had not joined."""
         camera = self._cameras.get(topic)
         if camera is None or viewer not in camera.viewers:
@@ -112,7 +112,7 @@ class Cameras:
         return await asyncio.get_running_loop().run_in_executor(None, function, *arguments)
 
     def _arrived(self, camera: _Camera, arrival: Arrival) -> None:
-        picture = camera.last = Picture(lambda: self._codec.decoded(arrival), self._pool)
+        picture = camera.last = EncodedImage(lambda: self._codec.decoded(arrival), self._pool)
         camera.is_latched = arrival.is_latched
         for viewer in camera.viewers:
             viewer.show(picture)

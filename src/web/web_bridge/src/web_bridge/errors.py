@@ -22,7 +22,7 @@ class UnknownType(BridgeError):
     """A message or service type that this machine does not have."""
 
 
-class Refused(BridgeError):
+class RequestForbidden(BridgeError):
     """A request that the server's rules forbid."""
 
 

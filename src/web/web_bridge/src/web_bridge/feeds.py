@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from genpy import Message
 
     from web_bridge.codec import Codec
-    from web_bridge.graph import Graph, Subscription
+    from web_bridge.graph import Graph, SubscribedTopic
     from web_bridge.loop_thread import Later
     from web_bridge.session import Session
 
@@ -200,7 +200,7 @@ class Latched(Generic[_Message]):
         else:
             self._of.pop(arrival.publisher, None)
 
-    def of(self, subscription: Subscription | None) -> list[_Message]:
+    def of(self, subscription: SubscribedTopic | None) -> list[_Message]:
         """The messages of publishers that are still connected."""
         if self._of and subscription is not None:
             alive = subscription.publishers()
@@ -220,7 +220,7 @@ class Feed:
         self._lock = threading.Lock()
         self._clients: dict[Session, ClientFeed] = {}
         self._latched: Latched[Packet] = Latched()
-        self.subscription: Subscription | None = None
+        self.subscription: SubscribedTopic | None = None
 
     def arrived(self, arrival: Arrival) -> None:
         """A message of ROS; on the thread that received it."""

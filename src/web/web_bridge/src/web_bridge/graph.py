@@ -19,7 +19,7 @@ class Closable(Protocol):
     def close(self) -> None: ...
 
 
-class Subscription(Closable, Protocol):
+class SubscribedTopic(Closable, Protocol):
     """A subscribed topic."""
 
     def publishers(self) -> set[str]:
@@ -27,7 +27,7 @@ class Subscription(Closable, Protocol):
         ...
 
 
-class Publisher(Closable, Protocol):
+class AdvertisedTopic(Closable, Protocol):
     """An advertised topic."""
 
     type: str
@@ -55,11 +55,11 @@ class Graph(Protocol):
         """Raise if the type is unknown here or is not the topic's."""
         ...
 
-    def subscribe(self, topic: str, arrived: Callable[[Arrival], None]) -> Subscription:
+    def subscribe(self, topic: str, arrived: Callable[[Arrival], None]) -> SubscribedTopic:
         """``arrived`` is called on any thread."""
         ...
 
-    def advertise(self, topic: str, type_name: str, latched: bool, queue_size: int) -> Publisher: ...
+    def advertise(self, topic: str, type_name: str, latched: bool, queue_size: int) -> AdvertisedTopic: ...
 
     def call_service(self, service: str, fill: Callable[[Message], Message], call: Call) -> Message:
         """The response. ``fill`` lays the arguments over an empty request; ``call`` gets the way to end the wait."""

@@ -43,7 +43,7 @@ class PictureError(BridgeError):
     """An image that cannot be shown; the text says why."""
 
 
-class Form(NamedTuple):
+class ImageForm(NamedTuple):
     """How a client wants images: ``kind`` jpeg, png or original (a CompressedImage's bytes); ``width`` and ``height``
     in pixels, None: the image's own; ``is_turned``: by 180 degrees.
     """
@@ -63,7 +63,7 @@ class Encoded(NamedTuple):
     stamp: str
 
 
-class Picture:
+class EncodedImage:
     """One image, encoded once for each form. ``read()`` returns the message or raises BridgeError; ``pool`` does the
     work.
     """
@@ -76,7 +76,7 @@ class Picture:
         self._pixels: np.ndarray | None = None
         self._frames = {}
 
-    async def encoded(self, form: Form) -> Encoded:
+    async def encoded(self, form: ImageForm) -> Encoded:
         """The image in a form; in the loop. Raises BridgeError where it cannot be shown."""
         if form not in self._frames:
             self._frames[form] = asyncio.get_running_loop().run_in_executor(self._pool, self._encode, form)
@@ -85,7 +85,7 @@ class Picture:
         # One client that goes away must not end the work for the others.
         return await asyncio.shield(self._frames[form])
 
-    def _encode(self, form: Form) -> Encoded:
+    def _encode(self, form: ImageForm) -> Encoded:
         with self._lock:
             if self._message is None:
                 self._message = self._read()
@@ -170,7 +170,7 @@ def _scaled(values: np.ndarray) -> np.ndarray:
     return np.clip(values * (255 / max(largest, 1e-30)), 0, 255).astype(np.uint8)
 
 
-def encode(pixels: np.ndarray, form: Form) -> bytes:
+def encode(pixels: np.ndarray, form: ImageForm) -> bytes:
     """The bytes of a JPEG or PNG of decoded pixels. Raises PictureError."""
     if form.is_turned:
         pixels = cv2.rotate(pixels, cv2.ROTATE_180)

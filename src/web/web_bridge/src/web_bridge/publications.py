@@ -13,7 +13,7 @@ from web_bridge.errors import BridgeError, NoSuchTopic
 if TYPE_CHECKING:
     from web_bridge.codec import Codec
     from web_bridge.foxglove.session import FoxgloveSession
-    from web_bridge.graph import Graph, Publisher
+    from web_bridge.graph import AdvertisedTopic, Graph
     from web_bridge.loop_thread import Later
     from web_bridge.session import Session
 
@@ -41,7 +41,7 @@ class FirstMessages:
 
 
 class _Publication:
-    def __init__(self, publisher: Publisher) -> None:
+    def __init__(self, publisher: AdvertisedTopic) -> None:
         self.publisher = publisher
         self.names = {}  # client -> its ids
         self.timer = None
@@ -127,7 +127,7 @@ class Publications:
             raise NoSuchTopic("%s is not advertised by this client" % topic)
         publisher.publish(make(publisher.new_message()))
 
-    def _publisher(self, client: Session | FoxgloveSession, topic: str) -> Publisher | None:
+    def _publisher(self, client: Session | FoxgloveSession, topic: str) -> AdvertisedTopic | None:
         # Without the lock, which another thread may hold while it waits for the master.
         found = self._publications.get(topic)
         return found.publisher if found is not None and client in found.names else None

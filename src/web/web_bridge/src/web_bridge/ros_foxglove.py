@@ -40,7 +40,7 @@ class FoxgloveGraph(RosGraph):
     def __init__(self, probe_s: float = 0.25) -> None:
         super().__init__()
         self._probe_s = probe_s
-        self._packages = Packages()
+        self._packages = PackageFolders()
 
     def state(self) -> GraphState:
         published, subscribed, services = self._ask("getSystemState")
@@ -114,7 +114,7 @@ def _header(address: tuple[str, int], request: dict[str, str], timeout_s: float)
         raise BridgeError("%s:%s does not answer: %s" % (*address, error)) from None
 
 
-class Packages:
+class PackageFolders:
     """Folders of packages; looks again for one that is missing, not too often."""
 
     def __init__(self) -> None:

@@ -23,7 +23,7 @@ from web_bridge.feeds import Arrival
 from web_bridge.publications import FirstMessages
 
 if TYPE_CHECKING:
-    from web_bridge.graph import Closable, Publisher, Subscription
+    from web_bridge.graph import AdvertisedTopic, Closable, SubscribedTopic
     from web_bridge.services import Call
 
 #: What is published within this time after a topic was advertised also reaches subscribers that connect within it [s].
@@ -133,11 +133,11 @@ class RosGraph:
         self._types, self._types_until = types, time.monotonic() + _TYPES_S
         return types
 
-    def subscribe(self, topic: str, arrived: Callable[[Arrival], None]) -> Subscription:
+    def subscribe(self, topic: str, arrived: Callable[[Arrival], None]) -> SubscribedTopic:
         self.resolve(topic)
         return _Subscription(topic, arrived)
 
-    def advertise(self, topic: str, type_name: str, latched: bool, queue_size: int) -> Publisher:
+    def advertise(self, topic: str, type_name: str, latched: bool, queue_size: int) -> AdvertisedTopic:
         self.resolve(topic)
         return _Publisher(topic, type_name, latched, queue_size)
 

@@ -19,8 +19,8 @@ from tornado import iostream, web
 from web_bridge import video_pages
 from web_bridge.access import Access, host_of, origin_of
 from web_bridge.cameras import COMPRESSED, IMAGE
-from web_bridge.errors import BridgeError, NoSuchTopic, Refused, shown
-from web_bridge.pictures import JPEG_QUALITY, PNG_COMPRESSION, Form
+from web_bridge.errors import BridgeError, NoSuchTopic, RequestForbidden, shown
+from web_bridge.pictures import JPEG_QUALITY, PNG_COMPRESSION, ImageForm
 from web_bridge.websocket import MAX_CLIENTS, token_of
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tornado.httputil import HTTPServerRequest
 
     from web_bridge.cameras import Cameras
-    from web_bridge.pictures import Picture
+    from web_bridge.pictures import EncodedImage
 
 _LOG = logging.getLogger("web_bridge")
 BOUNDARY = "boundarydonotcross"
@@ -68,13 +68,13 @@ class VideoOptions(NamedTuple):
     snapshot_s: float = SNAPSHOT_S
 
 
-class Query(NamedTuple):
+class VideoQuery(NamedTuple):
     """The query of a client. ``transport`` raw: the topic itself; compressed: the images of ``TOPIC/compressed``;
     original: these without a change, or the topic's own in ``form`` where there are none.
     """
 
     topic: str
-    form: Form
+    form: ImageForm
     transport: str = "raw"
 
 
@@ -87,8 +87,8 @@ def check_type(name: str) -> None:
         raise QueryError(404, "type=%s is not known; mjpeg, png and ros_compressed are served" % name)
 
 
-def read_query(get: Callable[[str], Any], default_type: str = "mjpeg") -> Query:
-    """The Query in the arguments of an address; ``get(name)`` returns the last of a name, or None. Raises
+def read_query(get: Callable[[str], Any], default_type: str = "mjpeg") -> VideoQuery:
+    """The VideoQuery in the arguments of an address; ``get(name)`` returns the last of a name, or None. Raises
     QueryError.
     """
     name = get("type") or default_type
@@ -100,9 +100,9 @@ def read_query(get: Callable[[str], Any], default_type: str = "mjpeg") -> Query:
         raise QueryError(400, "default_transport=%s is not served; raw and compressed are" % transport)
     kind, usual, most = _TYPES[name]
     quality = _number(get, "quality")
-    form = Form(kind, usual if quality is None else min(max(quality, 0), most), _side(get, "width"),
-                _side(get, "height"), get("invert") is not None)
-    return Query(topic, form, "original" if name == "ros_compressed" else transport)
+    form = ImageForm(kind, usual if quality is None else min(max(quality, 0), most), _side(get, "width"),
+                     _side(get, "height"), get("invert") is not None)
+    return VideoQuery(topic, form, "original" if name == "ros_compressed" else transport)
 
 
 def _number(get: Callable[[Any], Any], name: str) -> int | None:
@@ -158,7 +158,7 @@ class VideoServer:
         """``stream`` holds nothing more."""
         self._held_bytes -= self._held.pop(stream, 0)
 
-    async def source(self, query: Query):
+    async def source(self, query: VideoQuery):
         """(the full name of the topic to subscribe to, the form). Raises BridgeError."""
         compressed = query.topic.rstrip("/") + "/compressed"
         if query.transport == "compressed":
@@ -166,7 +166,7 @@ class VideoServer:
         if query.transport == "original":
             # As web_video_server does for a camera without a compressed topic.
             with contextlib.suppress(NoSuchTopic):
-                return await self.cameras.find(compressed, (COMPRESSED,)), Form("original")
+                return await self.cameras.find(compressed, (COMPRESSED,)), ImageForm("original")
         return await self.cameras.find(query.topic), query.form
 
     async def close_all(self) -> None:
@@ -175,7 +175,7 @@ class VideoServer:
 
 
 def check_request(access: Access, request: HTTPServerRequest) -> None:
-    """Raise Refused unless a client, and the page that it shows, may look."""
+    """Raise RequestForbidden unless a client, and the page that it shows, may look."""
     headers, host = request.headers, request.host
     access.may_act(token_of(request))
     if (origin := headers.get("Origin")) is not None:
@@ -201,7 +201,7 @@ class _Handler(web.RequestHandler):
         self._server.options.told("%s asks for %s" % (self.request.remote_ip, self.request.path))
         try:
             check_request(self._server.options.access, self.request)
-        except Refused as error:
+        except RequestForbidden as error:
             _LOG.warning("a client at %s was refused: %s", self.request.remote_ip, error)
             self.refuse(403, error)
             return
@@ -285,7 +285,7 @@ class _One:
     def __init__(self) -> None:
         self.picture = asyncio.get_running_loop().create_future()
 
-    def show(self, picture: Picture) -> None:
+    def show(self, picture: EncodedImage) -> None:
         if not self.picture.done():
             self.picture.set_result(picture)
 
@@ -319,7 +319,7 @@ class StreamHandler(_Handler):
 class Stream:
     """The images of one client."""
 
-    def __init__(self, connection: iostream.IOStream, topic: str, form: Form, server: VideoServer) -> None:
+    def __init__(self, connection: iostream.IOStream, topic: str, form: ImageForm, server: VideoServer) -> None:
         self._server = server
         self._connection = connection
         self._topic = topic
@@ -334,7 +334,7 @@ class Stream:
             own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, _UNSENT_BYTES)
         connection.set_close_callback(self._changed.set)
 
-    def show(self, picture: Picture) -> None:
+    def show(self, picture: EncodedImage) -> None:
         """The newest picture, instead of one that was not yet looked at."""
         self._newest = picture
         self._changed.set()
@@ -377,7 +377,7 @@ class Stream:
             except TimeoutError:
                 return None
 
-    async def _encoded(self, picture: Picture):
+    async def _encoded(self, picture: EncodedImage):
         """The picture as this client wants it, or None where it cannot be shown."""
         try:
             return await picture.encoded(self._form)

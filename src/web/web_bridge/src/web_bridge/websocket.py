@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tornado import iostream, web, websocket
 
 from web_bridge.access import Access, Rules
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.outgoing import DROPPABLE_BYTES, OutgoingBuffer
 from web_bridge.session import Session
 
@@ -129,7 +129,7 @@ class BufferedSocket(websocket.WebSocketHandler):
         try:
             access.check_origin(self.request.headers.get("Origin"), self.request.host)
             self.may_act = access.may_act(token_of(self.request))
-        except Refused as error:
+        except RequestForbidden as error:
             _LOG.warning("a client at %s was refused: %s", self.request.remote_ip, error)
             self.set_status(403)
             self.finish(str(error) + "\n")

@@ -2,7 +2,7 @@
 import pytest
 
 from web_bridge.access import Access, Rules, is_token, patterns_of, without_tokens
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 
 
 @pytest.mark.parametrize(("origin", "host"), [
@@ -20,7 +20,7 @@ def test_pages_of_this_machine_may_connect(origin, host):
     ("http://10.1.2.3", "10.1.2.4:9090"), ("http://localhost", "10.1.2.4:9090"), ("http://[", "localhost:9090"),
     ("", "localhost:9090"), ("http://localhost:80", None), ("", ""), ("file://", "localhost:9090")])
 def test_foreign_pages_may_not(origin, host):
-    with pytest.raises(Refused):
+    with pytest.raises(RequestForbidden):
         Access(origins=["https://pages.example:444"], names=["lab-pc"]).check_origin(origin, host)
 
 
@@ -33,7 +33,7 @@ def test_tokens_say_who_may_act():
     access = Access({"drive": True, "look": False}, names=[])
     assert access.may_act("drive") is True and access.may_act("look") is False
     for wrong in ("", "driv", "drive ", "\udcff"):
-        with pytest.raises(Refused, match="token"):
+        with pytest.raises(RequestForbidden, match="token"):
             access.may_act(wrong)
     assert Access(names=[]).may_act("anything") is True
 
@@ -54,7 +54,7 @@ def test_rules_name_what_they_forbid():
                   lambda: rules.check_service("/robot/set"), lambda: rules.check_service("/rosapi/set_param"),
                   lambda: rules.check_service("/rosapi/set_logger_level"),
                   lambda: rules.check_may_act("publish")):
-        with pytest.raises(Refused):
+        with pytest.raises(RequestForbidden):
             check()
 
 

@@ -11,7 +11,7 @@ import pytest
 from sensor_msgs.msg import CompressedImage, Image
 
 from web_bridge import pictures
-from web_bridge.pictures import Form, Picture, PictureError, content_type, decoded, encode
+from web_bridge.pictures import EncodedImage, ImageForm, PictureError, content_type, decoded, encode
 
 # Red, green above blue, white; wide enough that a Bayer pattern and a pair of pixels share a colour.
 RED, GREEN, BLUE, WHITE = (0, 0, 255), (0, 255, 0), (255, 0, 0), (255, 255, 255)
@@ -72,9 +72,9 @@ def test_colours_stay_what_they_are(encoding, array, padding):
 def test_a_png_keeps_what_is_transparent_and_a_jpeg_does_not(encoding, order):
     array = np.dstack([scene(), np.full((16, 24), 128, np.uint8)])[:, :, order]
     pixels = decoded(message(array, encoding))
-    png = cv2.imdecode(np.frombuffer(encode(pixels, Form("png", 3)), np.uint8), cv2.IMREAD_UNCHANGED)
+    png = cv2.imdecode(np.frombuffer(encode(pixels, ImageForm("png", 3)), np.uint8), cv2.IMREAD_UNCHANGED)
     assert quarters(png) == [(*colour, 128) for colour in (RED, GREEN, BLUE, WHITE)]
-    jpeg = cv2.imdecode(np.frombuffer(encode(pixels, Form()), np.uint8), cv2.IMREAD_UNCHANGED)
+    jpeg = cv2.imdecode(np.frombuffer(encode(pixels, ImageForm()), np.uint8), cv2.IMREAD_UNCHANGED)
     assert jpeg.shape == (16, 24, 3) and np.abs(np.int16(quarters(jpeg)) - [RED, GREEN, BLUE, WHITE]).max() < 30
 
 
@@ -130,10 +130,10 @@ def test_what_cannot_be_shown_is_named(bad, text):
 
 def test_forms():
     pixels = scene()
-    shown = cv2.imdecode(np.frombuffer(encode(pixels, Form("png", 9, 12, 8, True)), np.uint8), cv2.IMREAD_COLOR)
+    shown = cv2.imdecode(np.frombuffer(encode(pixels, ImageForm("png", 9, 12, 8, True)), np.uint8), cv2.IMREAD_COLOR)
     assert shown.shape == (8, 12, 3) and quarters(shown) == [WHITE, BLUE, GREEN, RED]
-    assert len(encode(pixels, Form(quality=10))) < len(encode(pixels, Form(quality=95)))
-    only_wide = cv2.imdecode(np.frombuffer(encode(pixels, Form(width=48)), np.uint8), cv2.IMREAD_COLOR)
+    assert len(encode(pixels, ImageForm(quality=10))) < len(encode(pixels, ImageForm(quality=95)))
+    only_wide = cv2.imdecode(np.frombuffer(encode(pixels, ImageForm(width=48)), np.uint8), cv2.IMREAD_COLOR)
     assert only_wide.shape == (16, 48, 3)
 
 
@@ -152,10 +152,10 @@ def test_an_image_is_encoded_once_for_all_that_want_the_same(monkeypatch):
     def read():
         reads.append(threading.current_thread())
         return message(scene(), "bgr8")
-    small, large = Form(width=2), Form()
+    small, large = ImageForm(width=2), ImageForm()
 
     async def ask():
-        picture = Picture(read, pool)
+        picture = EncodedImage(read, pool)
         return await asyncio.gather(*(picture.encoded(form) for form in (large, small, large, small, large)))
     with ThreadPoolExecutor(2) as pool:
         found = asyncio.run(ask())
@@ -169,9 +169,9 @@ def test_an_image_is_kept_in_a_limited_number_of_forms(monkeypatch):
     monkeypatch.setattr(pictures, "encode", lambda pixels, form: encoded.append(form.width) or b"file")
 
     async def ask():
-        picture = Picture(lambda: message(scene(), "bgr8"), pool)
+        picture = EncodedImage(lambda: message(scene(), "bgr8"), pool)
         for width in (*range(1, 1001), 1000, 1):
-            assert (await picture.encoded(Form(width=width))).data == b"file"
+            assert (await picture.encoded(ImageForm(width=width))).data == b"file"
         return len(picture._frames)
     with ThreadPoolExecutor(2) as pool:
         assert asyncio.run(ask()) == pictures.MAX_FORMS

@@ -19,9 +19,9 @@ from web_bridge.access import Access
 from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
 from web_bridge.loop_thread import LoopThread
-from web_bridge.pictures import Form
+from web_bridge.pictures import ImageForm
 from web_bridge.serving import Serving
-from web_bridge.video import Query, QueryError, VideoOptions, VideoServer, read_query, routes
+from web_bridge.video import QueryError, VideoOptions, VideoQuery, VideoServer, read_query, routes
 
 IMAGE, PACKED = "/cam/image", "/cam/image/compressed"
 TYPES = {IMAGE: Image._type, PACKED: CompressedImage._type, "/plain": Image._type, "/cam/camera_info": "x/Info",
@@ -113,7 +113,7 @@ def test_all_clients_share_one_encoding_for_each_size(lab, monkeypatch):
         for stream, shape in (*((one, (16, 24, 3)) for one in large), *((one, (8, 12, 3)) for one in small)):
             picture = stream.picture()
             assert picture.shape == shape and abs(int(picture[4, 4, 0]) - blue) < 5 and picture[4, 4, 2] < 5
-    assert Counter(forms) == {Form(): 2, Form(width=12, height=8): 2}
+    assert Counter(forms) == {ImageForm(): 2, ImageForm(width=12, height=8): 2}
     assert len(lab.graph.subscribers[IMAGE]) == 1
 
 
@@ -277,11 +277,11 @@ def query_of(**given):
 
 
 def test_queries():
-    assert query_of(topic="/a") == Query("/a", Form())
-    assert query_of(topic="/a", type="png", quality="50", width="-1", height="", invert="") == Query(
-        "/a", Form("png", 9, is_turned=True))
-    assert query_of(topic="/a", quality="-5", width="12.4", bitrate="1", qos_profile="sensor_data") == Query(
-        "/a", Form(quality=0, width=12))
+    assert query_of(topic="/a") == VideoQuery("/a", ImageForm())
+    assert query_of(topic="/a", type="png", quality="50", width="-1", height="", invert="") == VideoQuery(
+        "/a", ImageForm("png", 9, is_turned=True))
+    assert query_of(topic="/a", quality="-5", width="12.4", bitrate="1", qos_profile="sensor_data") == VideoQuery(
+        "/a", ImageForm(quality=0, width=12))
     with pytest.raises(QueryError):
         query_of(topic="/a", type="h264")
 

@@ -9,7 +9,7 @@ from web_bridge.parameters import Endpoint, ParameterError, access_of, number, p
 from web_bridge.video import QueryError, VideoOptions, check_type
 
 
-class ServerParameters(NamedTuple):
+class VideoServerParameters(NamedTuple):
     """Parameters of the node. ``threads`` encode images; ``warnings`` for its log."""
 
     endpoint: Endpoint
@@ -19,7 +19,7 @@ class ServerParameters(NamedTuple):
     warnings: tuple
 
 
-def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
+def read_parameters(get: Callable[[str, Any], Any]) -> VideoServerParameters:
     """``get(name, default)`` returns a parameter of the node. Raises ParameterError."""
     address = str(get("address", "localhost"))
     access = access_of(get)
@@ -32,9 +32,9 @@ def read_parameters(get: Callable[[str, Any], Any]) -> ServerParameters:
     threads = int(number(get, "ros_threads", 2))
     if not 1 <= threads <= 64:
         raise ParameterError("~ros_threads is %d; 1 to 64 threads can encode images" % threads)
-    return ServerParameters(Endpoint(port_of(get, 8080), address), threads, switch(get, "verbose", True),
-                            VideoOptions(access, name, _period(get)),
-                            warnings_of(address, access, "see what the robot's cameras see"))
+    return VideoServerParameters(Endpoint(port_of(get, 8080), address), threads, switch(get, "verbose", True),
+                                 VideoOptions(access, name, _period(get)),
+                                 warnings_of(address, access, "see what the robot's cameras see"))
 
 
 def _period(get: Callable[[str, Any], Any]) -> float:

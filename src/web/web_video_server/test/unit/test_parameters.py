@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import pytest
 
-from web_bridge.errors import Refused
+from web_bridge.errors import RequestForbidden
 from web_bridge.parameters import ParameterError
 from web_video_server.parameters import read_parameters
 
@@ -23,7 +23,7 @@ def test_published_parameters_are_understood():
     assert found.endpoint[:2] == (0, "0.0.0.0") and found.warnings == ()
     assert (found.threads, found.is_verbose) == (3, False)
     assert (found.video.default_type, found.video.repeat_s) == ("png", 0.25)
-    with pytest.raises(Refused):
+    with pytest.raises(RequestForbidden):
         found.video.access.may_act("")
     assert read(publish_rate=-1).video.repeat_s == read(publish_rate=-1.0).video.repeat_s == 0.0
     assert "everybody on them can see" in read(address="0.0.0.0").warnings[0]

@@ -2,13 +2,13 @@
 """Exceptions of this package. Each text says what was found and what would have been right."""
 
 
-class ModelError(Exception):
+class BaxterModelError(Exception):
     """Base class of this package's errors."""
 
 
-class PoseError(ModelError):
+class PoseError(BaxterModelError):
     """A named pose does not exist or does not cover the requested joints."""
 
 
-class ModelMismatch(ModelError):
+class ModelMismatch(BaxterModelError):
     """The URDF lacks a joint or a frame that every Baxter has."""

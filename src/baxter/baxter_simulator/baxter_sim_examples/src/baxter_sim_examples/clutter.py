@@ -47,7 +47,7 @@ _THING = """<robot name="%(name)s">
 
 
 @dataclass(frozen=True)
-class Thing:
+class ClutterItem:
     """Something that stands in the way. spot: of its middle; width, height [m]; round: a cylinder, else a box."""
 
     name: str
@@ -62,8 +62,8 @@ class Thing:
         """Of the circle that it stands in [m]."""
         return 0.5 * self.width * (1.0 if self.is_round else math.sqrt(2.0))
 
-    def with_margin(self) -> Thing:
-        """The Thing as a planner should know it: larger to all sides."""
+    def with_margin(self) -> ClutterItem:
+        """The ClutterItem as a planner should know it: larger to all sides."""
         return replace(self, width=self.width + 2.0 * _MARGIN_M, height=self.height + 2.0 * _MARGIN_M)
 
     def urdf(self) -> str:
@@ -84,7 +84,7 @@ class Grasp:
     quality: float
 
 
-def clutter(seed: int) -> list[Thing]:
+def clutter(seed: int) -> list[ClutterItem]:
     """The things of a seed: a list that stands clear of the block, its target, and of each other."""
     trial, random = Trial.from_seed(seed), np.random.default_rng((seed, THINGS))
     block = 0.5 * math.sqrt(2.0) * BLOCK_SIZE_M
@@ -103,8 +103,8 @@ def _thing(name, random):
     width, height = random.uniform(*_WIDTHS_M), random.uniform(*_HEIGHTS_M)
     spot = Spot(float(x), float(y), TABLE_TOP_M - BASE_HEIGHT_M + 0.5 * float(height),
                 float(random.uniform(-math.pi, math.pi)))
-    return Thing(name, spot, float(width), float(height), float(random.uniform(*_MASSES_KG)),
-                 bool(random.integers(2)))
+    return ClutterItem(name, spot, float(width), float(height), float(random.uniform(*_MASSES_KG)),
+                       bool(random.integers(2)))
 
 
 def grasps(spot: Spot) -> list[Grasp]:

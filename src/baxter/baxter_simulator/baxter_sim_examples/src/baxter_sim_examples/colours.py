@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 if TYPE_CHECKING:
-    from .looking import View
+    from .looking import CameraView
 
 #: Ranges of hue [half degrees, as OpenCV counts: 0 to 179] of each colour.
 HUES = {"red": ((0, 8), (172, 179)), "yellow": ((22, 34),), "green": ((45, 80),), "blue": ((105, 130),)}
@@ -18,7 +18,7 @@ _SATURATED, _BRIGHT = 120, 50
 _BLOCK_AREAS = (0.8, 2.5)
 
 
-class Patch(NamedTuple):
+class ColourPatch(NamedTuple):
     """A patch of one colour: its middle [pixels] and its area [square pixels]."""
 
     u: float
@@ -26,7 +26,7 @@ class Patch(NamedTuple):
     area: float
 
 
-def find_patches(picture: np.ndarray, colour: str, least_area: float = 40.0) -> list[Patch]:
+def find_patches(picture: np.ndarray, colour: str, least_area: float = 40.0) -> list[ColourPatch]:
     """Patches of `colour`, one of :data:`HUES`, in a picture (height, width, 3) uint8 red, green, blue, the largest
     first; smaller ones than `least_area` [square pixels] are left out. ``ValueError`` for an unknown colour."""
     if colour not in HUES:
@@ -38,14 +38,14 @@ def find_patches(picture: np.ndarray, colour: str, least_area: float = 40.0) -> 
     for outline in outlines:
         moments = cv2.moments(outline)
         if moments["m00"] >= least_area:
-            found.append(Patch(moments["m10"] / moments["m00"], moments["m01"] / moments["m00"], moments["m00"]))
+            found.append(ColourPatch(moments["m10"] / moments["m00"], moments["m01"] / moments["m00"], moments["m00"]))
     return sorted(found, key=lambda patch: -patch.area)
 
 
-def find_blocks(view: View, colour: str, side_m: float, top_m: float) -> list[tuple[float, float, Patch]]:
-    """[(x, y [m] in `base`, Patch)] of the patches of `colour` in a `looking.View` that are as large as blocks of
-    `side_m` [m] whose upper faces are at height `top_m` [m] in `base`; so the robot itself, which is red, is left out.
-    ``ValueError`` for an unknown colour."""
+def find_blocks(view: CameraView, colour: str, side_m: float, top_m: float) -> list[tuple[float, float, ColourPatch]]:
+    """[(x, y [m] in `base`, ColourPatch)] of the patches of `colour` in a `looking.CameraView` that are as large as
+    blocks of `side_m` [m] whose upper faces are at height `top_m` [m] in `base`; so the robot itself, which is red, is
+    left out. ``ValueError`` for an unknown colour."""
     patches = find_patches(view.picture, colour)
     # A pixel's area at that height, from its places and those of its neighbours: smaller below the camera than aside.
     middles = np.array([patch[:2] for patch in patches]).reshape(-1, 2)

@@ -17,7 +17,7 @@ from gazebo_ros.gazebo_interface import GazeboInterfaceError, call, delete_model
 from .scene import BASE_HEIGHT_M, TABLE_XY_M, block_urdf
 
 if TYPE_CHECKING:
-    from .clutter import Thing
+    from .clutter import ClutterItem
     from .pick_and_place import Spot
     from .scene import Trial
 
@@ -31,7 +31,7 @@ class GazeboScene:
     Raises GazeboInterfaceError.
     """
 
-    def __init__(self, trial: Trial, things: Iterable[Thing] = ()) -> None:
+    def __init__(self, trial: Trial, things: Iterable[ClutterItem] = ()) -> None:
         """things: list of clutter.Things."""
         self._trial, self._things = trial, list(things)
 

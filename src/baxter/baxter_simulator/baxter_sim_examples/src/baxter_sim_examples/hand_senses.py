@@ -14,7 +14,7 @@ from baxter_dataflow import wait_for
 from command_line.options import counted
 from urdf_model.transforms import matrix_from_quaternion, rigid
 
-from .looking import View
+from .looking import CameraView
 
 BASE = "base"
 # Longest wait for messages, and for tf to know a moment [s].
@@ -34,13 +34,13 @@ class Eyes:
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer)
 
-    def view(self, image_topic: str, info_topic: str) -> View:
-        """The `View` of a camera's next picture, where it was taken."""
+    def view(self, image_topic: str, info_topic: str) -> CameraView:
+        """The `CameraView` of a camera's next picture, where it was taken."""
         info, = _next_messages(info_topic, CameraInfo)
         image, = _next_messages(image_topic, Image)
         picture = CvBridge().imgmsg_to_cv2(image, "rgb8")
-        return View(picture, np.reshape(info.K, (3, 3)), self.pose(image.header.frame_id, image.header.stamp),
-                    tuple(info.D))
+        return CameraView(picture, np.reshape(info.K, (3, 3)), self.pose(image.header.frame_id, image.header.stamp),
+                          tuple(info.D))
 
     def points(self, topic: str) -> np.ndarray:
         """The points (n, 3) [m], in `base`, of the next cloud of a depth camera."""
@@ -63,8 +63,8 @@ class HandSenses:
         self._camera, self._sensor = "%s_hand_camera" % limb, "%s_hand_range" % limb
         self._eyes = Eyes()
 
-    def look(self) -> View:
-        """The `View` of the camera's next picture, where it was taken."""
+    def look(self) -> CameraView:
+        """The `CameraView` of the camera's next picture, where it was taken."""
         return self._eyes.view("/cameras/%s/image" % self._camera, "/cameras/%s/camera_info" % self._camera)
 
     def feel(self) -> tuple[float, list[float]]:

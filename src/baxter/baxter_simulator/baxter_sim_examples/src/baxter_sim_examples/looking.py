@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from command_line.options import counted
 
-from .pick_and_place import Arm, Spot, start_angles, tool_down
+from .pick_and_place import PickingArm, Spot, start_angles, tool_down
 from .scene import BLOCK_SIZE_M
 from .tagged import BLOCK_TAG, BLOCK_TAG_M
 from .tags import find_tags
@@ -40,16 +40,16 @@ class NotSeen(Exception):
     """The object is not there, or is not seen; the text says what was found."""
 
 
-class LookingArm(Arm, Protocol):
+class LookingArm(PickingArm, Protocol):
     """The same with the hand's camera and range sensor; `feel()` -> (height of the sensor in `base` [m], its readings
     [m])."""
 
-    def look(self) -> View: ...
+    def look(self) -> CameraView: ...
 
     def feel(self) -> tuple[float, list[float]]: ...
 
 
-class View(NamedTuple):
+class CameraView(NamedTuple):
     """A picture and where it was taken: `picture` (height, width, 3) uint8 red, green, blue; `matrix` (3, 3) and
     `distortion` (n,), K and D of the camera; `pose` (4, 4) of the optical frame in `base` [m]."""
 
@@ -76,7 +76,7 @@ class View(NamedTuple):
         return abs(self.matrix[0, 0]) / max(abs(self.pose[2, 3] - height), 1e-3)
 
 
-def find_block(view: View, table_m: float, side_m: float = BLOCK_SIZE_M) -> Spot:
+def find_block(view: CameraView, table_m: float, side_m: float = BLOCK_SIZE_M) -> Spot:
     """The Spot of the block on a table whose top is at height `table_m` [m] in `base`. Raises NotSeen.
 
     The block's upper face is the lighter patch of wood whose outline, seen at the height of that face, is a square of
@@ -136,7 +136,7 @@ def locate(arm: LookingArm, middle: Sequence[float], about_m: float) -> Spot:
     return find_block(arm.look(), table_m)
 
 
-def find_tagged_block(view: View, number: int = BLOCK_TAG, tag_m: float = BLOCK_TAG_M,
+def find_tagged_block(view: CameraView, number: int = BLOCK_TAG, tag_m: float = BLOCK_TAG_M,
                       side_m: float = BLOCK_SIZE_M) -> Spot:
     """The Spot of the block of `side_m` [m] with tag `number`, of `tag_m` [m], on its upper face; the table's height
     need not be known. Raises NotSeen."""

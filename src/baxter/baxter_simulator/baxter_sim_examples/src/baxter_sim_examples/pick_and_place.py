@@ -30,7 +30,7 @@ _UP = _DOWN[-2::-1]
 _QUARTER = math.pi / 2.0
 
 
-class Arm(Protocol):
+class PickingArm(Protocol):
     """An arm with its gripper; `ik` may raise anything, and motions return when they are done. Angles are by joint
     name [rad]."""
 
@@ -82,7 +82,7 @@ def grip_yaw(yaw: float) -> float:
     return yaw - _QUARTER * round(yaw / _QUARTER)
 
 
-def pick_and_place(arm: Arm, source: Spot, target: Spot) -> None:
+def pick_and_place(arm: PickingArm, source: Spot, target: Spot) -> None:
     """Carry the block from `source` to `target` (Spot). Raises BlockLost, and the arm's errors.
 
     The fingers keep their angle to the block, so that it arrives turned by the difference of the two spots' yaw, up to

@@ -18,7 +18,7 @@ class NoPlane(Exception):
     """There is no plane among the points; the text says why."""
 
 
-class Plane(NamedTuple):
+class FittedPlane(NamedTuple):
     """The points p with `normal` (3,) . p = `distance` [m]; `inliers`: bool for each point that it was fitted to."""
 
     normal: np.ndarray
@@ -31,8 +31,8 @@ class Plane(NamedTuple):
 
 
 def fit_plane(points: npt.ArrayLike, tolerance_m: float, upwards: Sequence[float] = (0.0, 0.0, 1.0), seed: int = 0,
-              tries: int = 200) -> Plane:
-    """The :class:`Plane` with the most points (n, 3) [m] within `tolerance_m`; its normal points `upwards`.
+              tries: int = 200) -> FittedPlane:
+    """The :class:`FittedPlane` with the most points (n, 3) [m] within `tolerance_m`; its normal points `upwards`.
 
     Three points at a time are tried (Fischler and Bolles, "Random sample consensus", 1981); the best plane is then
     fitted to the points near it by least squares, again and again until these stay the same. Raises NoPlane.
@@ -65,9 +65,9 @@ def fit_plane(points: npt.ArrayLike, tolerance_m: float, upwards: Sequence[float
 
 
 def _fitted(points, chosen, upwards, tolerance_m):
-    """The Plane by least squares through the ``chosen`` points; its inliers are those of all points."""
+    """The FittedPlane by least squares through the ``chosen`` points; its inliers are those of all points."""
     middle = points[chosen].mean(axis=0)
     _, _, axes = np.linalg.svd(points[chosen] - middle, full_matrices=False)
     normal = axes[2] if axes[2] @ upwards >= 0.0 else -axes[2]
     distance = float(normal @ middle)
-    return Plane(normal, distance, np.abs(points @ normal - distance) < tolerance_m)
+    return FittedPlane(normal, distance, np.abs(points @ normal - distance) < tolerance_m)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 if TYPE_CHECKING:
-    from .looking import View
+    from .looking import CameraView
 
 #: Cells of a tag's side, the black border included. Around it a white margin of one cell is needed.
 CELLS = 8
@@ -35,8 +35,8 @@ def pattern(number: int) -> np.ndarray:
     return draw(_DICTIONARY, number, CELLS) > 127
 
 
-def find_tags(view: View, side_m: float) -> dict[int, np.ndarray]:
-    """{number: pose (4, 4) in `base` [m]} of the tags with black borders of `side_m` [m] in a `looking.View`.
+def find_tags(view: CameraView, side_m: float) -> dict[int, np.ndarray]:
+    """{number: pose (4, 4) in `base` [m]} of the tags with black borders of `side_m` [m] in a `looking.CameraView`.
 
     A tag's frame is in its middle: x to its right, y to its upper edge, z out of it, towards the camera.
     """

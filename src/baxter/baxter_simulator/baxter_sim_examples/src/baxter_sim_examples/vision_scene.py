@@ -17,7 +17,7 @@ BOARD_SIZE_M = (0.15, 0.15, 0.01)
 BOARD_TAG_M = min(BOARD_SIZE_M[:2]) * CELLS / (CELLS + 2)
 
 
-class Thing(NamedTuple):
+class PlacedModel(NamedTuple):
     """A model: its middle x, y, z [m] and its turn [rad], in `base`."""
 
     name: str
@@ -33,7 +33,7 @@ class Thing(NamedTuple):
 
 
 def _on_table(name, x, y, height, yaw):
-    return Thing(name, x, y, TABLE_TOP_M - BASE_HEIGHT_M + height / 2.0, yaw)
+    return PlacedModel(name, x, y, TABLE_TOP_M - BASE_HEIGHT_M + height / 2.0, yaw)
 
 
 #: Models of `model_files` by name; where the untucked arms hide nothing from the Kinect.

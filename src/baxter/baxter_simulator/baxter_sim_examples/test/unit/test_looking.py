@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from baxter_sim_examples.looking import NotSeen, View, find_block, locate, table_height
+from baxter_sim_examples.looking import CameraView, NotSeen, find_block, locate, table_height
 from baxter_sim_examples.scene import BLOCK_SIZE_M
 
 TABLE_M = -0.155
@@ -45,7 +45,7 @@ def draw(pose, blocks, noise=2.0, dark=0.4):
     tangent2 = u[None, :] ** 2 + v[:, None] ** 2
     light = 1.0 - dark * tangent2 / (1.0 + tangent2)
     noisy = picture * light[:, :, None] + noise * np.random.default_rng(3).standard_normal(picture.shape)
-    return View(np.clip(noisy, 0, 255).astype(np.uint8), K, pose)
+    return CameraView(np.clip(noisy, 0, 255).astype(np.uint8), K, pose)
 
 
 @pytest.mark.parametrize("x, y, yaw", [(0.6, 0.0, 0.3), (0.75, 0.3, -0.7), (0.68, 0.15, 0.0), (0.62, 0.33, 1.2)])

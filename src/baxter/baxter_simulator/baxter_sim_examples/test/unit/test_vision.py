@@ -9,7 +9,7 @@ import rospkg
 
 from baxter_sim_examples import tagged, vision_scene
 from baxter_sim_examples.colours import HUES, find_blocks, find_patches
-from baxter_sim_examples.looking import NotSeen, View, find_tagged_block, locate_tagged
+from baxter_sim_examples.looking import CameraView, NotSeen, find_tagged_block, locate_tagged
 from baxter_sim_examples.planes import NoPlane, fit_plane
 from baxter_sim_examples.scene import BLOCK_SIZE_M, TABLE_SIZE_M
 from baxter_sim_examples.tags import CELLS, find_tags, pattern
@@ -52,12 +52,12 @@ def world(tmp_path, *things):
 
 
 def seen(renderer, mirror, pinhole, pose, distortion=None, time_s=0.0):
-    """The View of a noisy camera at `pose`."""
+    """The CameraView of a noisy camera at `pose`."""
     lens = Lens(pinhole, distortion) if distortion else None
     picture, _ = renderer.render(mirror, lens.ideal if lens else pinhole, pose)
     picture = Exposure(1).developed([lens.picture(picture) if lens else picture], SENSOR, time_s)
     matrix = np.array([[pinhole.fx, 0.0, pinhole.cx], [0.0, pinhole.fy, pinhole.cy], [0.0, 0.0, 1.0]])
-    return View(picture, matrix, pose, tuple(distortion or ()))
+    return CameraView(picture, matrix, pose, tuple(distortion or ()))
 
 
 def looking_at(target, away, slant, turn):

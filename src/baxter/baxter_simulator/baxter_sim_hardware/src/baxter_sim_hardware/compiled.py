@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from baxter_sim_hardware.arms import avoidance
-from baxter_sim_hardware.arms.actuators import Actuators, Wanted
-from baxter_sim_hardware.arms.joint_command import CommandParser, JointLimits, Mode
+from baxter_sim_hardware.arms.actuators import ActuatorCommands, Actuators
+from baxter_sim_hardware.arms.joint_command import ArmLimits, CommandParser, Mode
 from baxter_sim_hardware.arms.joint_sensors import JointSensors
 from baxter_sim_hardware.arms.raw_stream import RawStream
 from baxter_sim_hardware.arms.safety import blocks_of
@@ -37,7 +37,7 @@ def load() -> None:
     any_beyond(1.0, here, at_rest, here, 1.0)
     approach_rates(np.zeros(1, dtype=int), here, here, bound, bound, bound > 0.0)
     avoidance.field(avoidance.Guards(("guard",), np.zeros((1, 3)), bound), *_arm())
-    limits = JointLimits(("left_s0",), -bound, bound, bound, bound)
+    limits = ArmLimits(("left_s0",), -bound, bound, bound, bound)
     parser = CommandParser(limits, limits.names)
     for mode in Mode:
         command = parser.parse(mode, limits.names, [0.0])
@@ -54,7 +54,7 @@ def load_of_effects(numbers: Mapping[str, Mapping[str, Mapping[str, float]]]) ->
     sensors = JointSensors(numbers["noise"], ["left_s0", "left_s1"], 0, 0)
     sensors.reached(sensors.felt(np.zeros(2)), np.arange(2))
     actuators = Actuators(numbers["lag"], ["left_s0"])
-    actuators.torques(Wanted(bound > 0.0, here, at_rest, bound > 0.0, here, bound), np.ones((3, 1)), 1.0)
+    actuators.torques(ActuatorCommands(bound > 0.0, here, at_rest, bound > 0.0, here, bound), np.ones((3, 1)), 1.0)
     rotations, origins, rates = _arm()
     frames = rotations, origins
     avoidance.between(frames, frames, rates, 1.0, 1.0)

@@ -2,11 +2,11 @@
 """Exceptions of the robot's core. Each text says what was found and what would have been right."""
 
 
-class HardwareError(Exception):
+class BaxterHardwareError(Exception):
     """Base class of this package's errors."""
 
 
-class CommandRefused(HardwareError):
+class CommandRefused(BaxterHardwareError):
     """A command is refused as a whole; no part of it was applied."""
 
 

@@ -22,7 +22,7 @@ NOD_S = 1.0  # the screen's way down and up again
 TURNING_SPEED = 0.01  # [rad/s] from which the head counts as turning
 
 
-class Head:
+class HeadHardware:
     """Set-point of the pan joint, and the clock of a nod.
 
     lower, upper: limits of the joint [rad]; pan: where it is now [rad]; dt: length of a tick [s]; dead_band: so far
@@ -98,15 +98,15 @@ class Head:
 
 
 class PanDrive:
-    """The head's joint in the physics world. model: of bullet_sim; dt, dead_band: as of `Head`.
+    """The head's joint in the physics world. model: of bullet_sim; dt, dead_band: as of `HeadHardware`.
 
-    Attributes: `head`, its `Head`; `joint`, the number of the joint in the model.
+    Attributes: `head`, its `HeadHardware`; `joint`, the number of the joint in the model.
     """
 
     def __init__(self, model: Model, dt: float, dead_band: float = 0.0) -> None:
         self._model, self._index = model, model.index([HEAD_JOINT])
         self.joint = self._index[0]
-        self.head = Head(model.lower[self.joint], model.upper[self.joint], self._pan(), dt, dead_band)
+        self.head = HeadHardware(model.lower[self.joint], model.upper[self.joint], self._pan(), dt, dead_band)
 
     def _pan(self) -> float:
         return self._model.read_joints()[0][self.joint]

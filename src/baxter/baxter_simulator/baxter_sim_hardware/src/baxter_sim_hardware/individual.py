@@ -16,7 +16,7 @@ import numpy as np
 from baxter_model import SIDES
 
 from . import effects
-from .errors import HardwareError
+from .errors import BaxterHardwareError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -54,7 +54,7 @@ def numbers_of(serial: int | str) -> str | Path:
 def checked(serial: int | str) -> int:
     """A serial number as an integer; of a robot with a file of its own, that of the drawing.
 
-    Raises HardwareError unless it is a YAML file or a whole number from 0 to LARGEST_SERIAL.
+    Raises BaxterHardwareError unless it is a YAML file or a whole number from 0 to LARGEST_SERIAL.
     """
     if is_file(serial):
         return DRAWING
@@ -63,7 +63,7 @@ def checked(serial: int | str) -> int:
     except ValueError:
         number = -1
     if not 0 <= number <= LARGEST_SERIAL or isinstance(serial, bool):
-        raise HardwareError("serial is %r; it must be a whole number, 0 (the drawing) to %d, or a YAML file" % (
+        raise BaxterHardwareError("serial is %r; it must be a whole number, 0 (the drawing) to %d, or a YAML file" % (
             serial, LARGEST_SERIAL))
     return number
 
@@ -72,7 +72,7 @@ def difference(serial: int, part: str, rows: Mapping[str, Mapping[str, float]], 
     """{name: value} by how much `part`, any text, of the robot `serial` differs; zeros for robot 0.
 
     rows: section "serial" of `effects.read`; number: a row of it, whose values are standard deviations. Raises
-    HardwareError.
+    BaxterHardwareError.
     """
     deviations = effects.row(rows, number)
     if serial == DRAWING:
@@ -89,7 +89,7 @@ def drawn(serial: int, part: str, number: str) -> np.random.Generator:
 def described(urdf_xml: str, serial: int, rows: Mapping[str, Mapping[str, float]]) -> str:
     """The description (URDF text) of the robot `serial`: mounts of arms, cameras and grippers are where its own are.
 
-    rows: as for `difference`. Robot 0's is the text as given. Raises HardwareError for a text that is no XML.
+    rows: as for `difference`. Robot 0's is the text as given. Raises BaxterHardwareError for a text that is no XML.
     """
     if serial == DRAWING:
         return urdf_xml
@@ -113,7 +113,7 @@ def described(urdf_xml: str, serial: int, rows: Mapping[str, Mapping[str, float]
 def robot_config(urdf_xml: str) -> dict[str, str]:
     """{parameter: text} of what the factory has measured: origins of the arms' mounts as the description has them.
 
-    Raises HardwareError for a text that is no XML.
+    Raises BaxterHardwareError for a text that is no XML.
     """
     found = {}
     for joint in _parsed(urdf_xml).findall("joint"):
@@ -125,7 +125,7 @@ def robot_config(urdf_xml: str) -> dict[str, str]:
     return found
 
 
-class Lens(NamedTuple):
+class LensFactors(NamedTuple):
     """How a camera's lens differs: factors of the focal lengths, shift of the principal point [pixels of the array]."""
 
     fx: float
@@ -134,8 +134,8 @@ class Lens(NamedTuple):
     cy: float
 
     @classmethod
-    def of(cls, serial: int, camera: str, rows: Mapping[str, Mapping[str, float]]) -> Lens:
-        """The lens of `camera`, "left_hand_camera" for instance. Raises HardwareError."""
+    def of(cls, serial: int, camera: str, rows: Mapping[str, Mapping[str, float]]) -> LensFactors:
+        """The lens of `camera`, "left_hand_camera" for instance. Raises BaxterHardwareError."""
         focal = difference(serial, camera, rows, "focal_length")
         centre = difference(serial, camera, rows, "principal_point")
         both = 1.0 + focal["both"]
@@ -151,4 +151,4 @@ def _parsed(urdf_xml: str) -> ElementTree.Element:
     try:
         return ElementTree.fromstring(urdf_xml)
     except ElementTree.ParseError as error:
-        raise HardwareError("the robot's description is no XML: %s" % error) from error
+        raise BaxterHardwareError("the robot's description is no XML: %s" % error) from error

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import roslib.message
 
-from baxter_model import ModelError
+from baxter_model import BaxterModelError
 from baxter_model.self_collision import spawn_options
 from disk_cache import compiler_pages
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
 from . import compiled, effects, individual
-from .errors import HardwareError
+from .errors import BaxterHardwareError
 from .message_delay import MessageDelay
-from .robot_state import Event, State
+from .robot_state import BaxterState, Event
 from .simulated import SimulatedBaxter, Which
 from .topics import interface
 from .topics.arms import ArmTopics
@@ -60,16 +60,16 @@ class BaxterPlugin(ModelPlugin):
         # The pedestal stands on the floor and stays there.
         return {"static": True, **spawn_options(robot.links)}
 
-    def __init__(self, context: PluginContext, before: State | None = None) -> None:
-        """``before``: the robot_state.State of the plugin that this one replaces, or None."""
+    def __init__(self, context: PluginContext, before: BaxterState | None = None) -> None:
+        """``before``: the robot_state.BaxterState of the plugin that this one replaces, or None."""
         super().__init__(context)
         try:
             self._build(context, before)
-        except (HardwareError, ModelError) as error:
+        except (BaxterHardwareError, BaxterModelError) as error:
             raise PluginError("model '%s' cannot be driven as a Baxter: %s" % (context.model.name, error)) from error
         self._open_topics(context)
 
-    def _build(self, context: PluginContext, before: State | None) -> None:
+    def _build(self, context: PluginContext, before: BaxterState | None) -> None:
         which = Which(self._parameter("profile", "sim"), self._parameter("effects", None),
                       self._parameter("serial", individual.DRAWING), self._parameter("disabled", "hold"))
         simulated = self._simulated = SimulatedBaxter(context.world, context.model, context.robot, which, before,
@@ -192,7 +192,7 @@ class BaxterPlugin(ModelPlugin):
 
     def restarted(self) -> BaxterPlugin:
         before = self._baxter.state.state
-        return self.successor(State.DISABLED if before is State.FAILED else before)
+        return self.successor(BaxterState.DISABLED if before is BaxterState.FAILED else before)
 
     def while_failed(self, time_s: float) -> bool:
         self._simulated.before = self._simulated.model.read_joints()

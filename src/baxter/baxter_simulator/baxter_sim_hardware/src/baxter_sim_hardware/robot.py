@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .arms.actuators import Actuators, Wanted
+from .arms.actuators import ActuatorCommands, Actuators
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
-from .errors import ArmStands, HardwareError
+from .errors import ArmStands, BaxterHardwareError
 from .robot_state import RobotState
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from baxter_model.description import LimbModel
 
     from .arms.drives import Drives
-    from .arms.joint_command import JointCommand, JointLimits
+    from .arms.joint_command import ArmLimits, CheckedCommand
     from .arms.measured import Measured
-    from .robot_state import Event, State
+    from .robot_state import BaxterState, Event
 
 INERTIA_TICKS = 50  # the inertias of links about their joints change that slowly
 DISABLED_BEHAVIOURS = ("hold", "sink")
@@ -36,22 +36,22 @@ class Behaviour(NamedTuple):
     actuators: Actuators | None = None
 
 
-class Baxter:
+class BaxterHardware:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, measured, dt: as for `Arms`; behaviour: `Behaviour`; state: the first robot_state.State.
+    limbs, limits, measured, dt: as for `Arms`; behaviour: `Behaviour`; state: the first robot_state.BaxterState.
 
     Attributes: `profile`, `actuators`: as in `Behaviour`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the
     `Measured` that the caller updates before each tick, and before each event between two ticks.
     """
 
-    def __init__(self, limbs: Sequence[LimbModel], limits: JointLimits, measured: Measured, dt: float = 0.002,
-                 behaviour: Behaviour = Behaviour(), state: State | None = None) -> None:  # noqa: B008 (a tuple)
+    def __init__(self, limbs: Sequence[LimbModel], limits: ArmLimits, measured: Measured, dt: float = 0.002,
+                 behaviour: Behaviour = Behaviour(), state: BaxterState | None = None) -> None:  # noqa: B008 (a tuple)
         profile, disabled, actuators = behaviour
         if profile not in SPEED_RATIO:
-            raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
+            raise BaxterHardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
         if disabled not in DISABLED_BEHAVIOURS:
-            raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
+            raise BaxterHardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
         self.profile = profile
         self.state = RobotState() if state is None else RobotState(state)
         self.measured, self.actuators, self._dt = measured, actuators, dt
@@ -91,7 +91,7 @@ class Baxter:
             self.arms.set_speed_ratio(side, self._speed_ratio)
             self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
-    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
+    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> CheckedCommand:
         """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled, and ArmStands
         after a collision."""
         self.state.require_enabled()
@@ -130,8 +130,8 @@ class Baxter:
         arms, measured, index = self.arms, self.measured, drives.position_driven
         driven, effort = np.zeros(len(measured.position), dtype=bool), np.zeros(len(measured.position))
         driven[index], effort[index] = True, drives.effort
-        wanted = Wanted(driven, arms.commanded_position, arms.said_velocity, arms.in_position_mode, arms.known_gravity,
-                        effort)
+        wanted = ActuatorCommands(driven, arms.commanded_position, arms.said_velocity, arms.in_position_mode,
+                                  arms.known_gravity, effort)
         if self._inertia_due == 0:
             self._links[2] = np.diagonal(measured.dynamics(measured.velocity)[0])
         self._inertia_due = (self._inertia_due + 1) % INERTIA_TICKS

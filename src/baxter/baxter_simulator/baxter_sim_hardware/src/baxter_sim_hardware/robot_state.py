@@ -16,7 +16,7 @@ from baxter_model.readiness import NOT_ENABLED, RESET
 from .errors import CommandRefused
 
 
-class State(Enum):
+class BaxterState(Enum):
     """The state of the whole robot."""
 
     DISABLED = "disabled"
@@ -38,7 +38,7 @@ class Event(Enum):
     ESTOP_PRESS = "emergency stop pressed"
 
 
-class Button(IntEnum):
+class EstopButton(IntEnum):
     """AssemblyState.estop_button on the wire."""
 
     UNPRESSED = 0
@@ -65,78 +65,78 @@ class Assembly:
     enabled: bool
     stopped: bool
     error: bool
-    estop_button: Button
+    estop_button: EstopButton
     estop_source: Source
 
 
 ASSEMBLY = {
-    State.DISABLED: Assembly(False, False, False, False, Button.UNPRESSED, Source.NONE),
-    State.ENABLED: Assembly(True, True, False, False, Button.UNPRESSED, Source.NONE),
-    State.STOPPED: Assembly(False, False, True, False, Button.UNKNOWN, Source.UNKNOWN),
-    State.ESTOP_PRESSED: Assembly(False, False, True, False, Button.PRESSED, Source.USER),
-    State.ESTOP_RELEASED: Assembly(False, False, True, False, Button.RELEASED, Source.USER),
-    State.FAILED: Assembly(False, False, True, True, Button.UNPRESSED, Source.FAULT),
+    BaxterState.DISABLED: Assembly(False, False, False, False, EstopButton.UNPRESSED, Source.NONE),
+    BaxterState.ENABLED: Assembly(True, True, False, False, EstopButton.UNPRESSED, Source.NONE),
+    BaxterState.STOPPED: Assembly(False, False, True, False, EstopButton.UNKNOWN, Source.UNKNOWN),
+    BaxterState.ESTOP_PRESSED: Assembly(False, False, True, False, EstopButton.PRESSED, Source.USER),
+    BaxterState.ESTOP_RELEASED: Assembly(False, False, True, False, EstopButton.RELEASED, Source.USER),
+    BaxterState.FAILED: Assembly(False, False, True, True, EstopButton.UNPRESSED, Source.FAULT),
 }
 
 # Every (state, event) pair has its row. Reset always ends disabled: the SDK's reset() waits for exactly that.
 TRANSITIONS = {
-    (State.DISABLED, Event.ENABLE): State.ENABLED,
-    (State.DISABLED, Event.DISABLE): State.DISABLED,
-    (State.DISABLED, Event.STOP): State.STOPPED,
-    (State.DISABLED, Event.RESET): State.DISABLED,
-    (State.DISABLED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
-    (State.DISABLED, Event.ESTOP_RELEASE): State.DISABLED,
-    (State.ENABLED, Event.ENABLE): State.ENABLED,
-    (State.ENABLED, Event.DISABLE): State.DISABLED,
-    (State.ENABLED, Event.STOP): State.STOPPED,
-    (State.ENABLED, Event.RESET): State.DISABLED,
-    (State.ENABLED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
-    (State.ENABLED, Event.ESTOP_RELEASE): State.ENABLED,
-    (State.STOPPED, Event.ENABLE): State.STOPPED,
-    (State.STOPPED, Event.DISABLE): State.STOPPED,
-    (State.STOPPED, Event.STOP): State.STOPPED,
-    (State.STOPPED, Event.RESET): State.DISABLED,
-    (State.STOPPED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
-    (State.STOPPED, Event.ESTOP_RELEASE): State.STOPPED,
-    (State.ESTOP_PRESSED, Event.ENABLE): State.ESTOP_PRESSED,
-    (State.ESTOP_PRESSED, Event.DISABLE): State.ESTOP_PRESSED,
-    (State.ESTOP_PRESSED, Event.STOP): State.ESTOP_PRESSED,
-    (State.ESTOP_PRESSED, Event.RESET): State.ESTOP_PRESSED,
-    (State.ESTOP_PRESSED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
-    (State.ESTOP_PRESSED, Event.ESTOP_RELEASE): State.ESTOP_RELEASED,
-    (State.ESTOP_RELEASED, Event.ENABLE): State.ESTOP_RELEASED,
-    (State.ESTOP_RELEASED, Event.DISABLE): State.ESTOP_RELEASED,
-    (State.ESTOP_RELEASED, Event.STOP): State.ESTOP_RELEASED,
-    (State.ESTOP_RELEASED, Event.RESET): State.DISABLED,
-    (State.ESTOP_RELEASED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
-    (State.ESTOP_RELEASED, Event.ESTOP_RELEASE): State.ESTOP_RELEASED,
-    (State.FAILED, Event.ENABLE): State.FAILED,
-    (State.FAILED, Event.DISABLE): State.FAILED,
-    (State.FAILED, Event.STOP): State.FAILED,
-    (State.FAILED, Event.RESET): State.DISABLED,
-    (State.FAILED, Event.ESTOP_PRESS): State.FAILED,
-    (State.FAILED, Event.ESTOP_RELEASE): State.FAILED,
+    (BaxterState.DISABLED, Event.ENABLE): BaxterState.ENABLED,
+    (BaxterState.DISABLED, Event.DISABLE): BaxterState.DISABLED,
+    (BaxterState.DISABLED, Event.STOP): BaxterState.STOPPED,
+    (BaxterState.DISABLED, Event.RESET): BaxterState.DISABLED,
+    (BaxterState.DISABLED, Event.ESTOP_PRESS): BaxterState.ESTOP_PRESSED,
+    (BaxterState.DISABLED, Event.ESTOP_RELEASE): BaxterState.DISABLED,
+    (BaxterState.ENABLED, Event.ENABLE): BaxterState.ENABLED,
+    (BaxterState.ENABLED, Event.DISABLE): BaxterState.DISABLED,
+    (BaxterState.ENABLED, Event.STOP): BaxterState.STOPPED,
+    (BaxterState.ENABLED, Event.RESET): BaxterState.DISABLED,
+    (BaxterState.ENABLED, Event.ESTOP_PRESS): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ENABLED, Event.ESTOP_RELEASE): BaxterState.ENABLED,
+    (BaxterState.STOPPED, Event.ENABLE): BaxterState.STOPPED,
+    (BaxterState.STOPPED, Event.DISABLE): BaxterState.STOPPED,
+    (BaxterState.STOPPED, Event.STOP): BaxterState.STOPPED,
+    (BaxterState.STOPPED, Event.RESET): BaxterState.DISABLED,
+    (BaxterState.STOPPED, Event.ESTOP_PRESS): BaxterState.ESTOP_PRESSED,
+    (BaxterState.STOPPED, Event.ESTOP_RELEASE): BaxterState.STOPPED,
+    (BaxterState.ESTOP_PRESSED, Event.ENABLE): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_PRESSED, Event.DISABLE): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_PRESSED, Event.STOP): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_PRESSED, Event.RESET): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_PRESSED, Event.ESTOP_PRESS): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_PRESSED, Event.ESTOP_RELEASE): BaxterState.ESTOP_RELEASED,
+    (BaxterState.ESTOP_RELEASED, Event.ENABLE): BaxterState.ESTOP_RELEASED,
+    (BaxterState.ESTOP_RELEASED, Event.DISABLE): BaxterState.ESTOP_RELEASED,
+    (BaxterState.ESTOP_RELEASED, Event.STOP): BaxterState.ESTOP_RELEASED,
+    (BaxterState.ESTOP_RELEASED, Event.RESET): BaxterState.DISABLED,
+    (BaxterState.ESTOP_RELEASED, Event.ESTOP_PRESS): BaxterState.ESTOP_PRESSED,
+    (BaxterState.ESTOP_RELEASED, Event.ESTOP_RELEASE): BaxterState.ESTOP_RELEASED,
+    (BaxterState.FAILED, Event.ENABLE): BaxterState.FAILED,
+    (BaxterState.FAILED, Event.DISABLE): BaxterState.FAILED,
+    (BaxterState.FAILED, Event.STOP): BaxterState.FAILED,
+    (BaxterState.FAILED, Event.RESET): BaxterState.DISABLED,
+    (BaxterState.FAILED, Event.ESTOP_PRESS): BaxterState.FAILED,
+    (BaxterState.FAILED, Event.ESTOP_RELEASE): BaxterState.FAILED,
 }
 
 # Requests that a state refuses, with a hint for the user.
 REFUSALS = {
-    (State.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (%s)" % RESET,
-    (State.ESTOP_PRESSED, Event.ENABLE): "the emergency stop is pressed: release it, then reset, then enable",
-    (State.ESTOP_PRESSED, Event.RESET): "the emergency stop is pressed: release it, then reset",
-    (State.ESTOP_RELEASED, Event.ENABLE): "the emergency stop was released but not reset: %s" % RESET,
-    (State.FAILED, Event.ENABLE): "the robot has failed: reset it first (%s)" % RESET,
+    (BaxterState.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (%s)" % RESET,
+    (BaxterState.ESTOP_PRESSED, Event.ENABLE): "the emergency stop is pressed: release it, then reset, then enable",
+    (BaxterState.ESTOP_PRESSED, Event.RESET): "the emergency stop is pressed: release it, then reset",
+    (BaxterState.ESTOP_RELEASED, Event.ENABLE): "the emergency stop was released but not reset: %s" % RESET,
+    (BaxterState.FAILED, Event.ENABLE): "the robot has failed: reset it first (%s)" % RESET,
 }
 
 
 class RobotState:
     """The table with a current row."""
 
-    def __init__(self, state: State = State.DISABLED) -> None:
+    def __init__(self, state: BaxterState = BaxterState.DISABLED) -> None:
         self.state = state
 
     @property
     def enabled(self) -> bool:
-        return self.state is State.ENABLED
+        return self.state is BaxterState.ENABLED
 
     @property
     def assembly(self) -> Assembly:
@@ -145,7 +145,7 @@ class RobotState:
 
     def fail(self) -> None:
         """The robot's own software has failed."""
-        self.state = State.FAILED
+        self.state = BaxterState.FAILED
 
     def require_enabled(self) -> None:
         """Raises CommandRefused unless the robot is enabled."""

@@ -21,24 +21,24 @@ from .arms.actuators import Actuators
 from .arms.external_load import ExternalLoad
 from .arms.guarding import Guarding, guards_of
 from .arms.hand_load import HandLoads
-from .arms.joint_command import JointLimits
+from .arms.joint_command import ArmLimits
 from .arms.joint_sensors import JointSensors
 from .arms.measured import Measured
 from .arms.safety import Safety
 from .errors import CommandRefused
 from .grippers.hands import hand_of
 from .head import PanDrive
-from .robot import Baxter, Behaviour
+from .robot import BaxterHardware, Behaviour
 from .robot_state import Event
 from .sensing.noise import HandSensors
-from .snapshot import Snapshot
+from .snapshot import JointSnapshot
 
 if TYPE_CHECKING:
     from bullet_sim import Model, World
     from urdf_model import Robot
 
     from .arms.safety import Felt
-    from .robot_state import State
+    from .robot_state import BaxterState
 
 kernels.load()  # not within a tick
 
@@ -62,20 +62,20 @@ def _never(side: str) -> bool:
 
 class SimulatedBaxter:
     """world, model: of bullet_sim; robot: the model's description (urdf_model.Robot) with all its shapes;
-    which: `Which`; before: the robot_state.State of the robot that this one replaces, or None. Raises HardwareError
-    and, for a model that is no Baxter, ModelError.
+    which: `Which`; before: the robot_state.BaxterState of the robot that this one replaces, or None. Raises
+    HardwareError and, for a model that is no BaxterHardware, ModelError.
 
     Each tick the caller calls `measure`, then passes commands to `baxter`, `head` and the grippers of `hands`, then
-    calls `update`, then steps the world. Attributes: `baxter`, a `robot.Baxter`; `head`, a `head.PanDrive`; `hands`:
-    {side: one of `grippers.hands`}; `guarding`, an `arms.guarding.Guarding`; `chains`: {side: Chain}; `limb_index`:
-    {side: (7,) numbers of its joints in the model}; `arm_index`: (14,) of both; `chosen`: the set of effects,
-    `numbers`: what `effects.read` returns for them; `seed`: of their chance, 0 without; `hand_sensors`: of the effect
-    `noise`, or None; `before`: (position, velocity, effort) of all joints at the last `measure`, None where there was
-    none since they were put where they are.
+    calls `update`, then steps the world. Attributes: `baxter`, a `robot.BaxterHardware`; `head`, a `head.PanDrive`;
+    `hands`: {side: one of `grippers.hands`}; `guarding`, an `arms.guarding.Guarding`; `chains`: {side: Chain};
+    `limb_index`: {side: (7,) numbers of its joints in the model}; `arm_index`: (14,) of both; `chosen`: the set of
+    effects, `numbers`: what `effects.read` returns for them; `seed`: of their chance, 0 without; `hand_sensors`: of the
+    effect `noise`, or None; `before`: (position, velocity, effort) of all joints at the last `measure`, None where
+    there was none since they were put where they are.
     """
 
     def __init__(self, world: World, model: Model, robot: Robot, which: Which = Which(),  # noqa: B008 (a tuple)
-                 before: State | None = None, is_squeezed: Callable[[str], bool] = _never) -> None:
+                 before: BaxterState | None = None, is_squeezed: Callable[[str], bool] = _never) -> None:
         self.world, self.model, self._robot = world, model, robot
         limbs = limbs_of(robot)
         names = tuple(name for limb in limbs for name in limb.joint_names)
@@ -83,7 +83,7 @@ class SimulatedBaxter:
         if before is None:
             self._hold_other_joints()
         self.dt = world.time_step_s
-        limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
+        limits = ArmLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
         usual = effects.ALL if which.profile == "robot" else effects.NONE
         chosen = self.chosen = effects.chosen(usual if which.effects is None else which.effects)
         rows = self.numbers = effects.read(individual.numbers_of(which.serial)) if chosen else {}
@@ -92,7 +92,7 @@ class SimulatedBaxter:
         self._sensors = JointSensors(rows["noise"], names, self.seed, serial) if "noise" in chosen else None
         self.hand_sensors = HandSensors(rows, serial, self.seed) if "noise" in chosen else None
         behaviour = Behaviour(which.profile, which.disabled, Actuators(rows["lag"], names) if "lag" in chosen else None)
-        self.baxter = Baxter(limbs, limits, Measured(self._felt(), self._dynamics), self.dt, behaviour, before)
+        self.baxter = BaxterHardware(limbs, limits, Measured(self._felt(), self._dynamics), self.dt, behaviour, before)
         self.limb_index = {limb.side: model.index(limb.joint_names) for limb in limbs}
         self.chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=tip_of(side)) for side in self.limb_index}
         dead_band = 0.0 if "noise" not in chosen else effects.positive(rows["senses"], "head_dead_band", "head_pan")
@@ -215,11 +215,11 @@ class SimulatedBaxter:
         arm = self.arm_index
         self.model.drive_position(arm, self.model.read_joints()[0][arm], self.model.max_effort[arm])
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> JointSnapshot:
         """The joints after a step."""
-        return Snapshot(self.model, self.before, self.dt, self._sense, self._as_known)
+        return JointSnapshot(self.model, self.before, self.dt, self._sense, self._as_known)
 
-    def feel(self, side: str, snapshot: Snapshot | Felt) -> tuple[np.ndarray, np.ndarray]:
+    def feel(self, side: str, snapshot: JointSnapshot | Felt) -> tuple[np.ndarray, np.ndarray]:
         """External (torques (7,) [Nm], wrench (6,) [N, Nm] in `base`) on one arm's joints and on its tip."""
         index = self.limb_index[side]
         jacobian = self.chains[side].jacobian(snapshot.position[index])

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bullet_sim import Model
 
 
-class Snapshot:
+class JointSnapshot:
     """The model's joints after a step; expensive values are computed once, and only on demand.
 
     position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step

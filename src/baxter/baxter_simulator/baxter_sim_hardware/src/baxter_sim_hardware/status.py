@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from .errors import CommandRefused
-from .robot_state import State
+from .robot_state import BaxterState
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus
 
 
-def level_of(state: State) -> tuple[int, str]:
-    """(level, text) of a robot_state.State: a stopped robot needs a person."""
-    return (OK if state in (State.ENABLED, State.DISABLED) else ERROR), state.value
+def level_of(state: BaxterState) -> tuple[int, str]:
+    """(level, text) of a robot_state.BaxterState: a stopped robot needs a person."""
+    return (OK if state in (BaxterState.ENABLED, BaxterState.DISABLED) else ERROR), state.value
 
 
 def check_fragment(link: str, joint: str, xml: str, links: Collection[str]) -> None:

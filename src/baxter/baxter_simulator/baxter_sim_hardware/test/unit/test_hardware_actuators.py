@@ -11,7 +11,7 @@ from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms.actuators import Actuators
 from baxter_sim_hardware.arms.joint_sensors import JointSensors
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 
 HEARD = ("joint_states",)
 
@@ -276,7 +276,7 @@ def test_effects_by_name(words, wanted):
 
 @pytest.mark.parametrize("words", ["lags", "lag;noise", True, 3, None])
 def test_an_unknown_effect_is_refused_with_the_names(words):
-    with pytest.raises(HardwareError, match=r"effects (is|has) .*lag"):
+    with pytest.raises(BaxterHardwareError, match=r"effects (is|has) .*lag"):
         effects.chosen(words)
 
 
@@ -286,7 +286,7 @@ def test_an_unknown_effect_is_refused_with_the_names(words):
 def test_bad_files_say_what_is_wrong(tmp_path, text, said):
     path = tmp_path / "robot.yaml"
     path.write_text(text)
-    with pytest.raises(HardwareError, match=said):
+    with pytest.raises(BaxterHardwareError, match=said):
         effects.read(path)
 
 
@@ -296,7 +296,7 @@ def test_bad_files_say_what_is_wrong(tmp_path, text, said):
 def test_numbers_that_no_actuator_has_are_refused(number, value, said):
     rows = effects.read(effects.physical_robot())["lag"]
     rows[number] = {**rows[number], "s0": value} if value is not None else {"s1": 1.0}
-    with pytest.raises(HardwareError, match=said):
+    with pytest.raises(BaxterHardwareError, match=said):
         Actuators(rows, ["%s_s0" % side for side in SIDES])
 
 

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baxter_model import JOINTS
-from baxter_sim_hardware.arms.joint_command import CommandParser, JointLimits, Mode
+from baxter_sim_hardware.arms.joint_command import ArmLimits, CommandParser, Mode
 from baxter_sim_hardware.errors import CommandRefused
 
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
-LIMITS = JointLimits(
+LIMITS = ArmLimits(
     NAMES,
     lower=np.tile([-1.70167993878, -2.147, -3.05417993878, -0.05, -3.059, -1.57079632679, -3.059], 2),
     upper=np.tile([1.70167993878, 1.047, 3.05417993878, 2.618, 3.059, 2.094, 3.059], 2),
@@ -118,7 +118,7 @@ def test_fuzzed_commands_are_refused_or_inside_the_limits(side, mode, names, val
 
 def test_limits_of_the_wrong_length_are_an_error():
     with pytest.raises(ValueError, match="lower has shape"):
-        JointLimits(("a", "b"), [0.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0])
+        ArmLimits(("a", "b"), [0.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0])
 
 
 def test_a_huge_command_is_refused_at_once():

@@ -10,7 +10,7 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Bool, Empty, Float64
 
-from baxter_sim_hardware.robot_state import State
+from baxter_sim_hardware.robot_state import BaxterState
 from baxter_sim_hardware.topics import interface
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
@@ -232,7 +232,7 @@ def test_a_resting_robot_does_not_move_when_it_restarts(loop, monkeypatch):
 
 
 @pytest.mark.parametrize("message, state", [
-    (("set_super_enable", Bool(False)), State.DISABLED), (("set_super_stop", Empty()), State.STOPPED)])
+    (("set_super_enable", Bool(False)), BaxterState.DISABLED), (("set_super_stop", Empty()), BaxterState.STOPPED)])
 def test_a_robot_that_was_not_enabled_is_not_afterwards(loop, monkeypatch, message, state):
     loop.lab.send(*message)
     loop.run(0.5)
@@ -245,7 +245,7 @@ def test_an_emergency_stop_outlasts_a_beginning(loop, monkeypatch):
     loop.lab.services["sim/press"](PressRequest(component="estop", action="press"))
     fail_in(loop, monkeypatch, 1)
     loop.run(0.1)
-    assert loop.plugin._baxter.state.state is State.ESTOP_PRESSED
+    assert loop.plugin._baxter.state.state is BaxterState.ESTOP_PRESSED
 
 
 REVIVALS = {

@@ -8,8 +8,8 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 
 import xacro
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.grippers.commands import CustomGripper
-from baxter_sim_hardware.grippers.electric import ElectricGripper
+from baxter_sim_hardware.grippers.commands import CustomGripperHardware
+from baxter_sim_hardware.grippers.electric import ElectricGripperHardware
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
@@ -47,7 +47,7 @@ def take(gripper, command, args="", enabled=True):
     ("configure", '{"speed": 1}', "speed is 1; parameters are"),
 ])
 def test_senseless_commands_are_refused(command, args, text):
-    gripper = ElectricGripper(0.02, 1.0)
+    gripper = ElectricGripperHardware(0.02, 1.0)
     with pytest.raises(CommandRefused) as refusal:
         take(gripper, command, args)
     assert text in str(refusal.value)
@@ -57,7 +57,7 @@ def test_senseless_commands_are_refused(command, args, text):
 @pytest.mark.parametrize("command, args", [("go", '{"position": 0}'), ("grip", ""), ("release", ""), ("calibrate", "")])
 def test_disabled_robot_moves_no_finger(command, args):
     with pytest.raises(CommandRefused, match="not enabled"):
-        take(ElectricGripper(0.02, 1.0), command, args, enabled=False)
+        take(ElectricGripperHardware(0.02, 1.0), command, args, enabled=False)
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -269,7 +269,7 @@ def test_fingers_that_may_use_no_force_give_up(lab):
 @pytest.mark.parametrize("target, hooked", [(100.0, True), (0.0, False)])
 def test_fingers_that_rattle_where_they_jam_come_to_rest(target, hooked):
     """Slow enough to count as standing still, without progress, and with less force than a grip needs."""
-    gripper, seen = ElectricGripper(0.02, 0.6), []
+    gripper, seen = ElectricGripperHardware(0.02, 0.6), []
     take(gripper, "go", '{"position": %g}' % target)
     for tick in range(500):
         gripper.update(0.6 + 3e-4 * (-1) ** tick, lambda: 36.0)
@@ -344,7 +344,7 @@ def test_a_tool_that_only_the_client_knows(make_lab, bare_robot):
     tell(lab, "go", '{"position": 0}')
     assert "unknown gripper command 'go'; choices are no_op, set, configure" in lab.log.lines[-1]
     with pytest.raises(CommandRefused, match="velocity is 3; parameters are none"):
-        take(CustomGripper(), "configure", '{"velocity": 3}')
+        take(CustomGripperHardware(), "configure", '{"velocity": 3}')
 
 
 def test_a_gripper_that_the_robot_knows_is_not_renamed(lab):

@@ -8,7 +8,7 @@ from baxter_core_msgs.msg import HeadPanCommand
 from std_msgs.msg import Bool
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.head import ACCELERATION, FULL_SPEED, NOD_S, Head
+from baxter_sim_hardware.head import ACCELERATION, FULL_SPEED, NOD_S, HeadHardware
 
 HEARD = ("head/head_state", "joint_states")
 LIMIT = math.pi / 2
@@ -30,7 +30,7 @@ def travel(head):
 @pytest.mark.parametrize("ratio, speed", [
     (0.05, 0.42), (0.1, 0.84), (1.0, FULL_SPEED), (0.0, FULL_SPEED), (3.0, FULL_SPEED)])
 def test_ratio_bounds_the_speed_and_zero_means_full(ratio, speed):
-    head = Head(-LIMIT, LIMIT, 0.0)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0)
     head.command_pan(1.5, ratio)
     path = travel(head)
     assert path[-1] == 1.5
@@ -42,13 +42,13 @@ def test_ratio_bounds_the_speed_and_zero_means_full(ratio, speed):
 
 
 def test_targets_are_clamped_to_the_limits():
-    head = Head(-LIMIT, LIMIT, 0.0)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0)
     head.command_pan(-4.0, 1.0)
     assert travel(head)[-1] == -LIMIT
 
 
 def test_a_coarse_head_stops_short_and_does_not_start_for_less():
-    head = Head(-LIMIT, LIMIT, 0.0, dead_band=0.05)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0, dead_band=0.05)
     head.command_pan(0.8, 1.0)
     assert travel(head)[-1] == pytest.approx(0.75)
     head.command_pan(0.79, 1.0)
@@ -59,14 +59,14 @@ def test_a_coarse_head_stops_short_and_does_not_start_for_less():
 
 @pytest.mark.parametrize("target, ratio", [(math.nan, 1.0), (math.inf, 1.0), (0.5, math.nan), (0.5, -0.1)])
 def test_senseless_pan_is_refused(target, ratio):
-    head = Head(-LIMIT, LIMIT, 0.0)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0)
     with pytest.raises(CommandRefused, match="they must be an angle and a number from 0 to 1"):
         head.command_pan(target, ratio)
     assert (travel(head) == 0.0).all()
 
 
 def test_disabled_pan_stays_until_it_is_enabled():
-    head = Head(-LIMIT, LIMIT, 0.0)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0)
     head.command_pan(1.0, 1.0, enable=False)
     head.command_pan(1.0, 1.0)
     assert not head.pan_enabled and travel(head)[-1] == 0.0
@@ -75,7 +75,7 @@ def test_disabled_pan_stays_until_it_is_enabled():
 
 
 def test_a_nod_ends_and_is_not_prolonged_by_repeated_commands():
-    head = Head(-LIMIT, LIMIT, 0.0)
+    head = HeadHardware(-LIMIT, LIMIT, 0.0)
     assert not head.is_nodding(3.0)
     head.nod(3.0)
     head.nod(3.0 + 0.9 * NOD_S)

@@ -11,7 +11,7 @@ import pytest
 import xacro
 from baxter_model import SIDES
 from baxter_sim_hardware import effects, individual
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer.pinhole import Pinhole
 from urdf_model import parse_urdf
@@ -91,7 +91,7 @@ def test_the_hand_is_where_the_robots_own_mount_puts_it(make_lab, drawing, rows)
 
 @pytest.mark.parametrize("serial", [-1, "three", 2.5, True, None, 2 ** 31])
 def test_what_is_no_serial_is_refused(serial):
-    with pytest.raises(HardwareError, match="serial is .*; it must be a whole number"):
+    with pytest.raises(BaxterHardwareError, match="serial is .*; it must be a whole number"):
         individual.checked(serial)
 
 

@@ -11,7 +11,7 @@ from std_msgs.msg import Empty
 
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.sensing import navigator_lights
-from baxter_sim_hardware.sensing.panel import ANALOG, BLOWERS, DIGITAL, LIGHTS, NAVIGATORS, PUMPS, Panel
+from baxter_sim_hardware.sensing.panel import ANALOG, BLOWERS, DIGITAL, LIGHTS, NAVIGATORS, PUMPS, ControlPanel
 from model_files.resources import ResourceFinder
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
@@ -24,7 +24,7 @@ BAXTER = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxte
 
 
 def test_outputs_follow_and_inputs_refuse():
-    panel = Panel()
+    panel = ControlPanel()
     panel.set_digital("torso_left_outer_light", True)
     assert panel.digital["torso_left_outer_light"]
     assert sum(panel.digital.values()) == 1
@@ -35,14 +35,14 @@ def test_outputs_follow_and_inputs_refuse():
 
 @pytest.mark.parametrize("value", [0, 1, 37, 100, 65535])
 def test_analog_outputs_keep_the_integer(value):
-    panel = Panel()
+    panel = ControlPanel()
     panel.set_analog("torso_fan", value)
     assert panel.analog["torso_fan"] == value
 
 
 @pytest.mark.parametrize("name, value", [("torso_fan", -1), ("torso_fan", 65536), ("left_wheel", 3), ("fan", 3)])
 def test_bad_analog_commands_change_nothing(name, value):
-    panel = Panel()
+    panel = ControlPanel()
     with pytest.raises(CommandRefused, match="must be from 0 to 65535|is not an analog output; choices are torso_fan"):
         panel.set_analog(name, value)
     assert not any(panel.analog.values())
@@ -50,7 +50,7 @@ def test_bad_analog_commands_change_nothing(name, value):
 
 @pytest.mark.parametrize("navigator", NAVIGATORS)
 def test_navigator_is_its_buttons_wheel_and_lights(navigator):
-    panel = Panel()
+    panel = ControlPanel()
     panel.press(navigator + "_button_back")
     panel.turn(navigator + "_wheel", -3)
     panel.set_digital(navigator + "_outer_light", True)
@@ -63,7 +63,7 @@ def test_navigator_is_its_buttons_wheel_and_lights(navigator):
 
 
 def test_fingers_press_only_what_is_there():
-    panel = Panel()
+    panel = ControlPanel()
     with pytest.raises(CommandRefused, match="'left_inner_light' is not a digital input; choices are left_button_back"):
         panel.press("left_inner_light")
     with pytest.raises(CommandRefused, match="'torso_fan' is not a wheel; choices are left_wheel"):

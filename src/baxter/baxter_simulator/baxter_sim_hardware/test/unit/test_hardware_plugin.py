@@ -12,7 +12,7 @@ from std_msgs.msg import Bool, Empty, Float64, UInt16
 
 from baxter_model import JOINTS, ModelMismatch
 from baxter_model.description import limbs_of
-from baxter_sim_hardware.robot_state import State
+from baxter_sim_hardware.robot_state import BaxterState
 from baxter_sim_hardware.topics import interface
 from gazebo_ros.model_plugin import PluginError
 from urdf_model import parse_urdf
@@ -326,7 +326,7 @@ def test_starting_over_leaves_nothing_of_what_was_set(make_lab):
     lab.plugin.start_over()
     arms = lab.plugin._baxter.arms
     assert (arms.speed_ratio("left"), arms.timeout("left")) == (1.0, 0.2)
-    assert lab.plugin._baxter.state.state is State.DISABLED
+    assert lab.plugin._baxter.state.state is BaxterState.DISABLED
     before = lab.model.read_joints()[0]
     lab.run(0.5)
     np.testing.assert_allclose(lab.model.read_joints()[0], before, atol=1e-3)

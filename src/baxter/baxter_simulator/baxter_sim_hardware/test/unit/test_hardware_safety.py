@@ -11,7 +11,7 @@ from baxter_model.self_collision import BODY
 from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms import avoidance, collision
 from baxter_sim_hardware.arms.safety import blocks_of
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 from bullet_sim import Pose
 from bullet_sim.mesh_loading import load_scene
 from model_files.resources import ResourceFinder
@@ -305,7 +305,7 @@ def test_distance_and_closing_speed_to_the_body_are_those_of_the_geometry(make_l
 @pytest.mark.parametrize("row, said", [({"x_least": 0.0}, "has no 'y_least'"), (
     dict.fromkeys(("x_least", "y_least", "z_least", "x_most", "y_most", "z_most", "first_joint"), 1.0), "not greater")])
 def test_blocks_that_are_none_are_refused(row, said):
-    with pytest.raises(HardwareError, match=said):
+    with pytest.raises(BaxterHardwareError, match=said):
         blocks_of({"torso_back": row})
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.robot_state import Event, RobotState, State
+from baxter_sim_hardware.robot_state import BaxterState, Event, RobotState
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "baxter_sim_hardware"
 # Written out independently of the code: (state, event, state after, is a refusal).
@@ -50,8 +50,8 @@ failed reset disabled -
 failed press failed -
 failed release failed -
 """
-STATES = {"disabled": State.DISABLED, "enabled": State.ENABLED, "stopped": State.STOPPED,
-          "pressed": State.ESTOP_PRESSED, "released": State.ESTOP_RELEASED, "failed": State.FAILED}
+STATES = {"disabled": BaxterState.DISABLED, "enabled": BaxterState.ENABLED, "stopped": BaxterState.STOPPED,
+          "pressed": BaxterState.ESTOP_PRESSED, "released": BaxterState.ESTOP_RELEASED, "failed": BaxterState.FAILED}
 EVENTS = {"enable": Event.ENABLE, "disable": Event.DISABLE, "stop": Event.STOP, "reset": Event.RESET,
           "press": Event.ESTOP_PRESS, "release": Event.ESTOP_RELEASE}
 
@@ -66,7 +66,7 @@ def test_transition(row):
 
 
 def test_every_pair_has_a_row():
-    assert len(ROWS.strip().splitlines()) == len(State) * len(Event)
+    assert len(ROWS.strip().splitlines()) == len(BaxterState) * len(Event)
 
 
 @pytest.mark.parametrize("name, fields", [  # ready enabled stopped error estop_button estop_source
@@ -84,14 +84,14 @@ def test_wire_fields(name, fields):
 
 
 def test_refusal_says_what_to_do():
-    robot = RobotState(State.STOPPED)
+    robot = RobotState(BaxterState.STOPPED)
     with pytest.raises(CommandRefused, match="reset it first"):
         robot.apply(Event.ENABLE)
 
 
 def test_what_needs_power_is_refused_in_every_other_state():
-    RobotState(State.ENABLED).require_enabled()
-    for state in set(State) - {State.ENABLED}:
+    RobotState(BaxterState.ENABLED).require_enabled()
+    for state in set(BaxterState) - {BaxterState.ENABLED}:
         with pytest.raises(CommandRefused, match="not enabled"):
             RobotState(state).require_enabled()
 

@@ -10,7 +10,7 @@ import xacro
 from baxter_model import ModelMismatch
 from baxter_model.description import cup_of
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.grippers.suction import SuctionGripper
+from baxter_sim_hardware.grippers.suction import SuctionGripperHardware
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
@@ -83,13 +83,13 @@ def distance(lab, box):
 ])
 def test_senseless_commands_are_refused(command, args, text):
     with pytest.raises(CommandRefused) as refusal:
-        SuctionGripper().take(command, args, "", 0, True)
+        SuctionGripperHardware().take(command, args, "", 0, True)
     assert text in str(refusal.value)
 
 
 def test_disabled_robot_sucks_not():
     with pytest.raises(CommandRefused, match="not enabled"):
-        SuctionGripper().take("go", "", "", 0, False)
+        SuctionGripperHardware().take("go", "", "", 0, False)
 
 
 @pytest.mark.parametrize("side", SIDES)

@@ -61,4 +61,4 @@ def test_of_one_limb_the_node_itself_is_listed_and_of_several_each_limb(node):
 def test_a_frame_with_a_zero_is_refused_at_once_by_name(node):
     """tf2's library raises an error of its own for such names."""
     with pytest.raises(node.InvalidRequest, match=r"^'no\\x00where' is not a frame"):
-        node.Frames("base").pose_of("no\0where", node.rospy.Time(), node.time.monotonic() + 60.0)
+        node.RobotFrames("base").pose_of("no\0where", node.rospy.Time(), node.time.monotonic() + 60.0)

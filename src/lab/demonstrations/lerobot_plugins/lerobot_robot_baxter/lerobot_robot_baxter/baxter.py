@@ -9,9 +9,9 @@ from typing import Any
 from lerobot.robots import Robot, RobotConfig
 
 from . import wire
-from .cameras import Stream
+from .cameras import CameraStream
 from .over_rosbridge import OverRosbridge
-from .rosbridge import Bridge
+from .rosbridge import RosbridgeClient
 
 #: {camera: topic of its images}
 CAMERAS = {"head": "/cameras/head_camera/image", "left_hand": "/cameras/left_hand_camera/image",
@@ -59,7 +59,7 @@ class Baxter(OverRosbridge, Robot):
     def __init__(self, config: BaxterConfig):
         super().__init__(config)
         self.config = config
-        self.cameras: dict[str, Stream | None] = dict.fromkeys(config.camera_names)
+        self.cameras: dict[str, CameraStream | None] = dict.fromkeys(config.camera_names)
         self._set_points: dict[str, float] = {}
         self._sent_at = 0.0
         self._openings: dict[str, float | None] = {}
@@ -75,7 +75,7 @@ class Baxter(OverRosbridge, Robot):
         """Find the robot. Raises ConnectionError."""
         if self.is_connected:
             raise ConnectionError("%s is connected already" % self)
-        bridge = Bridge(self.config.address)
+        bridge = RosbridgeClient(self.config.address)
         try:
             self._begin(bridge)
         except Exception:
@@ -83,15 +83,15 @@ class Baxter(OverRosbridge, Robot):
             raise
         self._bridge, self._set_points, self._openings = bridge, {}, dict.fromkeys(wire.SIDES)
         for camera in self.cameras:
-            self.cameras[camera] = Stream(self.config.pictures, CAMERAS[camera], self.config.camera_height,
-                                          self.config.camera_width)
+            self.cameras[camera] = CameraStream(self.config.pictures, CAMERAS[camera], self.config.camera_height,
+                                                self.config.camera_width)
         try:
             self._pictures(_FOUND_WITHIN_S)
         except ConnectionError:
             self.disconnect()
             raise
 
-    def _begin(self, bridge: Bridge) -> None:
+    def _begin(self, bridge: RosbridgeClient) -> None:
         bridge.subscribe(wire.JOINT_STATES, wire.TYPES[wire.JOINT_STATES], takes=wire.has_both_arms)
         states = [wire.gripper_topic(side, "state") for side in wire.SIDES]
         for topic in (wire.ROBOT_STATE, *states):
@@ -117,7 +117,7 @@ class Baxter(OverRosbridge, Robot):
         if self.config.drive and not state()["enabled"]:
             raise ConnectionError("the robot is not enabled; enable it, or say --robot.enable=true")
 
-    def _require(self) -> Bridge:
+    def _require(self) -> RosbridgeClient:
         if self._bridge is None:
             raise ConnectionError("%s is not connected" % self)
         return self._bridge

@@ -40,7 +40,7 @@ def parts(stream: BinaryIO) -> Iterator[bytes]:
         yield content
 
 
-class Stream:
+class CameraStream:
     """topic: of a camera's images; address: http:// of web_video_server; (height, width) of the pictures."""
 
     def __init__(self, address: str, topic: str, height: int, width: int, timeout_s: float = 5.0):

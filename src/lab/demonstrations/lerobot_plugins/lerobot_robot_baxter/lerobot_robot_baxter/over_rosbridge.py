@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from . import wire
-from .rosbridge import Bridge
+from .rosbridge import RosbridgeClient
 
 
 class OverRosbridge:
     """A base in front of LeRobot's own class."""
 
-    _bridge: Bridge | None = None
+    _bridge: RosbridgeClient | None = None
 
     @property
     def action_features(self) -> dict[str, Any]:

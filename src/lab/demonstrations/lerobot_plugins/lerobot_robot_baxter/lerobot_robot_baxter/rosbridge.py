@@ -15,12 +15,13 @@ import websocket
 _QUEUE = 100
 
 
-class BridgeError(ConnectionError):
+class RosbridgeError(ConnectionError):
     """The connection to a rosbridge cannot be made, or has ended; the text has its address and the reason."""
 
 
-class Bridge:
-    """address: ws://HOST:PORT; timeout_s: for the connection and for each message that is sent. Raises BridgeError."""
+class RosbridgeClient:
+    """address: ws://HOST:PORT; timeout_s: for the connection and for each message that is sent. Raises
+    RosbridgeError."""
 
     def __init__(self, address: str, timeout_s: float = 5.0):
         self.address = address
@@ -28,7 +29,7 @@ class Bridge:
             self._socket = websocket.create_connection(address, timeout=timeout_s)
             self._socket.settimeout(None)
         except (OSError, ValueError, websocket.WebSocketException) as error:
-            raise BridgeError("there is no rosbridge at %s: %s" % (address, error)) from error
+            raise RosbridgeError("there is no rosbridge at %s: %s" % (address, error)) from error
         self._lock, self._came = threading.Lock(), threading.Condition()
         self._newest: dict[str, tuple[dict[str, Any], float]] = {}
         self._queues: dict[str, deque[dict[str, Any]]] = {}
@@ -51,11 +52,11 @@ class Bridge:
         self._send({"op": "advertise", "topic": topic, "type": kind})
 
     def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Raises BridgeError."""
+        """Raises RosbridgeError."""
         self._send({"op": "publish", "topic": topic, "msg": message})
 
     def newest(self, topic: str) -> tuple[dict[str, Any], float] | None:
-        """The newest message and its age [s], None before the first. Raises BridgeError."""
+        """The newest message and its age [s], None before the first. Raises RosbridgeError."""
         with self._came:
             self._require()
             found = self._newest.get(topic)
@@ -70,7 +71,7 @@ class Bridge:
         return found
 
     def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether a condition on what came is true within the time. Raises BridgeError."""
+        """Whether a condition on what came is true within the time. Raises RosbridgeError."""
         end = time.monotonic() + timeout_s
         while not condition():
             left = end - time.monotonic()
@@ -94,7 +95,7 @@ class Bridge:
 
     def _require(self):
         if self._end:
-            raise BridgeError("the connection to %s has ended: %s" % (self.address, self._end))
+            raise RosbridgeError("the connection to %s has ended: %s" % (self.address, self._end))
 
     def _send(self, operation):
         with self._lock:

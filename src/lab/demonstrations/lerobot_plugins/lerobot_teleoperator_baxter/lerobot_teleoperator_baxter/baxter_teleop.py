@@ -9,7 +9,7 @@ from lerobot.teleoperators import Teleoperator, TeleoperatorConfig
 from lerobot.teleoperators.utils import TeleopEvents
 from lerobot_robot_baxter import wire
 from lerobot_robot_baxter.over_rosbridge import OverRosbridge
-from lerobot_robot_baxter.rosbridge import Bridge
+from lerobot_robot_baxter.rosbridge import RosbridgeClient
 
 _FOUND_WITHIN_S = 5.0
 #: {source: topic}: what its arms are told, or where they are.
@@ -54,7 +54,7 @@ class BaxterTeleop(OverRosbridge, Teleoperator):
         """Find the robot. Raises ConnectionError."""
         if self.is_connected:
             raise ConnectionError("%s is connected already" % self)
-        topic, bridge = SOURCES[self.config.source], Bridge(self.config.address)
+        topic, bridge = SOURCES[self.config.source], RosbridgeClient(self.config.address)
         bridge.subscribe(topic, wire.TYPES[topic], takes=wire.has_both_arms)
         needed = [topic]
         for side in wire.SIDES:

@@ -23,7 +23,7 @@ MARKS_TOPIC = "/steering/mark"
 _ARMS = [name for side in SIDES for name in joint_names(side)]
 _OPENING = {EndEffectorCommand.CMD_GRIP: 0.0, EndEffectorCommand.CMD_RELEASE: 100.0}
 
-#: (key, value, stamp or None) of `watching.Recorder.take`
+#: (key, value, stamp or None) of `watching.WatchingRecorder.take`
 Said = Iterable[tuple[str, Any, float | None]]
 
 

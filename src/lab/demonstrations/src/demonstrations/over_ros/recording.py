@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from command_line.options import Parser, number
 
 from ..frames import MARKS, MAX_RATE_HZ, DemonstrationError
-from ..watching import Recorder, schema_of
+from ..watching import WatchingRecorder, schema_of
 from ..writing import SetWriter
 from .messages import CAMERAS, MARKS_TOPIC, Heard, topics
 
@@ -98,7 +98,8 @@ def sizes(feed: Feed, heard: Mapping[str, Heard], cameras: Sequence[str]) -> dic
     return found
 
 
-def record(feed: Feed, heard: Mapping[str, Heard], recorder: Recorder, size: Mapping[str, tuple[int, int]]) -> None:
+def record(feed: Feed, heard: Mapping[str, Heard], recorder: WatchingRecorder,
+           size: Mapping[str, tuple[int, int]]) -> None:
     """Pass a feed to a recorder until it ends. Raises DemonstrationError, OSError."""
     for item in feed:
         for key, value, stamp in heard[item[0]].says(item[1]) if item else ():
@@ -129,7 +130,7 @@ def run(options: argparse.Namespace) -> None:
     with contextlib.closing(feed()) as first:
         size = sizes(first, heard, options.cameras)
     with SetWriter(options.folder, schema_of(options.rate, size, options.models)) as writer:
-        recorder = Recorder(writer, options.task, say=say)
+        recorder = WatchingRecorder(writer, options.task, say=say)
         say("recording into %s, which has %d episodes" % (options.folder, writer.episodes))
         record(feed(), heard, recorder, size)
         if recorder.length:

@@ -19,7 +19,7 @@ from command_line.options import MAX_SEED, Parser, number
 
 from ..frames import DemonstrationError
 from ..reading import DataSet
-from ..replaying import Limits, Replay, actions_of, reason_to_stop
+from ..replaying import Replay, ReplayLimits, actions_of, reason_to_stop
 from .messages import joints
 
 #: Set-points a second, and the wall time in which the robot must be heard [s].
@@ -37,12 +37,12 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
                "wrong options.")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="a set of `rosrun demonstrations record`")
     parser.add_argument("--episode", type=number(int, 0, MAX_SEED), default=0, metavar="N", help="default: the first")
-    parser.add_argument("--speed", type=number(float, 0.0, 1.5, above=True), default=Limits.speed_rad_s,
+    parser.add_argument("--speed", type=number(float, 0.0, 1.5, above=True), default=ReplayLimits.speed_rad_s,
                         metavar="RAD_S", help="on the way to the start (default: %(default)s rad/s)")
     return parser.parse_args(argv)
 
 
-class Robot:
+class ReplayRobot:
     """Both arms and grippers of a master. Raises DemonstrationError where it is not heard."""
 
     def __init__(self) -> None:
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace) -> None:
     data = DataSet(options.folder)
     actions = actions_of(data, options.episode)
     rospy.init_node("demonstrations_replay")
-    robot, limits = Robot(), Limits(options.speed)
+    robot, limits = ReplayRobot(), ReplayLimits(options.speed)
     assert robot.angles is not None
     replay = Replay(actions, data.schema.rate_hz, robot.angles, limits)
     print("%.1f s to the start, then %d frames in %.1f s" % (

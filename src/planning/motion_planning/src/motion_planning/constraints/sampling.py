@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from motion_planning.constraints import ConstraintSet
     from motion_planning.constraints.targets import OrientationTarget, PositionTarget
     from motion_planning.exact import ExactChecker
-    from motion_planning.kinematics import Limb
+    from motion_planning.kinematics import GroupLimb
     from motion_planning.model import Group, PlanningModel
     from motion_planning.scene import Scene
 
@@ -200,7 +200,7 @@ class Sampler:
                 yield q
             first = False
 
-    def _independent(self, links: Sequence[str]) -> list[Limb]:
+    def _independent(self, links: Sequence[str]) -> list[GroupLimb]:
         """The limbs of those of ``links`` that share no joint, the most constrained ones first. Raises
         KinematicsFailure."""
         def weight(link: str) -> tuple[int, int]:
@@ -226,7 +226,7 @@ class Sampler:
         whole[self._group.indices] = near
         return self._model.wrapped(whole)
 
-    def _solutions(self, limbs: Sequence[Limb], first: bool) -> list[np.ndarray]:
+    def _solutions(self, limbs: Sequence[GroupLimb], first: bool) -> list[np.ndarray]:
         """Postures [q (n,), ...] that put each link of ``limbs`` at a pose within its constraints.
 
         ``first``: one posture at the middle of them, near the scene's state.

@@ -6,10 +6,10 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from motion_planning.constraints.targets import (
-    Context,
     JointTarget,
     OrientationTarget,
     PositionTarget,
+    StateInScene,
     VisibilityTarget,
 )
 
@@ -49,12 +49,12 @@ class ConstraintSet:
         ``exact``: ExactChecker that tells whether a link blocks a line of sight; None: no such check. Raises
         ConstraintError for names that neither the robot nor the scene has.
         """
-        context = Context(model, state, scene, exact)
+        context = StateInScene(model, state, scene, exact)
         return [one.evaluate(context) for one in self.all]
 
     def broken(self, model: PlanningModel, state: State, scene: Scene, exact: ExactChecker | None = None) -> str | None:
         """Return the sentence of the first violated constraint, None if all hold. Raises ConstraintError."""
-        context = Context(model, state, scene, exact)
+        context = StateInScene(model, state, scene, exact)
         return next((result.sentence for result in (one.evaluate(context) for one in self.all)
                      if not result.satisfied), None)
 

@@ -55,7 +55,7 @@ class JointTarget:
             raise ConstraintError("tolerances of joint '%s' are +%g and -%g; expected 0 or more"
                                   % (self.joint, self.above, self.below))
 
-    def evaluate(self, context: Context) -> Evaluation:
+    def evaluate(self, context: StateInScene) -> Evaluation:
         index = context.variable(self.joint)
         value = float(context.state.q[index])
         off = value - self.position
@@ -95,7 +95,7 @@ class PositionTarget:
                 raise ConstraintError("the position of link '%s' has a %s as region, which has no volume"
                                       % (self.link, type(shape).__name__))
 
-    def evaluate(self, context: Context) -> Evaluation:
+    def evaluate(self, context: StateInScene) -> Evaluation:
         link, frame = context.link_pose(self.link), context.frame(self.frame)
         point = link[:3, :3] @ self.offset + link[:3, 3]
         distances, inside = [], False
@@ -145,7 +145,7 @@ class OrientationTarget:
                                   % (self.link, list(self.tolerances)))
         object.__setattr__(self, "rotation", read_only(rotation))
 
-    def evaluate(self, context: Context) -> Evaluation:
+    def evaluate(self, context: StateInScene) -> Evaluation:
         wanted = context.frame(self.frame)[:3, :3] @ self.rotation
         turn = wanted.T @ context.link_pose(self.link)[:3, :3] @ self.axes
         angles = self.angles(turn)
@@ -205,7 +205,7 @@ class VisibilityTarget:
                                   "or more, got %s, %s and %s" % (self.view_axis, self.cone_sides, self.target_radius))
         object.__setattr__(self, "may_touch", (*self.may_touch, self.target_frame, self.sensor_frame))
 
-    def evaluate(self, context: Context) -> Evaluation:
+    def evaluate(self, context: StateInScene) -> Evaluation:
         target = context.frame(self.target_frame) @ self.target_pose
         sensor = context.frame(self.sensor_frame) @ self.sensor_pose
         axis, line = sensor[:3, 2 - self.view_axis], target[:3, 3] - sensor[:3, 3]
@@ -225,7 +225,7 @@ class VisibilityTarget:
                                       "target" % contact.a)
         return Evaluation(True, 0.0, "")
 
-    def _in_the_way(self, context: Context, exact: ExactChecker, sensor: np.ndarray,
+    def _in_the_way(self, context: StateInScene, exact: ExactChecker, sensor: np.ndarray,
                     target: np.ndarray) -> list[Contact]:
         turns = np.linspace(0.0, 2.0 * math.pi, self.cone_sides, endpoint=False)
         rim = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=1) * self.target_radius
@@ -242,7 +242,7 @@ class VisibilityTarget:
         return self  # one of the two moves with the robot, otherwise the constraint could not be influenced
 
 
-class Context:
+class StateInScene:
     """A state of a robot in a scene, with the frames of both looked up once."""
 
     def __init__(self, model: PlanningModel, state: State, scene: Scene, exact: ExactChecker | None = None) -> None:

@@ -15,7 +15,16 @@ import numpy as np
 from motion_planning.errors import PlanningError
 from motion_planning.exact import kernels
 from motion_planning.exact.geometry import grown, plane_overlap, simple_of
-from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part, without_fixed_joints
+from motion_planning.exact.tables import (
+    ATTACHED,
+    OBJECT,
+    ROBOT,
+    CheckedShape,
+    Fixed,
+    Geometries,
+    Movers,
+    without_fixed_joints,
+)
 from motion_planning.model import ModelError
 from motion_planning.shapes import Octree, TriangleMesh
 from urdf_model import Mesh, Plane
@@ -287,7 +296,7 @@ class ExactChecker:
 
     # -- tables -------------------------------------------------------------------------------------------------
 
-    def _robot_parts(self, meshes: Meshes) -> list[Part]:
+    def _robot_parts(self, meshes: Meshes) -> list[CheckedShape]:
         parts = []
         for index, name in enumerate(self.model.links):
             for collision in self.model.robot.links[name].collisions:
@@ -296,7 +305,7 @@ class ExactChecker:
                 except PlanningError as error:
                     self.warnings.append("%s; link '%s' is checked without it" % (error, name))
                     continue
-                parts.append(Part(name, ROBOT, index, shape, collision.origin))
+                parts.append(CheckedShape(name, ROBOT, index, shape, collision.origin))
         return parts
 
     def _kept(self, key: Hashable, held: object, make: Callable[[], T]) -> T:
@@ -324,7 +333,7 @@ class ExactChecker:
             parts = [part._replace(shape=grown(part.shape, scene.link_padding.get(part.name, 0.0),
                                                scene.link_scale.get(part.name, 1.0))) for part in parts]
         bodies = state.attached.values()
-        held = [Part(body.id, ATTACHED, self.model.link_index[body.link], shape, body.object.pose @ pose)
+        held = [CheckedShape(body.id, ATTACHED, self.model.link_index[body.link], shape, body.object.pose @ pose)
                 for body in bodies for shape, pose in body.object.shapes]
         return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies},
                       self._carriers)
@@ -350,7 +359,7 @@ class ExactChecker:
         return self._kept(*self._fixed_key(scene), lambda: self._make_fixed(scene))
 
     def _make_fixed(self, scene: Scene) -> Fixed:
-        return Fixed([Part(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in _things(scene)
+        return Fixed([CheckedShape(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in _things(scene)
                       for shape, pose in thing.shapes], self._geometries)
 
 
@@ -386,7 +395,7 @@ class _Query:
             self._memory[key] = self._allowed.allowed(*key)
         return self._memory[key]
 
-    def part(self, j: int) -> Part:
+    def part(self, j: int) -> CheckedShape:
         return self.movers.parts[j] if j >= 0 else self.fixed.parts[-1 - j]
 
     def geometry(self, j: int) -> Any:

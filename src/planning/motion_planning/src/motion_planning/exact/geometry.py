@@ -26,7 +26,7 @@ _SLIVER = 1e-9
 _MIN_SIDE_M = 1e-9
 
 
-class Bounds(NamedTuple):
+class ShapeBounds(NamedTuple):
     """A box around a shape, along the shape's axes, and a ball about the same centre [m], in the shape's frame."""
 
     centre: np.ndarray
@@ -34,7 +34,7 @@ class Bounds(NamedTuple):
     radius: float
 
 
-class Form(NamedTuple):
+class ShapeForm(NamedTuple):
     """nodes (n, 6) of a shape that is made of parts and, of a mesh, heights (d,): see ``apart``."""
 
     nodes: np.ndarray
@@ -57,25 +57,25 @@ def simple_of(shape: Geometry) -> tuple[int, tuple[float, float, float], float] 
     return None
 
 
-def bounds_of(shape: Geometry) -> Bounds:
-    """Return the :class:`Bounds` of a shape. Raises TypeError for other objects."""
+def bounds_of(shape: Geometry) -> ShapeBounds:
+    """Return the :class:`ShapeBounds` of a shape. Raises TypeError for other objects."""
     simple = simple_of(shape)
     if simple is not None:
-        return Bounds(np.zeros(3), np.array(simple[1]), simple[2])
+        return ShapeBounds(np.zeros(3), np.array(simple[1]), simple[2])
     if isinstance(shape, TriangleMesh):
         low, high = shape.corners.min(axis=0), shape.corners.max(axis=0)
         centre = 0.5 * (low + high)
-        return Bounds(centre, 0.5 * (high - low), float(np.linalg.norm(shape.corners - centre, axis=1).max()))
+        return ShapeBounds(centre, 0.5 * (high - low), float(np.linalg.norm(shape.corners - centre, axis=1).max()))
     if isinstance(shape, Octree):
         side = 0.5 * shape.boxes[:, 3:]
         low, high = (shape.boxes[:, :3] - side).min(axis=0), (shape.boxes[:, :3] + side).max(axis=0)
         half = 0.5 * (high - low)
-        return Bounds(0.5 * (low + high), half, float(np.linalg.norm(half)))
+        return ShapeBounds(0.5 * (low + high), half, float(np.linalg.norm(half)))
     raise TypeError("%r is not a shape that can collide" % (shape,))
 
 
-def form_of(shape: Geometry, bounds: Bounds) -> Form:
-    """Return the Form of a mesh or octree with these Bounds. Raises TypeError for other objects."""
+def form_of(shape: Geometry, bounds: ShapeBounds) -> ShapeForm:
+    """Return the ShapeForm of a mesh or octree with these ShapeBounds. Raises TypeError for other objects."""
     if isinstance(shape, TriangleMesh):
         corners = shape.vertices[shape.triangles]
         low, high, order = corners.min(axis=1), corners.max(axis=1), np.arange(len(corners))[None]
@@ -104,7 +104,7 @@ def form_of(shape: Geometry, bounds: Bounds) -> Form:
     while True:
         found.append(np.concatenate([0.5 * (low + high) - bounds.centre, 0.5 * (high - low)], axis=1))
         if len(low) == 1:
-            return Form(np.concatenate(found[::-1]), heights)
+            return ShapeForm(np.concatenate(found[::-1]), heights)
         low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
 
 

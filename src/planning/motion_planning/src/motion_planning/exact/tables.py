@@ -15,7 +15,7 @@ from motion_planning.exact.geometry import bounds_of, fcl_geometry, form_of, sim
 
 if TYPE_CHECKING:
     from motion_planning.exact.apart import Forms
-    from motion_planning.exact.geometry import Bounds, Form
+    from motion_planning.exact.geometry import ShapeBounds, ShapeForm
     from motion_planning.model.kernels import Kinematics
     from motion_planning.scene import AllowedCollisions
     from motion_planning.shapes import Geometry
@@ -30,7 +30,7 @@ _CHUNK = 32
 _MAX_PAIRS = 5_000_000
 
 
-class Part(NamedTuple):
+class CheckedShape(NamedTuple):
     """One shape of something. name: of the link or object; kind: ROBOT, OBJECT or ATTACHED; link: index of the link
     that it moves with, -1 where it stands in the world; pose (4, 4): in that link, or in the planning frame."""
 
@@ -66,8 +66,8 @@ class Geometries:
     def __init__(self) -> None:
         self._known, self._geometries = WeakKeyDictionary(), WeakKeyDictionary()
 
-    def of(self, shape: Geometry) -> tuple[Bounds, Form]:
-        """Return the Bounds and the Form of a mesh or octree."""
+    def of(self, shape: Geometry) -> tuple[ShapeBounds, ShapeForm]:
+        """Return the ShapeBounds and the ShapeForm of a mesh or octree."""
         entry = self._known.get(shape)
         if entry is None:
             bounds = bounds_of(shape)
@@ -110,9 +110,9 @@ class Geometries:
 class Movers:
     """Shapes that move with the robot."""
 
-    def __init__(self, parts: Sequence[Part], geometries: Geometries, touch: Mapping[str, frozenset[str]],
+    def __init__(self, parts: Sequence[CheckedShape], geometries: Geometries, touch: Mapping[str, frozenset[str]],
                  carriers: Sequence[Carrier]) -> None:
-        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}; carriers: see
+        """``parts``: [CheckedShape]; ``touch``: {name of something held: links that it may touch}; carriers: see
         ``without_fixed_joints``."""
         self.parts, self.touch = parts, touch
         self.geometries = [geometries.geometry(part.shape) for part in parts]
@@ -149,7 +149,7 @@ class Movers:
             return np.empty((0, 2), dtype=np.int64)
         return np.sort(np.concatenate(found), axis=1)
 
-    def _may_touch(self, allowed: AllowedCollisions, ones: Sequence[Part]) -> np.ndarray:
+    def _may_touch(self, allowed: AllowedCollisions, ones: Sequence[CheckedShape]) -> np.ndarray:
         """(n, n) bool: whether two of ``ones`` (n Parts), one of each thing, may touch."""
         may = allowed.among([one.name for one in ones])
         links = np.array([one.link for one in ones])
@@ -167,7 +167,7 @@ class Movers:
 class Fixed:
     """Shapes that stand in the world."""
 
-    def __init__(self, parts: Sequence[Part], geometries: Geometries) -> None:
+    def __init__(self, parts: Sequence[CheckedShape], geometries: Geometries) -> None:
         count = len(parts)
         poses = np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4)
         local, halves, radii, (kinds, firsts, counts, nodes, slabs, heights) = geometries.tables(

@@ -13,10 +13,10 @@ from motion_planning.timing import Timed
 from urdf_model.transforms import rigid
 
 if TYPE_CHECKING:
-    from motion_planning.cartesian import Follower, Line
+    from motion_planning.cartesian import Line, LineFollower
     from motion_planning.industrial.curves import Arc
     from motion_planning.industrial.limits import CartesianLimits
-    from motion_planning.industrial.sequence import Piece
+    from motion_planning.industrial.sequence import SequencePiece
 
 # Points of a corner: greatest distance in time [s], and least number.
 _SPACING_S, _FEWEST = 0.25 * WINDOW_S, 16
@@ -30,7 +30,7 @@ class Blend:
     and the joints follow it; else the joints are summed.
     """
 
-    def __init__(self, one: Piece, other: Piece, overlap: float) -> None:
+    def __init__(self, one: SequencePiece, other: SequencePiece, overlap: float) -> None:
         """one, other: commands in time (way, timed, profile)."""
         self.overlap = overlap
         self._ways = one.way, other.way
@@ -61,7 +61,7 @@ class Blend:
                          math.sqrt(bend / (scaling[1] * max(limits.trans_acceleration, limits.trans_deceleration))))
         return excess / 0.999
 
-    def _follow(self, paths: tuple[Line | Arc, Line | Arc], follower: Follower, before: np.ndarray,
+    def _follow(self, paths: tuple[Line | Arc, Line | Arc], follower: LineFollower, before: np.ndarray,
                 after: np.ndarray) -> None:
         """Move the joints' sum to where the link's sum is; before, after (m,): fractions of both ways."""
         one, other = paths

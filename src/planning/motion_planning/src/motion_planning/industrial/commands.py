@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from motion_planning.cartesian import CartesianError, Follower, Line
+from motion_planning.cartesian import CartesianError, Line, LineFollower
 from motion_planning.errors import PlanningError
 from motion_planning.industrial.curves import NoCircle, Spline, Straight, arc_about, arc_through
 from motion_planning.industrial.goals import goal_of
@@ -59,7 +59,7 @@ class Auxiliary:
 
 
 @dataclass(frozen=True, eq=False)
-class Command:
+class IndustrialCommand:
     """query: PlanQuery with planner_id of :data:`PLANNERS` and exactly one goal; its path constraints do not influence
     the planning, but the trajectory must satisfy them. auxiliary: for CIRC. start_velocities: of the group's joints, if
     known."""
@@ -70,16 +70,16 @@ class Command:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class IndustrialMotion:
     """A command's path. curve: joints (k,) by the fraction of it; path: poses of the link, None for PTP; follower: of
     the link, None if the group has none; limits (3,): velocity, acceleration and deceleration of the fraction; moves:
     false if start and goal are the same; scene: Scene at the start."""
 
-    command: Command
+    command: IndustrialCommand
     scene: Scene
     curve: Straight | Spline
     path: Line | Arc | None
-    follower: Follower | None
+    follower: LineFollower | None
     limits: Limits
     moves: bool = True
 
@@ -107,8 +107,8 @@ class Motion:
         return self.curve.at(np.ones(1))[0][0]
 
 
-def plan(command: Command, tools: Tools, limits: CartesianLimits) -> Plan:
-    """Return the pipeline.Plan of a :class:`Command`; tools: pipeline.Tools; limits: CartesianLimits.
+def plan(command: IndustrialCommand, tools: Tools, limits: CartesianLimits) -> Plan:
+    """Return the pipeline.Plan of a :class:`IndustrialCommand`; tools: pipeline.Tools; limits: CartesianLimits.
 
     PTP: all joints start and arrive together, each with the same share of its motion at each time. LIN, CIRC: the link
     follows its path within DEVIATION_M and DEVIATION_RAD, with its rotation in step. The speed is a trapezoid; limits
@@ -122,8 +122,8 @@ def plan(command: Command, tools: Tools, limits: CartesianLimits) -> Plan:
     return Plan(command.query.scene.state, timed.positions, timed, tools.clock() - begin)
 
 
-def motion(command: Command, tools: Tools, limits: CartesianLimits) -> Motion:
-    """Return the :class:`Motion` of a command. Raises PlanningFailure."""
+def motion(command: IndustrialCommand, tools: Tools, limits: CartesianLimits) -> IndustrialMotion:
+    """Return the :class:`IndustrialMotion` of a command. Raises PlanningFailure."""
     query, model = command.query, command.query.scene.model
     _understand(command)
     group = model.groups[query.group]
@@ -135,18 +135,18 @@ def motion(command: Command, tools: Tools, limits: CartesianLimits) -> Motion:
         slowest = scaling[0] * model.velocity[group.indices].min(), scaling[1] * model.acceleration[group.indices].min()
         moves = reach > _NOTHING
         speeds = tuple(limit / max(reach, _NOTHING) for limit in (*slowest, slowest[1]))
-        follower = Follower(model, group, query.scene.state, goal.link, None) if goal.link else None
-        return Motion(command, query.scene, Straight(start, goal.q), None, follower, speeds, moves)
+        follower = LineFollower(model, group, query.scene.state, goal.link, None) if goal.link else None
+        return IndustrialMotion(command, query.scene, Straight(start, goal.q), None, follower, speeds, moves)
     follower, end = _follower(query, group, goal)
     path = _path(command, follower.pose_of_link(start), end)
     if path.length < _NOTHING and path.angle < _NOTHING:
-        return Motion(command, query.scene, Straight(start, start), path, follower, (1.0, 1.0, 1.0), False)
+        return IndustrialMotion(command, query.scene, Straight(start, start), path, follower, (1.0, 1.0, 1.0), False)
     curve = _followed(path, follower, start, (query.planner_id, tools.stop))
-    return Motion(command, query.scene, curve, path, follower, limits.along(path.length, path.angle, scaling))
+    return IndustrialMotion(command, query.scene, curve, path, follower, limits.along(path.length, path.angle, scaling))
 
 
-def in_time(way: Motion, limits: Limits | None = None, stretch: float = 1.0) -> tuple[Timed, Profile, float]:
-    """Return (Timed, Profile, factor by which it takes longer than by its own limits) of a Motion.
+def in_time(way: IndustrialMotion, limits: Limits | None = None, stretch: float = 1.0) -> tuple[Timed, Profile, float]:
+    """Return (Timed, Profile, factor by which it takes longer than by its own limits) of a IndustrialMotion.
 
     limits: velocity, acceleration and deceleration of the fraction, None: the Motion's; stretch: least factor by which
     it takes longer. Raises PlanningFailure if the joints need far longer.
@@ -208,7 +208,7 @@ def check(scene: Scene, query: PlanQuery, timed: Timed, tools: Tools) -> None:
                 raise PlanningFailure(Code.INVALID_MOTION_PLAN, "the way violates the path constraints: %s" % violated)
 
 
-def _understand(command: Command) -> None:
+def _understand(command: IndustrialCommand) -> None:
     """Raise PlanningFailure for an incomplete or impossible command."""
     query, model = command.query, command.query.scene.model
     if query.planner_id not in PLANNERS:
@@ -234,18 +234,18 @@ def _understand(command: Command) -> None:
                               "limits are %.4f and %.4f" % beyond[0], joints={beyond[0][0]: beyond[0][1]})
 
 
-def _follower(query: PlanQuery, group: Group, goal: Goal) -> tuple[Follower, np.ndarray]:
-    """The Follower of the goal's link, and the link's pose at the goal."""
+def _follower(query: PlanQuery, group: Group, goal: Goal) -> tuple[LineFollower, np.ndarray]:
+    """The LineFollower of the goal's link, and the link's pose at the goal."""
     if goal.link is None or goal.pose is None:
         raise PlanningFailure(Code.NO_IK_SOLUTION, "group '%s' is not a chain; %s needs a link to move: give a pose as "
                               "goal, or another group" % (group.name, query.planner_id))
     try:
-        return Follower(query.scene.model, group, query.scene.state, goal.link, None), goal.pose
+        return LineFollower(query.scene.model, group, query.scene.state, goal.link, None), goal.pose
     except CartesianError as error:
         raise PlanningFailure(Code.NO_IK_SOLUTION, str(error)) from None
 
 
-def _path(command: Command, begin: np.ndarray, end: np.ndarray) -> Line | Arc:
+def _path(command: IndustrialCommand, begin: np.ndarray, end: np.ndarray) -> Line | Arc:
     if command.query.planner_id == "LIN":
         return Line(begin, end)
     auxiliary = command.auxiliary
@@ -261,7 +261,8 @@ def _path(command: Command, begin: np.ndarray, end: np.ndarray) -> Line | Arc:
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "no circle: %s" % error) from None
 
 
-def _followed(path: Line | Arc, follower: Follower, start: np.ndarray, doing: tuple[str, Callable[[], bool]]) -> Spline:
+def _followed(path: Line | Arc, follower: LineFollower, start: np.ndarray,
+              doing: tuple[str, Callable[[], bool]]) -> Spline:
     """The Spline of joints along ``path``; doing: (planner, stop())."""
     planner, stop = doing
     steps = max(_FEWEST_STEPS, math.ceil(path.length / _STEP_M), math.ceil(path.angle / _STEP_RAD))
@@ -279,14 +280,14 @@ def _followed(path: Line | Arc, follower: Follower, start: np.ndarray, doing: tu
     return Spline([0.0, *follower.fractions], points)
 
 
-def _points(way: Motion, profile: Profile, times: np.ndarray) -> Timed:
+def _points(way: IndustrialMotion, profile: Profile, times: np.ndarray) -> Timed:
     fraction, speed, rate = profile.at(times)
     value, slope, bend = way.curve.at(np.clip(fraction, 0.0, 1.0))
     speed, rate = speed[:, None], rate[:, None]
     return Timed(times, value, slope * speed, bend * speed**2 + slope * rate)
 
 
-def _deviation(way: Motion, profile: Profile, timed: Timed) -> float:
+def _deviation(way: IndustrialMotion, profile: Profile, timed: Timed) -> float:
     """The link's distance from its path between the points of a trajectory, as a multiple of the allowed distance."""
     if way.path is None or way.follower is None:
         return 0.0
@@ -300,14 +301,14 @@ def _deviation(way: Motion, profile: Profile, timed: Timed) -> float:
     return float(worst)
 
 
-def _excess(way: Motion, timed: Timed) -> float:
+def _excess(way: IndustrialMotion, timed: Timed) -> float:
     """The factor by which a trajectory must take longer to respect the joints' limits, 1 or less if it does."""
     model, indices = way.scene.model, way.group.indices
     speeds, accelerations = timed.peaks()
     return max((speeds / model.velocity[indices]).max(), math.sqrt((accelerations / model.acceleration[indices]).max()))
 
 
-def _too_slow(way: Motion, timed: Timed, slower: float) -> PlanningFailure:
+def _too_slow(way: IndustrialMotion, timed: Timed, slower: float) -> PlanningFailure:
     """The PlanningFailure of a path that a joint can follow only ``slower`` times as slowly."""
     speeds = timed.peaks()[0] / way.scene.model.velocity[way.group.indices]
     at, joint = np.unravel_index(speeds.argmax(), speeds.shape)

@@ -17,7 +17,7 @@ from motion_planning.pipeline import Code, Plan, PlanningFailure
 from motion_planning.timing import Timed
 
 if TYPE_CHECKING:
-    from motion_planning.industrial.commands import Command, Motion
+    from motion_planning.industrial.commands import IndustrialCommand, IndustrialMotion
     from motion_planning.industrial.limits import CartesianLimits
     from motion_planning.industrial.profile import Profile
     from motion_planning.pipeline import Tools
@@ -29,25 +29,25 @@ _SAME_S = 5e-3
 
 
 @dataclass
-class Piece:
-    """A Motion in time. begin [s]: in its trajectory; blend: the Blend that it begins with, or None."""
+class SequencePiece:
+    """A IndustrialMotion in time. begin [s]: in its trajectory; blend: the Blend that it begins with, or None."""
 
-    way: Motion
+    way: IndustrialMotion
     timed: Timed
     profile: Profile
     begin: float = 0.0
     blend: Blend | None = None
 
 
-def plan_sequence(commands: Sequence[Command], radii: Iterable[float], tools: Tools,
+def plan_sequence(commands: Sequence[IndustrialCommand], radii: Iterable[float], tools: Tools,
                   limits: CartesianLimits) -> list[tuple[str, Plan]]:
-    """Return [(group name, pipeline.Plan), ...] of :class:`Command`\\ s that follow each other. The first starts at its
-    scene's state, each other at the end of the previous one; their start states are ignored. radii (n,) [m]: distance
-    from a goal at which the link may leave its path for the next one; 0: it stops at the goal. Consecutive commands of
-    one group make one trajectory; the groups' trajectories are to be executed in the order given. Corners between two
-    groups are not rounded. In a corner of two LIN or CIRC the rotation is blended in step with the position. If a
-    corner would exceed a limit, the commands on both sides of it take longer. tools: pipeline.Tools; limits:
-    CartesianLimits. Raises PlanningFailure.
+    """Return [(group name, pipeline.Plan), ...] of :class:`IndustrialCommand`\\ s that follow each other. The first
+    starts at its scene's state, each other at the end of the previous one; their start states are ignored. radii (n,)
+    [m]: distance from a goal at which the link may leave its path for the next one; 0: it stops at the goal.
+    Consecutive commands of one group make one trajectory; the groups' trajectories are to be executed in the order
+    given. Corners between two groups are not rounded. In a corner of two LIN or CIRC the rotation is blended in step
+    with the position. If a corner would exceed a limit, the commands on both sides of it take longer. tools:
+    pipeline.Tools; limits: CartesianLimits. Raises PlanningFailure.
     """
     begin = tools.clock()
     radii = [float(radius) for radius in radii]
@@ -81,7 +81,7 @@ def plan_sequence(commands: Sequence[Command], radii: Iterable[float], tools: To
     return plans
 
 
-def _understand(commands: Sequence[Command], radii: list[float]) -> None:
+def _understand(commands: Sequence[IndustrialCommand], radii: list[float]) -> None:
     negative = [number for number, radius in enumerate(radii) if not 0.0 <= radius < np.inf]
     if negative:
         raise PlanningFailure(Code.INVALID_MOTION_PLAN, "blend_radius of command %d is %g; expected 0 or more"
@@ -94,7 +94,8 @@ def _understand(commands: Sequence[Command], radii: list[float]) -> None:
 class _Run:
     """Commands of one group that make one trajectory. first: number of commands of the sequence before them."""
 
-    def __init__(self, ways: list[Motion], radii: list[float], first: int, total: int, limits: CartesianLimits) -> None:
+    def __init__(self, ways: list[IndustrialMotion], radii: list[float], first: int, total: int,
+                 limits: CartesianLimits) -> None:
         self._ways, self._radii, self._first, self._total, self._limits = ways, radii, first, total, limits
         self._stretch = np.ones(len(ways))
         for number, radius in enumerate(radii):
@@ -123,7 +124,7 @@ class _Run:
         raise self._failure(number - 1, "the corner exceeds limits %.2f times however slow; make the blend radius "
                             "larger" % max(excesses))
 
-    def _pieces(self) -> list[Piece]:
+    def _pieces(self) -> list[SequencePiece]:
         pieces = []
         for number, way in enumerate(self._ways):
             before = self._cuts[number - 1] if number else None
@@ -133,13 +134,13 @@ class _Run:
                 timed, profile, self._stretch[number] = in_time(way, limits, self._stretch[number])
             except PlanningFailure as error:
                 raise failing(error, self._first + number + 1, self._total) from None
-            piece = Piece(way, timed, profile)
+            piece = SequencePiece(way, timed, profile)
             if pieces:
                 self._append(number, pieces[-1], piece)
             pieces.append(piece)
         return pieces
 
-    def _append(self, number: int, last: Piece, piece: Piece) -> None:
+    def _append(self, number: int, last: SequencePiece, piece: SequencePiece) -> None:
         """Place ``piece`` in time after ``last``, with a Blend if the corner is rounded."""
         piece.begin = last.begin + last.timed.duration
         cut = self._cuts[number - 1]
@@ -197,7 +198,7 @@ def _crossing(pose: Callable[[float], np.ndarray], corner: np.ndarray, radius: f
     return high
 
 
-def _points(pieces: list[Piece]) -> Timed:
+def _points(pieces: list[SequencePiece]) -> Timed:
     """One Timed of all pieces."""
     rows = []
     for piece, following in zip(pieces, [*pieces[1:], None], strict=True):

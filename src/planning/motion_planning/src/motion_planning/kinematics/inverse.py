@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from arm_kinematics import Target
-    from motion_planning.kinematics import Limb
+    from motion_planning.kinematics import GroupLimb
     from motion_planning.model import PlanningModel
 
 #: Number of solutions of each limb to combine before the search restarts from another seed.
@@ -66,7 +66,7 @@ def ik(model: PlanningModel, group: Group | str, poses: Mapping[str, np.ndarray]
     return _search(model, state.q, (limbs, targets), accept, (refusal, deadline, clock))
 
 
-def _search(model: PlanningModel, start: np.ndarray, problem: tuple[list[Limb], list[Target]],
+def _search(model: PlanningModel, start: np.ndarray, problem: tuple[list[GroupLimb], list[Target]],
             accept: Callable[[np.ndarray], str | None], progress: tuple[str, float, Callable[[], float]]) -> np.ndarray:
     """Return the first other solution that ``accept`` accepts: near ones first, then from random postures until the
     deadline."""
@@ -92,11 +92,11 @@ def _search(model: PlanningModel, start: np.ndarray, problem: tuple[list[Limb], 
         around = generator.uniform(model.bounds[:, 0], model.bounds[:, 1])
 
 
-def _seed_of(limb: Limb, q: np.ndarray) -> np.ndarray:
+def _seed_of(limb: GroupLimb, q: np.ndarray) -> np.ndarray:
     return np.clip(q[limb.indices], limb.chain.lower, limb.chain.upper)
 
 
-def _put(model: PlanningModel, q: np.ndarray, limbs: Sequence[Limb], parts: Sequence[np.ndarray]) -> np.ndarray:
+def _put(model: PlanningModel, q: np.ndarray, limbs: Sequence[GroupLimb], parts: Sequence[np.ndarray]) -> np.ndarray:
     """Return ``q`` (n,) with each limb's part (k,) inserted; continuous joints are wrapped to -pi to pi."""
     whole = np.array(q)
     for limb, part in zip(limbs, parts, strict=True):

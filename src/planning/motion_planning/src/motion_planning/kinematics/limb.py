@@ -31,7 +31,7 @@ class NoIkSolution(KinematicsFailure):
         self.rejected = rejected
 
 
-class Limb(NamedTuple):
+class GroupLimb(NamedTuple):
     """The joints of a group between one link and the nearest link that the group does not move.
 
     chain: their kinematics, from link ``base`` to ``link``; indices (k,): of its joints in the model's q.
@@ -73,8 +73,8 @@ class Limb(NamedTuple):
             return []
 
 
-def limbs_of(model: PlanningModel, group: Group, links: Iterable[str]) -> list[Limb]:
-    """Return a list of Limb, one for each of ``links`` (names), of the Group ``group``.
+def limbs_of(model: PlanningModel, group: Group, links: Iterable[str]) -> list[GroupLimb]:
+    """Return a list of GroupLimb, one for each of ``links`` (names), of the Group ``group``.
 
     Raises KinematicsFailure if a link is unknown, is not moved by the group, depends on a joint of another group in
     between, or shares a joint with another one of the links.
@@ -91,7 +91,7 @@ def limbs_of(model: PlanningModel, group: Group, links: Iterable[str]) -> list[L
 
 
 @lru_cache(maxsize=128)
-def _limb(model: PlanningModel, group_name: str, link: str) -> Limb:
+def _limb(model: PlanningModel, group_name: str, link: str) -> GroupLimb:
     group = model.group(group_name)
     if link not in model.link_index:
         raise KinematicsFailure("robot '%s' has no link '%s'" % (model.name, link))
@@ -109,4 +109,4 @@ def _limb(model: PlanningModel, group_name: str, link: str) -> Limb:
         chain = Chain.from_robot(model.robot, base, link)
     except ChainError as error:
         raise KinematicsFailure("link '%s' cannot be moved by group '%s': %s" % (link, group.name, error)) from None
-    return Limb(link, base, chain, read_only([model.index[name] for name in chain.joint_names], np.int64))
+    return GroupLimb(link, base, chain, read_only([model.index[name] for name in chain.joint_names], np.int64))

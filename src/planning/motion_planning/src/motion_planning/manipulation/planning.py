@@ -11,7 +11,7 @@ import numpy as np
 from motion_planning.cartesian import CartesianError, Steps, cartesian_path
 from motion_planning.errors import PlanningError
 from motion_planning.kinematics import KinematicsFailure, NoIkSolution, ik
-from motion_planning.manipulation.tasks import PickTask, Stage, by_quality, moved
+from motion_planning.manipulation.tasks import ManipulationStage, PickTask, by_quality, moved
 from motion_planning.pipeline import Code, PlanningFailure
 from motion_planning.timing import time_path
 
@@ -63,7 +63,7 @@ class ManipulationFailure(PlanningFailure):
 
 
 @dataclass(frozen=True, eq=False)
-class Tools:
+class ManipulationTools:
     """The tools of planning. exact: ExactChecker; plan(scene, q (k,), seconds): returns a pipeline.Plan of the group
     from the scene's state to ``q`` or raises PlanningError; clock: function that returns the time [s]; stop(): true
     ends the search; scaling: (velocity, acceleration) 0 < f <= 1 of the straight motions."""
@@ -76,10 +76,11 @@ class Tools:
 
 
 class Manipulation(NamedTuple):
-    """candidate: the valid Candidate; stages: [Stage, ...] in their order; falls: of those tried before it."""
+    """candidate: the valid Candidate; stages: [ManipulationStage, ...] in their order; falls: of those tried before
+    it."""
 
     candidate: Candidate
-    stages: list[Stage]
+    stages: list[ManipulationStage]
     falls: list[Fall]
 
 
@@ -91,7 +92,7 @@ class _Fallen(Exception):
 
 
 def plan_manipulation(task: PickTask | PlaceTask, candidates: Sequence[Candidate], allowed_time: float,
-                      tools: Tools) -> Manipulation:
+                      tools: ManipulationTools) -> Manipulation:
     """Return a :class:`Manipulation` of the best valid Candidate.
 
     task: PickTask or PlaceTask; candidates: list; allowed_time [s]. For each candidate, in the order of quality: a
@@ -137,7 +138,8 @@ def _failure(task: PickTask | PlaceTask, count: int, falls: list[Fall], late: bo
 class _Attempt:
     """One candidate while it is tried."""
 
-    def __init__(self, task: PickTask | PlaceTask, candidate: Candidate, tools: Tools, seconds: float) -> None:
+    def __init__(self, task: PickTask | PlaceTask, candidate: Candidate, tools: ManipulationTools,
+                 seconds: float) -> None:
         self.task, self.candidate, self.tools, self.seconds = task, candidate, tools, seconds
         self.model = task.scene.model
         self.group = self.model.groups[task.group]
@@ -145,7 +147,7 @@ class _Attempt:
         self.tried = self.free = 0
         self.fallen: _Fallen | None = None
 
-    def run(self) -> list[Stage]:
+    def run(self) -> list[ManipulationStage]:
         """Return the stages. Raises _Fallen."""
         if isinstance(self.task, PickTask) and self.task.minimize_distance:
             self.candidate = moved(self.candidate, self._closest(self.task))
@@ -157,12 +159,13 @@ class _Attempt:
         except PlanningError as error:
             raise _Fallen(PLAN, str(error), int(getattr(error, "code", Code.PLANNING_FAILED))) from None
         at_begin = scene.state.with_q(begin, self.group.indices)
-        stages = [Stage("plan", plan.timed, {}, self.task.on_the_way())]
+        stages = [ManipulationStage("plan", plan.timed, {}, self.task.on_the_way())]
         if self.candidate.before:
-            stages.append(Stage("pre_grasp", None, self.candidate.before, scene.with_state(at_begin)))
-        stages.append(Stage("approach", self._timed(approach, scene, APPROACH), {}, scene.with_state(at_begin)))
-        stages.append(Stage("grasp", None, self.candidate.after, after))
-        stages.append(Stage("retreat", self._timed(retreat, after, RETREAT), {}, after))
+            stages.append(ManipulationStage("pre_grasp", None, self.candidate.before, scene.with_state(at_begin)))
+        stages.append(ManipulationStage("approach", self._timed(approach, scene, APPROACH), {},
+                                        scene.with_state(at_begin)))
+        stages.append(ManipulationStage("grasp", None, self.candidate.after, after))
+        stages.append(ManipulationStage("retreat", self._timed(retreat, after, RETREAT), {}, after))
         return stages
 
     # -- the grasp ----------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ class Candidate:
     touch: frozenset[str] = frozenset()
 
 
-class Stage(NamedTuple):
+class ManipulationStage(NamedTuple):
     """A part of the motion. description: plan, pre_grasp, approach, grasp or retreat. timed: timing.Timed of the
     group's joints, None if the hand moves; posture: {joint: value} of the hand; scene: in which the motion is free,
     with the robot at the start of the stage."""

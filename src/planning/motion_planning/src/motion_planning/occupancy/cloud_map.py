@@ -11,7 +11,7 @@ from motion_planning.occupancy.occupancy_map import OccupancyMap, parts
 
 if TYPE_CHECKING:
     from motion_planning.occupancy.mask import Mask
-    from motion_planning.occupancy.occupancy_map import View
+    from motion_planning.occupancy.occupancy_map import SensorView
     from motion_planning.shapes import Octree
 
 # Room in the table of cells for each point: it must not be full.
@@ -27,8 +27,9 @@ class CloudMap(OccupancyMap):
         super().clear()
         self._of_sources: dict[str, np.ndarray] = {}
 
-    def see(self, view: View, mask: Mask, source: str = "") -> tuple[bool, np.ndarray]:
-        """Put a View in the place of the one that the ``source`` had before; points in the Mask are not obstacles.
+    def see(self, view: SensorView, mask: Mask, source: str = "") -> tuple[bool, np.ndarray]:
+        """Put a SensorView in the place of the one that the ``source`` had before; points in the Mask are not
+        obstacles.
 
         Returns (whether the cells have changed, (n,) bool: points outside of the mask, or too far).
         """

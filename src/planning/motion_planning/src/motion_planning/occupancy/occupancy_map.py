@@ -21,7 +21,7 @@ _HIT, _MISS, _MOST = 0.85, -0.4, 3.5
 _MAX_CELLS = 5e6
 
 
-class View(NamedTuple):
+class SensorView(NamedTuple):
     """points (n, 3) in the sensor's frame, NaN for none; sensor, map (4, 4): both frames in the planning frame when the
     points were measured; max_range [m]: farther points are not entered, but their rays clear cells up to this range."""
 
@@ -51,8 +51,9 @@ class OccupancyMap:
         """Remove all cells."""
         self._codes, self._odds = np.empty(0, np.int64), np.empty(0)
 
-    def see(self, view: View, mask: Mask, source: str = "") -> tuple[bool, np.ndarray]:
-        """Enter a :class:`View` of any source; points in the :class:`Mask` clear cells as rays, but are not obstacles.
+    def see(self, view: SensorView, mask: Mask, source: str = "") -> tuple[bool, np.ndarray]:
+        """Enter a :class:`SensorView` of any source; points in the :class:`Mask` clear cells as rays, but are not
+        obstacles.
 
         Returns (whether the cells have changed, (n,) bool: points outside of the mask).
         """

@@ -12,12 +12,12 @@ import numpy as np
 
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.planners.errors import NoPath
-from motion_planning.planners.trees import Path, Run
+from motion_planning.planners.trees import Path, TreeSearch
 
 if TYPE_CHECKING:
     from motion_planning.constraints import ConstraintSet
     from motion_planning.model import Group
-    from motion_planning.planners import Search
+    from motion_planning.planners import SearchOptions
     from motion_planning.scene import Scene
     from motion_planning.spheres import SphereChecker
 
@@ -39,12 +39,12 @@ class ConstrainedPlanning:
 
     _manifold: Manifold
 
-    def __init__(self, scene: Scene, group: Group, checker: SphereChecker, search: Search,
+    def __init__(self, scene: Scene, group: Group, checker: SphereChecker, search: SearchOptions,
                  constraints: ConstraintSet) -> None:
         self._scene, self._group, self._checker, self._search = scene, group, checker, search
         self._constraints = constraints
         self._random = np.random.default_rng(search.seed & (1 << 63) - 1)
-        self._run = Run(search.seed, search.clock() + search.allowed_time, search.clock, search.stop)
+        self._run = TreeSearch(search.seed, search.clock() + search.allowed_time, search.clock, search.stop)
         # Set after exact geometry has refused a path that is free by spheres.
         self._doubts_spheres = False
 

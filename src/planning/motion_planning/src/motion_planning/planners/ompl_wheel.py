@@ -13,7 +13,7 @@ from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path
 
 if TYPE_CHECKING:
-    from motion_planning.planners.trees import Run
+    from motion_planning.planners.trees import TreeSearch
     from motion_planning.spheres import SphereChecker
 
 #: Planners that improve the path until their time is over.
@@ -57,8 +57,8 @@ class OmplPlanner:
                                             if key not in _FOREIGN}
         self.remarks = self._made(_Space(None, np.zeros((1, 1))))[1]
 
-    def __call__(self, checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
-                 reach: float | None = None) -> Path:
+    def __call__(self, checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray,
+                 run: TreeSearch, reach: float | None = None) -> Path:
         """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker``. Raises NoPath."""
         start, goals = np.asarray(start, dtype=float), np.atleast_2d(np.asarray(goals, dtype=float))
         bounds = np.asarray(bounds, dtype=float)
@@ -90,7 +90,7 @@ class OmplPlanner:
                 remarks.append("planner %s cannot take '%s' for its setting '%s'" % (self.name, text, key))
         return planner, remarks
 
-    def _solve(self, space: _Space, ends: tuple[np.ndarray, np.ndarray], run: Run) -> np.ndarray | None:
+    def _solve(self, space: _Space, ends: tuple[np.ndarray, np.ndarray], run: TreeSearch) -> np.ndarray | None:
         base, _ = _library()
         begin = run.clock()
         deadline = begin + _SHARE * (run.deadline - begin) if self.name in ANYTIME else run.deadline

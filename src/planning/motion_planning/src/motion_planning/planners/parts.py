@@ -20,7 +20,7 @@ from motion_planning.planners.trees import SAMPLES, Path, growing, shorten
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from motion_planning.planners.trees import Run
+    from motion_planning.planners.trees import TreeSearch
     from motion_planning.spheres import SphereChecker
 
     Parts = Sequence[tuple[np.ndarray, SphereChecker]]
@@ -38,7 +38,7 @@ _PAIRS = 3
 _IN_A_TURN = 2 * SAMPLES
 
 
-def two_parts(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+def two_parts(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: TreeSearch,
               reach: float) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) for a ``checker`` of two parts, which are planned
     one by one where they get past each other so; its times are then of "shorten". Arguments and errors as in
@@ -62,7 +62,7 @@ def two_parts(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goa
     raise AssertionError("not reached")
 
 
-def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: Run,
+def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: TreeSearch,
                 reach: float) -> tuple[np.ndarray | None, int, float]:
     """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
     the parts cannot pass each other on these."""
@@ -80,8 +80,8 @@ def _one_by_one(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, g
     return points, samples, shortening
 
 
-def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: Run, reach: float,
-              yielding: int) -> tuple[np.ndarray | None, int]:
+def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goal: np.ndarray, run: TreeSearch,
+              reach: float, yielding: int) -> tuple[np.ndarray | None, int]:
     """(points (m, k), samples): a part moves to a random posture, then the other part to its goal, then the first part.
     The searches are bounded, since the posture may be out of reach; points are None where one of them ends."""
     indices, alone = checker.parts[yielding]
@@ -101,7 +101,7 @@ def _in_turns(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goa
     return np.concatenate(ways), samples
 
 
-def _free_posture_of(alone: SphereChecker, bounds: np.ndarray, run: Run) -> np.ndarray:
+def _free_posture_of(alone: SphereChecker, bounds: np.ndarray, run: TreeSearch) -> np.ndarray:
     """A random posture (j,) that is free for one part."""
     random, (low, high) = np.random.default_rng(run.seed), bounds.T
     while True:

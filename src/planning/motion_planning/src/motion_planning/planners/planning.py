@@ -16,7 +16,7 @@ from motion_planning.planners import kernels
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.parts import TOGETHER, two_parts
-from motion_planning.planners.trees import REACH, Path, Run, improve, rrt_connect, shorten
+from motion_planning.planners.trees import REACH, Path, TreeSearch, improve, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 from motion_planning.scene import Scene
 from motion_planning.spheres import Patience, SphereChecker, SphereModel, make_links
@@ -61,7 +61,7 @@ _sphere_models, _checkers, _made_links = (weakref.WeakKeyDictionary() for _ in r
 _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
 
-class Search(NamedTuple):
+class SearchOptions(NamedTuple):
     """Options of a search. exact: ExactChecker. seed: the same one gives the same path if the time suffices.
     allowed_time [s] on ``clock``, a function that returns seconds. stop: called every few ms; true ends the search.
     constraints: ConstraintSet for every state on the path, or None. planner: a function like ``rrt_connect`` that
@@ -138,7 +138,7 @@ def prepare(exact: ExactChecker) -> None:
     warm_up()
 
 
-def plan_path(scene: Scene, group: str, start: np.ndarray, goals: np.ndarray, search: Search) -> Path:
+def plan_path(scene: Scene, group: str, start: np.ndarray, goals: np.ndarray, search: SearchOptions) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
 
     Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten", "exact" and
@@ -159,7 +159,7 @@ def plan_path(scene: Scene, group: str, start: np.ndarray, goals: np.ndarray, se
 
 
 class _Planning:
-    def __init__(self, scene: Scene, group: str, search: Search) -> None:
+    def __init__(self, scene: Scene, group: str, search: SearchOptions) -> None:
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
         # The first plan of a robot may have to make its spheres: that must not use up its time.
@@ -168,7 +168,7 @@ class _Planning:
         self.times = {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
         end = self.begin + max(search.allowed_time, MIN_FOR_SCENE_S)
-        preparing = Run(search.seed, end, search.clock, search.stop)
+        preparing = TreeSearch(search.seed, end, search.clock, search.stop)
         self.checker = checker_of(search.exact, scene, self.group, Patience(
             lambda: not self._left(_SHARE_OF_TABLES), lambda: preparing.check("the scene was prepared for planning")))
         self._note("tables")
@@ -258,9 +258,10 @@ class _Planning:
             run.check("a path was looked for that exact geometry agrees with")
             checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
 
-    def _improved(self, path: Path, short: Path, how: tuple[SphereChecker, Run],
+    def _improved(self, path: Path, short: Path, how: tuple[SphereChecker, TreeSearch],
                   ways: tuple[np.ndarray, np.ndarray]) -> Path:
-        """``path``, or a shorter one if there is time: ``short`` improved, between two ``ways``. how: checker, Run."""
+        """``path``, or a shorter one if there is time: ``short`` improved, between two ``ways``. how: checker,
+        TreeSearch."""
         checker, run = how
         run = run._replace(deadline=self.begin + _SHARE_TO_IMPROVE * self.search.allowed_time)
         if not self.search.improve or not self._left(_SHARE_TO_IMPROVE):
@@ -275,7 +276,7 @@ class _Planning:
         finally:
             self._note("improve")
 
-    def _ways(self, start: np.ndarray, goals: np.ndarray, run: Run,
+    def _ways(self, start: np.ndarray, goals: np.ndarray, run: TreeSearch,
               with_room: bool = False) -> tuple[np.ndarray, list[np.ndarray]]:
         """(way from the start to where spheres are free, ways from there to the goals); goals without one are left
         out. with_room: see ``_way_out``."""
@@ -289,13 +290,13 @@ class _Planning:
         self._note("way out")
         return outwards, inwards
 
-    def _found(self, checker: SphereChecker, start: np.ndarray, goals: np.ndarray, run: Run) -> Path:
+    def _found(self, checker: SphereChecker, start: np.ndarray, goals: np.ndarray, run: TreeSearch) -> Path:
         """A Path by spheres to one of ``goals``."""
         if self.search.planner is rrt_connect and len(checker.parts) == 2:
             return two_parts(checker, self.bounds, start, goals, run, REACH)
         return self.search.planner(checker, self.bounds, start, goals, run)
 
-    def _way_out(self, q: np.ndarray, run: Run, with_room: bool = False) -> np.ndarray:
+    def _way_out(self, q: np.ndarray, run: TreeSearch, with_room: bool = False) -> np.ndarray:
         """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres; with_room: to the one
         of several with the most room around it, and on to where there is more."""
         if self.checker.valid(q)[0]:
@@ -372,7 +373,7 @@ class _Planning:
         parents.append(parent)
         return len(nodes) - 1
 
-    def _shortened(self, points: np.ndarray, run: Run) -> np.ndarray:
+    def _shortened(self, points: np.ndarray, run: TreeSearch) -> np.ndarray:
         """The path without the corners that exact geometry does not need, within the time limit."""
         k = 0
         while k + 2 < len(points):
@@ -407,7 +408,7 @@ class _Planning:
     def _all_free(self, states: np.ndarray) -> bool:
         return self.search.exact.first_blocked(self.scene, states, self.group.name) is None
 
-    def _path_is_free(self, points: np.ndarray, run: Run) -> bool:
+    def _path_is_free(self, points: np.ndarray, run: TreeSearch) -> bool:
         """Whether the path is free by exact geometry, at states between those that spheres have checked. Spheres
         contain the robot: if they are free, so is the robot. Exact geometry checks all other states, and in any case
         every eighth state and each corner.
@@ -426,8 +427,9 @@ class _Planning:
 
     # -- time ---------------------------------------------------------------------------------------------------
 
-    def _run(self, share: float) -> Run:
-        return Run(self.search.seed, self.begin + share * self.search.allowed_time, self.search.clock, self.search.stop)
+    def _run(self, share: float) -> TreeSearch:
+        return TreeSearch(self.search.seed, self.begin + share * self.search.allowed_time, self.search.clock,
+                          self.search.stop)
 
     def _note(self, part: str) -> None:
         """Add the time since the last note to that of a part of the work."""

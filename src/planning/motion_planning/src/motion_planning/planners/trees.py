@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from motion_planning.spheres import SphereChecker
 
     Trees = tuple[np.ndarray, np.ndarray, np.ndarray]
-    Planner = Callable[[SphereChecker, np.ndarray, np.ndarray, np.ndarray, "Run"], "Path"]
+    Planner = Callable[[SphereChecker, np.ndarray, np.ndarray, np.ndarray, "TreeSearch"], "Path"]
 
 #: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow passages.
 REACH = 0.5
@@ -48,7 +48,7 @@ class Path(NamedTuple):
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
-class Run(NamedTuple):
+class TreeSearch(NamedTuple):
     """seed: the same one gives the same path. deadline: on ``clock``, a function that returns seconds. stop: a function
     called every few ms; true ends the search. samples: the number of them after which a search gives up."""
 
@@ -66,7 +66,7 @@ class Run(NamedTuple):
             raise NoPath("time was over while %s" % what, late=True)
 
 
-def rrt_connect(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+def rrt_connect(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: TreeSearch,
                 reach: float = REACH) -> Path:
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker`` (SphereChecker).
 
@@ -76,7 +76,7 @@ def rrt_connect(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, g
     return next(path for path in growing(checker, bounds, start, goals, run, reach) if path is not None)
 
 
-def growing(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: Run,
+def growing(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals: np.ndarray, run: TreeSearch,
             reach: float = REACH) -> Iterator[Path | None]:
     """``rrt_connect`` in parts of ``SAMPLES`` samples: yields None after each one, and at last the Path."""
     start, goals = np.asarray(start, dtype=np.float32), np.atleast_2d(np.asarray(goals, dtype=np.float32))
@@ -101,13 +101,13 @@ def growing(checker: SphereChecker, bounds: np.ndarray, start: np.ndarray, goals
         yield None
 
 
-def shorten(path: Path, checker: SphereChecker, run: Run, tries: int = _TRIES, misses: int = _MISSES) -> Path:
+def shorten(path: Path, checker: SphereChecker, run: TreeSearch, tries: int = _TRIES, misses: int = _MISSES) -> Path:
     """Return the Path without detours for which ``checker`` finds a straight line; it is never longer than before. Ends
     after so many ``tries``, or so many ``misses`` in a row."""
     return _shorter(path, checker, _numbers(run.seed), (tries, misses, 0.0))
 
 
-def improve(path: Path, checker: SphereChecker, run: Run) -> Path:
+def improve(path: Path, checker: SphereChecker, run: TreeSearch) -> Path:
     """Return the Path after ``IMPROVING`` tries to make it shorter, some 20 ms for both arms of Baxter, or fewer if the
     deadline has passed. Raises NoPath if it is stopped."""
     numbers, tries, left = _numbers(run.seed), _FIRST_TRIES, IMPROVING

@@ -12,7 +12,7 @@ from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners import kernels
 from motion_planning.planners.errors import NoPath
-from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
+from motion_planning.planners.trees import Path, TreeSearch, rrt_connect, shorten
 from motion_planning.scene import Scene
 from motion_planning.spheres import SphereChecker, SphereModel
 from motion_planning.spheres.world_tables import solids_of
@@ -31,7 +31,7 @@ def warm_up() -> None:
     """Compile all code of planning, or load it from the cache."""
     model, meshes = PlanningModel.from_xml(_URDF, _SRDF), MeshReader(lambda filename: None)
     checker = SphereChecker(SphereModel.of(model, meshes), model.groups["arm"], Scene(model))
-    run = Run(seed=1, deadline=0.0, clock=time.monotonic)
+    run = TreeSearch(seed=1, deadline=0.0, clock=time.monotonic)
     ends = np.array([[0.5], [2.5]])
     try:
         rrt_connect(checker, model.bounds, ends[0], ends[1:], run)

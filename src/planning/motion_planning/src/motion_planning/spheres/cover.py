@@ -41,7 +41,7 @@ _MAX_SWEEPS = 24
 ROUNDING = 2e-5
 
 
-class Bound(NamedTuple):
+class WorkBound(NamedTuple):
     """Greatest work, beyond which geometry gets a larger tolerance. samples: of a mesh's surface; voxels: of the box
     around it; distances: samples times centres; spheres: of anything."""
 
@@ -52,9 +52,9 @@ class Bound(NamedTuple):
 
 
 #: For links of a robot, which are covered once and kept on disk. Most are meshes of half a metre; they take a second.
-OF_LINKS = Bound(8_000_000, 20_000_000, 1_000_000_000, 1_000_000)
+OF_LINKS = WorkBound(8_000_000, 20_000_000, 1_000_000_000, 1_000_000)
 #: For objects of a scene, while a plan waits: a few tenths of a second.
-OF_OBJECTS = Bound(2_000_000, 4_000_000, 200_000_000, 2_000)
+OF_OBJECTS = WorkBound(2_000_000, 4_000_000, 200_000_000, 2_000)
 
 
 class CoverError(ValueError):
@@ -78,7 +78,7 @@ def cover_object(parts: Sequence[Placed], tolerance: float) -> np.ndarray:
     return np.concatenate([[[used, 0.0, 0.0, 0.0]], spheres])
 
 
-def _cover(parts: Sequence[Placed], tolerance: float, bound: Bound) -> tuple[np.ndarray, float]:
+def _cover(parts: Sequence[Placed], tolerance: float, bound: WorkBound) -> tuple[np.ndarray, float]:
     """The spheres (n, 4), and the tolerance [m] that was used."""
     alone = [(geometry, pose) for geometry, pose in parts if isinstance(geometry, Sphere)]
     found = [np.append(pose[:3, 3], geometry.radius + ROUNDING) for geometry, pose in alone]
@@ -181,7 +181,7 @@ class _solid_box:
 class _solid_mesh:
     """A mesh as voxels: those of its surface and those that it encloses."""
 
-    def __init__(self, mesh: TriangleMesh, pose: np.ndarray, tolerance: float, bound: Bound) -> None:
+    def __init__(self, mesh: TriangleMesh, pose: np.ndarray, tolerance: float, bound: WorkBound) -> None:
         vertices, triangles = used_corners(np.asarray(mesh.vertices, dtype=float).reshape(-1, 3),
                                            np.asarray(mesh.triangles).reshape(-1, 3))
         # Surface voxels have no depth: the tolerance alone must extend a sphere to their corners.
@@ -220,7 +220,7 @@ class _solid_mesh:
         return nearest.astype(float)
 
 
-def _solid(geometry: Geometry, pose: np.ndarray, tolerance: float, bound: Bound) -> _solid_box | _solid_mesh:
+def _solid(geometry: Geometry, pose: np.ndarray, tolerance: float, bound: WorkBound) -> _solid_box | _solid_mesh:
     if isinstance(geometry, (Box, Cylinder)):
         return _solid_box(geometry, pose, tolerance)
     if isinstance(geometry, TriangleMesh):

@@ -20,7 +20,7 @@ from motion_planning.spheres import kernel
 from motion_planning.spheres.cover import ball
 from motion_planning.spheres.pair_maps import pair_map
 from motion_planning.spheres.sphere_model import Kept, Patience, object_spheres
-from motion_planning.spheres.world_tables import Tree, forest, pyramid, solids_of, tree_of
+from motion_planning.spheres.world_tables import BoxTree, forest, pyramid, solids_of, tree_of
 from urdf_model import Box, Cylinder, Plane
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class _Cluster(NamedTuple):
 class _Still(NamedTuple):
     """A link or an attached object that the group does not move; may: for each cluster, whether they may touch."""
 
-    tree: Tree
+    tree: BoxTree
     may: tuple[bool, ...]
 
 

@@ -41,7 +41,7 @@ class Solids(NamedTuple):
     high: np.ndarray
 
 
-class Tree(NamedTuple):
+class BoxTree(NamedTuple):
     """Objects and the boxes around them, counted from 0."""
 
     links: np.ndarray
@@ -195,15 +195,16 @@ def pyramid(cone: Cone) -> TriangleMesh:
                         np.concatenate([np.column_stack([k, after, tip]), np.column_stack([after, k, base])]))
 
 
-def tree_of(solids: Solids) -> Tree:
-    """Return the Tree over Solids: halves of the order in which a space-filling curve meets them, one object a leaf."""
+def tree_of(solids: Solids) -> BoxTree:
+    """Return the BoxTree over Solids: halves of the order in which a space-filling curve meets them, one object a
+    leaf."""
     count = len(solids.kinds)
     order = _along_curve(solids.low, solids.high)
     links = np.empty((max(0, 2 * count - 1), 2), np.int32)
     nodes = np.empty((len(links), 6), np.float32)
     _fill_tree(np.concatenate([solids.low[order] - _ROUNDING, solids.high[order] + _ROUNDING], axis=1).astype(
         np.float32), links, nodes)
-    return Tree(links, nodes, solids.kinds[order], solids.numbers[order])
+    return BoxTree(links, nodes, solids.kinds[order], solids.numbers[order])
 
 
 @compiled
@@ -255,7 +256,7 @@ def _codes(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return code
 
 
-def forest(trees: Sequence[Tree], before: Forest | None = None) -> Forest:
+def forest(trees: Sequence[BoxTree], before: Forest | None = None) -> Forest:
     """Return (world, [(first node, last + 1)]): many Trees as one table, see ``kernel``.
 
     before: what this function returned for Trees that come before them.
@@ -273,7 +274,7 @@ def forest(trees: Sequence[Tree], before: Forest | None = None) -> Forest:
     return (links, nodes, kinds, objects), places
 
 
-def _flat(trees: Sequence[Tree]) -> World:
+def _flat(trees: Sequence[BoxTree]) -> World:
     links, nodes, kinds, objects = (np.concatenate(arrays) for arrays in zip(*trees, strict=True))
     return links.ravel(), nodes.ravel(), kinds, objects.ravel()
 

@@ -25,16 +25,16 @@ _TURN = 0.1
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
-def fastest(curve: RoundedPath, velocity: np.ndarray, acceleration: np.ndarray) -> Motion:
-    """Return the fastest :class:`Motion` along a RoundedPath, from rest to rest; limits (k,) above 0."""
+def fastest(curve: RoundedPath, velocity: np.ndarray, acceleration: np.ndarray) -> CurveMotion:
+    """Return the fastest :class:`CurveMotion` along a RoundedPath, from rest to rest; limits (k,) above 0."""
     s, derivatives, stops = curve.grid(curve.length / _INTERVALS, _TURN)
     stop = np.zeros(len(s), dtype=np.bool_)
     stop[[0, -1, *stops]] = True
     squared, rates = greatest_speeds(np.diff(s), derivatives, velocity, acceleration, stop)
-    return Motion(curve, s, squared, rates)
+    return CurveMotion(curve, s, squared, rates)
 
 
-class Motion:
+class CurveMotion:
     """A motion along a curve: s(t) is a parabola on each interval of the grid. duration [s]."""
 
     def __init__(self, curve: RoundedPath, s: np.ndarray, squared: np.ndarray, rates: np.ndarray) -> None:

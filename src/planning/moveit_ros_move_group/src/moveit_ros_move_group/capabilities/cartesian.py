@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from moveit_ros_move_group.context import Context
 
 
-class CartesianPath:
+class CartesianPathService:
     """A fraction below 1 is not an error; the reason why the path ends there is published as a failure."""
 
     def __init__(self, context: Context) -> None:

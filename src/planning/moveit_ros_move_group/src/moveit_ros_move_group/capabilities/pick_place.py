@@ -30,9 +30,9 @@ from visualization_msgs.msg import MarkerArray
 from motion_planning.errors import PlanningError
 from motion_planning.manipulation import (
     ManipulationFailure,
+    ManipulationTools,
     PickTask,
     PlaceTask,
-    Tools,
     hand_links,
     places_on,
     plan_manipulation,
@@ -53,12 +53,12 @@ if TYPE_CHECKING:
     from trajectory_msgs.msg import JointTrajectory
 
     from motion_planning.exact import Contact
-    from motion_planning.manipulation import Candidate, Manipulation, Stage
+    from motion_planning.manipulation import Candidate, Manipulation, ManipulationStage
     from motion_planning.pipeline import Plan
     from motion_planning.scene import Scene
     from motion_planning.srdf import EndEffector
     from moveit_ros_move_group.context import Context
-    from moveit_ros_move_group.execution import Outcome
+    from moveit_ros_move_group.execution import ExecutionOutcome
     from moveit_ros_move_group.planning import Planner
 
 # [s], if a goal has none.
@@ -71,7 +71,7 @@ _JOINED = 1e-4
 _WAY_M, _MIN_WAY_M = 0.1, 0.03
 
 
-class PickPlace:
+class PickPlaceActions:
     """Both actions. ``~pick_place/max_velocity_scaling_factor`` and ``~pick_place/max_acceleration_scaling_factor``
     (1.0) say how fast, as their goals do not."""
 
@@ -87,7 +87,7 @@ class PickPlace:
 class _Action:
     """One of the two actions."""
 
-    def __init__(self, shared: PickPlace, kind: type[_Pick] | type[_Place]) -> None:
+    def __init__(self, shared: PickPlaceActions, kind: type[_Pick] | type[_Place]) -> None:
         self._shared, self._kind, self._context = shared, kind, shared.context
         self._changed = threading.Event()
         self._context.monitor.on_change(self._changed.set)
@@ -134,8 +134,8 @@ class _Action:
         def plan(scene: Scene, q: np.ndarray, seconds: float) -> Plan:
             return self._shared.planner.plan(self._request(job, goal, q, seconds), scene, stop)
 
-        tools = Tools(self._context.exact, plan, wall_clock, lambda: stop() or rospy.is_shutdown(),
-                      self._shared.scaling)
+        tools = ManipulationTools(self._context.exact, plan, wall_clock, lambda: stop() or rospy.is_shutdown(),
+                                  self._shared.scaling)
         try:
             found = plan_manipulation(job.task, job.candidates, seconds, tools)
         except ManipulationFailure as failure:
@@ -170,7 +170,7 @@ class _Action:
                 result.trajectory_descriptions.append(stage.description)
         self._context.show_path(start, *result.trajectory_stages)
 
-    def _message(self, job: _Pick | _Place, found: Manipulation, stage: Stage,
+    def _message(self, job: _Pick | _Place, found: Manipulation, stage: ManipulationStage,
                  values: Mapping[str, float]) -> RobotTrajectory | None:
         """The RobotTrajectory of a stage, None where nothing moves in it."""
         model = self._context.model
@@ -203,8 +203,8 @@ class _Action:
         return MoveItErrorCodes.SUCCESS, ""
 
     def _execute_stage(self, job: _Pick | _Place, found: Manipulation,
-                       stage: Stage) -> tuple[Outcome | None, list[Contact]]:
-        """(Outcome, contacts that ended it); (None, []) where nothing moves."""
+                       stage: ManipulationStage) -> tuple[ExecutionOutcome | None, list[Contact]]:
+        """(ExecutionOutcome, contacts that ended it); (None, []) where nothing moves."""
         context, stop = self._context, self._server.is_preempt_requested
         message = self._message(job, found, stage, context.monitor.joint_values())
         if message is None:
@@ -216,7 +216,7 @@ class _Action:
         watch = RestOfTheWay(context.exact, group, stage.timed, lambda: self._changed_scene(stage))
         return context.require_executor().execute(message, stop, watch.hit), watch.contacts
 
-    def _changed_scene(self, stage: Stage) -> Scene | None:
+    def _changed_scene(self, stage: ManipulationStage) -> Scene | None:
         if not self._changed.is_set():
             return None
         self._changed.clear()

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import unquote
 
-from web_bridge.errors import BridgeError, Refused, shown
+from web_bridge.errors import BridgeError, RequestForbidden, shown
 
 #: A file that has more is not sent [bytes].
 LARGEST_FILE = 32 << 20
@@ -31,7 +31,7 @@ class Assets:
         package, inside = parts[1], unquote(parts[2])
         # After %2e%2e has become a dot.
         if ".." in inside or "\0" in inside or "\\" in inside:
-            raise Refused("%s leaves its package" % shown(uri))
+            raise RequestForbidden("%s leaves its package" % shown(uri))
         folder = self._folder_of(package)
         if folder is None:
             raise BridgeError("the package %s is not on this machine" % package)
@@ -39,7 +39,7 @@ class Assets:
         try:
             path = (root / inside.lstrip("/")).resolve(strict=True)
             if not path.is_relative_to(root):
-                raise Refused("%s leaves its package" % shown(uri))
+                raise RequestForbidden("%s leaves its package" % shown(uri))
             return self._contents(path, uri)
         # RuntimeError: a loop of links, before Python 3.13.
         except (OSError, RuntimeError) as error:

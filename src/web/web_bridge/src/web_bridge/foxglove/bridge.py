@@ -11,7 +11,7 @@ from web_bridge.access import is_token, without_tokens
 from web_bridge.errors import BridgeError
 from web_bridge.foxglove import wire
 from web_bridge.foxglove.assets import Assets
-from web_bridge.foxglove.catalogue import NOTHING, Catalogue, Changes, graph_update, is_different
+from web_bridge.foxglove.catalogue import NOTHING, Catalogue, CatalogueChanges, graph_update, is_different
 from web_bridge.foxglove.channel_feeds import ChannelFeeds
 from web_bridge.foxglove.parameters import shown_parameter
 from web_bridge.foxglove.rules import FoxgloveRules
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from web_bridge.codec import Codec
     from web_bridge.feeds import Arrival
     from web_bridge.foxglove.session import FoxgloveSession
-    from web_bridge.graph import Subscription, WatchedGraph
+    from web_bridge.graph import SubscribedTopic, WatchedGraph
     from web_bridge.loop_thread import Later
 
 _LOG = logging.getLogger("web_bridge")
@@ -69,7 +69,7 @@ class FoxgloveBridge:
         self._watched = set()  # names that the graph tells changes of
         self._known = []  # frames for a new client
         self._state = NOTHING
-        self._clock: Subscription | None = None
+        self._clock: SubscribedTopic | None = None
         self._time_ns = None
         self._time_waits = False
         self._told = set()
@@ -174,7 +174,7 @@ class FoxgloveBridge:
                 changes = None
             delay_s = _FIRST_LOOK_S if changes or was_asked else min(2 * delay_s, self.options.longest_look_s)
 
-    def _look(self) -> Changes | None:
+    def _look(self) -> CatalogueChanges | None:
         try:
             changes = self.catalogue.look(self.graph.state())
         except BridgeError as error:
@@ -184,8 +184,8 @@ class FoxgloveBridge:
             self._warn(problem)
         if not changes:
             return None
-        known = _texts(Changes(channels=tuple(self.catalogue.channels.values()),
-                               services=tuple(self.catalogue.services.values())))
+        known = _texts(CatalogueChanges(channels=tuple(self.catalogue.channels.values()),
+                                        services=tuple(self.catalogue.services.values())))
         news = _texts(changes)
         # A client that comes at this moment gets each channel once: known before, or new.
         with self._lock:
@@ -220,7 +220,7 @@ class FoxgloveBridge:
             self._clock = self.graph.subscribe(_CLOCK, self._clock_arrived)
         elif not is_wanted and self._clock is not None:
             self._clock.close()
-            self._clock: Subscription | None = None
+            self._clock: SubscribedTopic | None = None
             self._time_ns = None
         return is_wanted
 
@@ -243,8 +243,8 @@ class FoxgloveBridge:
                 client.send_time(frame)
 
 
-def _texts(changes: Changes) -> list[tuple[str | None, str]]:
-    """[(capability that a client needs, frame)] of Changes."""
+def _texts(changes: CatalogueChanges) -> list[tuple[str | None, str]]:
+    """[(capability that a client needs, frame)] of CatalogueChanges."""
     found = [
         (None, "unadvertise", "channelIds", changes.gone_channels),
         (None, "advertise", "channels", [one.advertised() for one in changes.channels]),

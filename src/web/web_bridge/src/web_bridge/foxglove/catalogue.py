@@ -61,7 +61,7 @@ class ServiceEntry(NamedTuple):
                 "schema": schema}
 
 
-class Changes(NamedTuple):
+class CatalogueChanges(NamedTuple):
     """Messages to clients after a look at the graph. ``graph``: the fields of connectionGraphUpdate."""
 
     channels: tuple = ()
@@ -93,8 +93,8 @@ class Catalogue:
         self.channels, self.services = {}, {}
         self.state = NOTHING
 
-    def look(self, state: GraphState) -> Changes:
-        """Compare with a GraphState; returns Changes."""
+    def look(self, state: GraphState) -> CatalogueChanges:
+        """Compare with a GraphState; returns CatalogueChanges."""
         problems = []
         channels = self._updated_channels(state, problems)
         services = self._updated_services(state, problems)
@@ -104,7 +104,7 @@ class Catalogue:
         new_services = tuple(services[one] for one in sorted(set(services) - set(self.services)))
         graph = graph_update(self.state, state)
         self.channels, self.services, self.state = channels, services, state
-        return Changes(new_channels, gone_channels, new_services, gone_services, graph, tuple(problems))
+        return CatalogueChanges(new_channels, gone_channels, new_services, gone_services, graph, tuple(problems))
 
     def forget_service(self, entry: ServiceEntry) -> None:
         """Ask again for the type of a service at the next look."""

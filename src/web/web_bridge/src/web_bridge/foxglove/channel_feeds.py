@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from web_bridge.feeds import Arrival
     from web_bridge.foxglove.catalogue import Channel
     from web_bridge.foxglove.session import FoxgloveSession
-    from web_bridge.graph import Graph, Subscription
+    from web_bridge.graph import Graph, SubscribedTopic
 
 
 class ChannelFeed:
@@ -23,7 +23,7 @@ class ChannelFeed:
         self._lock = threading.Lock()
         self._clients = {}  # client -> id of its subscription
         self._latched: Latched[Arrival] = Latched()
-        self.subscription: Subscription | None = None
+        self.subscription: SubscribedTopic | None = None
 
     def arrived(self, arrival: Arrival) -> None:
         """A message of ROS; on the thread that received it."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from web_bridge.errors import Refused, shown
+from web_bridge.errors import RequestForbidden, shown
 
 EVERYTHING = (re.compile(".*"),)
 #: The kinds of files that a page needs to draw a robot. Also in capitals: vendors' meshes are called so.
@@ -47,31 +47,31 @@ class FoxgloveRules(NamedTuple):
         return capability in self.capabilities and (self.may_act or capability not in _OF_ACTING)
 
     def check(self, capability: str) -> None:
-        """Raise Refused for a capability that this client may not use."""
+        """Raise RequestForbidden for a capability that this client may not use."""
         if capability not in self.capabilities:
-            raise Refused("this server does not offer %s (~capabilities)" % capability)
+            raise RequestForbidden("this server does not offer %s (~capabilities)" % capability)
         if not self.has(capability):
-            raise Refused("the view token does not allow %s" % capability)
+            raise RequestForbidden("the view token does not allow %s" % capability)
 
     def check_publish(self, topic: str) -> None:
         self.check("clientPublish")
         if not _fits(self.client_topics, topic):
-            raise Refused("client_topic_whitelist of this server does not allow to publish on %s" % topic)
+            raise RequestForbidden("client_topic_whitelist of this server does not allow to publish on %s" % topic)
 
     def check_set_parameter(self, name: str) -> None:
         self.check("parameters")
         if not self.may_act:
-            raise Refused("the view token does not allow to set parameters")
+            raise RequestForbidden("the view token does not allow to set parameters")
         self.check_parameter(name)
 
     def check_parameter(self, name: str) -> None:
         if not self.shows_parameter(name):
-            raise Refused("param_whitelist of this server does not allow the parameter %s" % name)
+            raise RequestForbidden("param_whitelist of this server does not allow the parameter %s" % name)
 
     def check_asset(self, uri: str) -> None:
         self.check("assets")
         if ".." in uri or not _fits(self.assets, uri):
-            raise Refused("asset_uri_allowlist of this server does not allow %s" % shown(uri))
+            raise RequestForbidden("asset_uri_allowlist of this server does not allow %s" % shown(uri))
 
 
 def _fits(patterns: tuple[re.Pattern, ...], name: str) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from web_bridge.codec import deserialized, serialized
-from web_bridge.errors import BridgeError, FieldError, Refused, ServiceFailed, shown
+from web_bridge.errors import BridgeError, FieldError, RequestForbidden, ServiceFailed, shown
 from web_bridge.fields import field
 from web_bridge.foxglove import parameters as values
 from web_bridge.foxglove import wire
@@ -332,7 +332,7 @@ class FoxgloveSession:
         for name in names:
             self._rules.check_parameter(name)
         if len(self._watched | names) > MAX_PARAMETERS:
-            raise Refused("a client may watch %d parameters" % MAX_PARAMETERS)
+            raise RequestForbidden("a client may watch %d parameters" % MAX_PARAMETERS)
         self._watched |= names
         self._bridge.watch_parameters(self, sorted(names))
 

@@ -51,7 +51,7 @@ _LIMIT, _OFFSET, _STIFFNESS, _HYSTERESIS, _SPEED, _EXCESS = (NUMBERS.index(name)
 FREE_SPEED = 1.5
 
 
-class Wanted(NamedTuple):
+class ActuatorCommands(NamedTuple):
     """Commands of the actuators for one tick, (n,) each.
 
     driven: which of them follow `position` [rad]; velocity: what set-points are said to move at, 0 where nobody says
@@ -70,7 +70,8 @@ class Wanted(NamedTuple):
 class Actuators:
     """The actuators of n joints.
 
-    rows: {number: {joint: value}} as `effects.read` has them for "lag"; names: of the joints. Raises HardwareError.
+    rows: {number: {joint: value}} as `effects.read` has them for "lag"; names: of the joints. Raises
+    BaxterHardwareError.
     """
 
     def __init__(self, rows: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> None:
@@ -79,9 +80,9 @@ class Actuators:
                               ("motor_speed", 0.1)):
             values = self._numbers[NUMBERS.index(number)]
             if values.min() < least:
-                raise effects.HardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))
+                raise effects.BaxterHardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))
         if self._numbers.min() < 0.0:
-            raise effects.HardwareError("%s is negative" % NUMBERS[int(np.argwhere(self._numbers < 0.0)[0, 0])])
+            raise effects.BaxterHardwareError("%s is negative" % NUMBERS[int(np.argwhere(self._numbers < 0.0)[0, 0])])
         # Motor's angle and speed, filtered set-point, integral, set-point of the tick before, share of the hysteresis,
         # what the controller adds to the known load.
         self._state = np.zeros((7, len(names)))
@@ -96,7 +97,7 @@ class Actuators:
         """Forget what the set-points of `joints` were: they are at position (k,) [rad]."""
         self._state[2, joints] = position
 
-    def torques(self, wanted: Wanted, links: np.ndarray, dt: float) -> np.ndarray:
+    def torques(self, wanted: ActuatorCommands, links: np.ndarray, dt: float) -> np.ndarray:
         """(n,) [Nm] what drives the links in this tick, the counterbalance among it; 0 for joints that are not driven.
 
         links: (3, n), their angles [rad], speeds [rad/s], and inertias about their joints, at least [kg m^2]; dt [s]. A
@@ -146,7 +147,7 @@ class Actuators:
 
 
 @_compiled
-def turn(state: np.ndarray, begun: np.ndarray, numbers: np.ndarray, wanted: Wanted, links: np.ndarray,
+def turn(state: np.ndarray, begun: np.ndarray, numbers: np.ndarray, wanted: ActuatorCommands, links: np.ndarray,
          dt: float) -> np.ndarray:
     motor, speed, filtered, integral, last = state[0], state[1], state[2], state[3], state[4]
     torques = np.zeros(links.shape[1])

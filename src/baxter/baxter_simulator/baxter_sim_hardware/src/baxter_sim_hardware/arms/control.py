@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
     from baxter_model.description import LimbModel
 
-    from .joint_command import JointCommand, JointLimits
+    from .joint_command import ArmLimits, CheckedCommand
     from .measured import Measured
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
@@ -80,7 +80,7 @@ SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanish
 class _Limb:
     """The state of one arm that is separate from the other's."""
 
-    def __init__(self, model: LimbModel, limits: JointLimits) -> None:
+    def __init__(self, model: LimbModel, limits: ArmLimits) -> None:
         self.parser = CommandParser(limits, model.joint_names)
         self.index = np.array([limits.names.index(name) for name in model.joint_names])
         self.joints = np.zeros(len(limits.names), dtype=bool)  # the same as a mask
@@ -95,13 +95,13 @@ class _Limb:
 class Arms:
     """The joint commands of all limbs, from message fields to drive set-points.
 
-    limbs: sequence of baxter_model.description.LimbModel; limits: JointLimits of all their joints, which fixes the
+    limbs: sequence of baxter_model.description.LimbModel; limits: ArmLimits of all their joints, which fixes the
     order of every array here; measured: `Measured`, which the caller renews before each tick; speed_ratio: 0..1 at
     start; dt: length of a tick [s]; free_speed: (n,) [rad/s] of the motors of a physical robot's actuators without
     load, or None for ideal drives, which a set-point leads by REACH_RAD at most.
     """
 
-    def __init__(self, limbs: Sequence[LimbModel], limits: JointLimits, measured: Measured, speed_ratio: float = 1.0,
+    def __init__(self, limbs: Sequence[LimbModel], limits: ArmLimits, measured: Measured, speed_ratio: float = 1.0,
                  dt: float = 0.002, free_speed: np.ndarray | None = None) -> None:
         self.limits = limits
         is_ideal = free_speed is None
@@ -229,8 +229,8 @@ class Arms:
     def timeout(self, side: str) -> float:
         return self._limbs[side].timeout_s
 
-    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
-        """Take one JointCommand message; returns the checked JointCommand.
+    def command(self, side: str, mode: int, names: Sequence[str], values: Sequence[float]) -> CheckedCommand:
+        """Take one JointCommand message; returns the checked CheckedCommand.
 
         Raises CommandRefused, in which case nothing has changed.
         """
@@ -274,7 +274,7 @@ class Arms:
         self._refresh_speed()
         return command
 
-    def _expire_later(self, command: JointCommand, limb: _Limb) -> None:
+    def _expire_later(self, command: CheckedCommand, limb: _Limb) -> None:
         self._modes.expire_at(command.index, self._measured.time_s + limb.timeout_s)
 
     def set_yielding(self, side: str, yields: bool) -> None:
@@ -490,7 +490,7 @@ class Arms:
             points.velocity[joints] = points.output_rate[joints] = measured.velocity[joints]
             self._smoothing.restart(joints, measured.position[joints])
 
-    def _move_in_step(self, command: JointCommand) -> None:
+    def _move_in_step(self, command: CheckedCommand) -> None:
         """Make the joints of a POSITION command arrive together."""
         if shares_in_step(command.index, command.values, self._points.position, self._speeds.numbers, MIN_SHARE):
             self._refresh_speed()

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Mapping
 
     from arm_kinematics import Chain
-    from baxter_sim_hardware.robot import Baxter
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.robot import BaxterHardware
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from bullet_sim import Model, World
     from urdf_model import Robot
 
@@ -41,16 +41,17 @@ def guards_of(robot: Robot) -> avoidance.Guards:
 
 
 class Guarding:
-    """world, model: of bullet_sim; baxter: `robot.Baxter`; chains: {side: Chain}; guards: `avoidance.Guards`; feel:
-    function (side, snapshot) -> (torques (7,), wrench (6,)) from outside; is_squeezed: function(side) -> whether its
-    cuff is.
+    """world, model: of bullet_sim; baxter: `robot.BaxterHardware`; chains: {side: Chain}; guards: `avoidance.Guards`;
+    feel: function (side, snapshot) -> (torques (7,), wrench (6,)) from outside; is_squeezed: function(side) -> whether
+    its cuff is.
 
     Attributes: `safety`: `arms.safety.Safety`, or None where collisions are only reported; `warn`: function(time_s,
     kind, text) for the log; `held`: {side: names of the links that avoidance holds that arm away from now}.
     """
 
-    def __init__(self, world: World, model: Model, baxter: Baxter, chains: Mapping[str, Chain],
-                 guards: avoidance.Guards, feel: Callable[[str, Snapshot | safety.Felt], tuple[np.ndarray, np.ndarray]],
+    def __init__(self, world: World, model: Model, baxter: BaxterHardware, chains: Mapping[str, Chain],
+                 guards: avoidance.Guards, feel: Callable[[str, JointSnapshot | safety.Felt],
+                                                          tuple[np.ndarray, np.ndarray]],
                  is_squeezed: Callable[[str], bool]) -> None:
         self._world, self._model, self._baxter, self._arms = world, model, baxter, baxter.arms
         self._chains, self._guards = chains, guards
@@ -158,8 +159,8 @@ class Guarding:
         field = self.fields[side]
         return sorted({*links, *_near(field)}), other_arm or bool(field.other)
 
-    def collides(self, side: str, time_s: float, snapshot: Snapshot) -> bool:
-        """Whether one arm is in a collision; snapshot: `snapshot.Snapshot`."""
+    def collides(self, side: str, time_s: float, snapshot: JointSnapshot) -> bool:
+        """Whether one arm is in a collision; snapshot: `snapshot.JointSnapshot`."""
         if self.safety is not None:
             return self.safety.collides[side] or self._baxter.halted(side)
         active = self.suppressions[side].active

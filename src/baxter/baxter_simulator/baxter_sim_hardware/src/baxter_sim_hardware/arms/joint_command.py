@@ -50,7 +50,7 @@ def _clamp(index: np.ndarray, values: np.ndarray, lower: np.ndarray, upper: np.n
 
 
 @dataclass(frozen=True)
-class JointLimits:
+class ArmLimits:
     """Limits of n joints, from the robot's URDF.
 
     lower, upper: (n,) [rad]; velocity: (n,) [rad/s]; effort: (n,) [Nm].
@@ -85,7 +85,7 @@ WORTH_TELLING = 1e-3  # [rad, rad/s or Nm]
 
 
 @dataclass(frozen=True)
-class JointCommand:
+class CheckedCommand:
     """A checked command. index: (k,) ints into the limits' joints; values: (k,) [rad, rad/s or Nm by mode]."""
 
     mode: Mode
@@ -95,18 +95,18 @@ class JointCommand:
 
 
 class CommandParser:
-    """Turns the fields of a JointCommand message for one limb into a `JointCommand`.
+    """Turns the fields of a JointCommand message for one limb into a `CheckedCommand`.
 
     limits: of all joints that the indices count in; names: the joints that this limb accepts.
     """
 
-    def __init__(self, limits: JointLimits, names: Sequence[str]) -> None:
+    def __init__(self, limits: ArmLimits, names: Sequence[str]) -> None:
         self._limits = limits
         self._names = tuple(names)
         self._index = {name: limits.names.index(name) for name in names}
         self._last = [], np.zeros(0, dtype=int)  # the last valid names, and their indices
 
-    def parse(self, mode: int, names: Sequence[str], values: Sequence[float]) -> JointCommand:
+    def parse(self, mode: int, names: Sequence[str], values: Sequence[float]) -> CheckedCommand:
         """Check one command.
 
         mode: int; names: sequence of str; values: sequence of float, one for each name.
@@ -120,7 +120,7 @@ class CommandParser:
             outside = np.abs(inside - values) > WORTH_TELLING
             clamped = tuple("%s: %.5g became %.5g %s" % (names[i], values[i], inside[i], _UNITS[mode])
                             for i in np.flatnonzero(outside))
-        return JointCommand(mode, index, inside, clamped)
+        return CheckedCommand(mode, index, inside, clamped)
 
     def _check(self, mode: int, names: Sequence[str], values: Sequence[float]) -> None:
         """Raises CommandRefused; else `_last` holds the command's joints."""

@@ -29,14 +29,15 @@ class JointSensors:
     """The sensors of n joints.
 
     rows: {number: {joint: value}} as `effects.read` has them for "noise"; names: of the joints; seed: integer of the
-    noise, 0 or more; serial: of the robot, from which its gears follow; robot 0 has none. Raises HardwareError.
+    noise, 0 or more; serial: of the robot, from which its gears follow; robot 0 has none. Raises BaxterHardwareError.
     """
 
     def __init__(self, rows: Mapping[str, Mapping[str, float]], names: Sequence[str], seed: int, serial: int) -> None:
         self._quanta = [effects.per_joint(rows, "%s_quantum" % quantity, names) for quantity in QUANTITIES]
         for quantity, quantum in zip(QUANTITIES, self._quanta, strict=True):
             if quantum.min() <= 0.0:
-                raise effects.HardwareError("%s_quantum is %g; it must be greater than 0" % (quantity, quantum.min()))
+                raise effects.BaxterHardwareError("%s_quantum is %g; it must be greater than 0" % (quantity,
+                                                                                                   quantum.min()))
         self._noise = {quantity: effects.per_joint(rows, "%s_noise" % quantity, names)
                        for quantity in ("position", "effort")}
         self._gear = np.array([*(effects.per_joint(rows, number, names) for number in ("gear_error", "gear_waves")),

@@ -47,7 +47,7 @@ def postures(name: str, side: str) -> list[np.ndarray]:
     return [neutral + signs * [turns.get(joint, 0.0) for joint in JOINTS] for turns in PROCEDURES[name][1]]
 
 
-class Arm(NamedTuple):
+class ProcedureArm(NamedTuple):
     """The state of the arm for a procedure, (7,) each: position [rad], velocity [rad/s], torques from outside [Nm]."""
 
     position: np.ndarray
@@ -96,9 +96,9 @@ class Procedure:
         """Whether `update` must be called."""
         return self.is_enabled or self._moves
 
-    def update(self, time_s: float, robot_enabled: bool, arm: Arm) -> Order | np.ndarray:
-        """Continue the procedure at time_s [s]; arm: `Arm`. Returns an `Order`, or the next posture (7,) [rad] of the
-        arm."""
+    def update(self, time_s: float, robot_enabled: bool, arm: ProcedureArm) -> Order | np.ndarray:
+        """Continue the procedure at time_s [s]; arm: `ProcedureArm`. Returns an `Order`, or the next posture (7,) [rad]
+        of the arm."""
         if self.is_enabled and time_s - self._last > KEEP_ALIVE_S:
             self.is_enabled, self.timed_out = False, True
         if self.is_enabled and self.complete == NOT_COMPLETE:
@@ -109,7 +109,7 @@ class Procedure:
         self._moves = False
         return order
 
-    def _go_on(self, time_s: float, robot_enabled: bool, arm: Arm) -> Order | np.ndarray:
+    def _go_on(self, time_s: float, robot_enabled: bool, arm: ProcedureArm) -> Order | np.ndarray:
         if not robot_enabled:
             return self._fail("the robot is disabled")
         if self._since is None:
@@ -149,7 +149,7 @@ class Procedure:
         return Order.STOP
 
 
-class Updater:
+class RefusingUpdater:
     """The updater, which refuses every request: there is no source of updates."""
 
     def __init__(self) -> None:

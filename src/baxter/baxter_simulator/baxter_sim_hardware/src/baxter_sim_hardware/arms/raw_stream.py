@@ -12,7 +12,7 @@ from disk_cache.compiled import compiler
 from .joint_modes import RAW_POSITION
 
 if TYPE_CHECKING:
-    from .joint_command import JointCommand, JointLimits
+    from .joint_command import ArmLimits, CheckedCommand
     from .setpoint import SetPoints
 
 STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
@@ -48,10 +48,10 @@ def _take(numbers: np.ndarray, points: np.ndarray, bounds: np.ndarray, mode: np.
 class RawStream:
     """The times of the last raw set-points, and their velocities, for n joints.
 
-    limits: JointLimits; speed: (n,) [rad/s] how fast set-points may go; dt: length of a tick [s].
+    limits: ArmLimits; speed: (n,) [rad/s] how fast set-points may go; dt: length of a tick [s].
     """
 
-    def __init__(self, limits: JointLimits, speed: np.ndarray, dt: float) -> None:
+    def __init__(self, limits: ArmLimits, speed: np.ndarray, dt: float) -> None:
         self._bounds, self._dt = np.array([limits.lower, limits.upper, speed]), dt
         self._speed = self._bounds[2]
         # All are views of one array, which a compiled function takes sooner.
@@ -74,8 +74,8 @@ class RawStream:
         """(n,) [rad/s] at what the set-points are said to move at time_s [s]; 0 for those of which nobody says so."""
         return np.where(time_s - self._velocity_stamp <= FEED_FORWARD_S, self._velocity, 0.0)
 
-    def take(self, points: SetPoints, mode: np.ndarray, command: JointCommand, time_s: float) -> None:
+    def take(self, points: SetPoints, mode: np.ndarray, command: CheckedCommand, time_s: float) -> None:
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
-        stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
+        stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: CheckedCommand."""
         _take(self._numbers, points.numbers, self._bounds, mode, command.index, command.values,
               (time_s, self._dt))

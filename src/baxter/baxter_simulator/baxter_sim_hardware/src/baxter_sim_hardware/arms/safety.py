@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from baxter_sim_hardware import effects
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 
 from . import avoidance, collision
 
@@ -31,7 +31,7 @@ class Distances:
     """How far arms keep away from each other and from the body.
 
     numbers: {section: {number: {name: value}}} as `effects.read` has them; links: {side: (7,) names of the links behind
-    its joints}; radius: of the arms [m]. Raises HardwareError.
+    its joints}; radius: of the arms [m]. Raises BaxterHardwareError.
     """
 
     def __init__(self, numbers: Mapping[str, Mapping[str, Mapping[str, float]]], links: Mapping[str, Sequence[str]],
@@ -71,7 +71,7 @@ class Distances:
 
 
 class Safety(Distances):
-    """numbers, links, radius: as for `Distances`; load: `external_load.ExternalLoad`. Raises HardwareError.
+    """numbers, links, radius: as for `Distances`; load: `external_load.ExternalLoad`. Raises BaxterHardwareError.
 
     Attributes: `hold_s` [s] for which an arm stands that has collided; `collides`: {side: whether it did at the last
     look}.
@@ -96,17 +96,17 @@ class Safety(Distances):
 
 def blocks_of(rows: Mapping[str, Mapping[str, float]]) -> avoidance.Blocks:
     """The `avoidance.Blocks` of the body. rows: {block: {name: value}} as `effects.read` has them for "body"; a block's
-    name begins with that of its link. Raises HardwareError."""
+    name begins with that of its link. Raises BaxterHardwareError."""
     names = ("x_least", "y_least", "z_least", "x_most", "y_most", "z_most", "first_joint")
     try:
         values = np.array([[row[name] for name in names] for row in rows.values()], dtype=float)
     except KeyError as error:
-        raise HardwareError("a block of the section 'body' has no %s; each needs %s" % (
+        raise BaxterHardwareError("a block of the section 'body' has no %s; each needs %s" % (
             error, ", ".join(names))) from None
     corners = values[:, :6].reshape(-1, 2, 3)
     if not (corners[:, 0] < corners[:, 1]).all():
-        raise HardwareError("a block of the section 'body' is not greater than nothing; its least coordinates must be "
-                            "smaller than its greatest")
+        raise BaxterHardwareError("a block of the section 'body' is not greater than nothing; its least coordinates "
+                                  "must be smaller than its greatest")
     return avoidance.Blocks(tuple(name.split("_")[0] for name in rows), values[:, 6].astype(np.int64), corners)
 
 

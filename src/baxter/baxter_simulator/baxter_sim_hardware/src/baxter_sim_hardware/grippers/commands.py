@@ -15,7 +15,7 @@ from rospy_nodes.json_object import JsonRefused, read_object
 LONGEST_SENDER = 1000
 
 
-class Gripper:
+class GripperHardware:
     """Commands and parameters of one kind of gripper. Kinds derive from it and fill the two tables.
 
     Attributes: command, sender, sequence: of the last valid command, as its acknowledgement;
@@ -81,7 +81,7 @@ class Gripper:
         self.load = load
 
 
-class CustomGripper(Gripper):
+class CustomGripperHardware(GripperHardware):
     """A tool that the robot knows nothing about, or none at all: without parameters, and no command has an effect."""
 
     COMMANDS = {"no_op": ("no_op", False), "set": ("configure", False), "configure": ("configure", False)}

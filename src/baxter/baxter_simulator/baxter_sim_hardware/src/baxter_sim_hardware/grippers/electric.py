@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from baxter_model import ELECTRIC
 from baxter_sim_hardware.errors import CommandRefused
 
-from .commands import Gripper, is_number
+from .commands import GripperHardware, is_number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,7 +37,7 @@ class Phase(Enum):
     HOLDING = "holding"
 
 
-class ElectricGripper(Gripper):
+class ElectricGripperHardware(GripperHardware):
     """Positions are shares of the fingers' travel, 0 closed to 1 open, unless given in percent.
 
     travel: of one finger [m]; position: present position of the fingers; dt: length of a tick [s]; calibrated: whether

@@ -10,9 +10,9 @@ import numpy as np
 from baxter_model import tip_of
 from baxter_model.description import cup_of, openings_of
 
-from .commands import CustomGripper
-from .electric import OPEN, ElectricGripper
-from .suction import SuctionGripper
+from .commands import CustomGripperHardware
+from .electric import OPEN, ElectricGripperHardware
+from .suction import SuctionGripperHardware
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,7 +47,7 @@ class FingersHand:
             model.couple(first, second, self._openings[1] / self._openings[0])
         for link in self._links:
             model.grip_firmly(link)
-        self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt, calibrated)
+        self.gripper = ElectricGripperHardware(float(np.abs(self._openings).max()), self._position(), dt, calibrated)
         self._unseen_ticks = 0
         self._driven = OPEN, 100.0  # to which share of the travel, how hard [%], as they begin
 
@@ -123,7 +123,7 @@ class CupHand:
         ring = RIM_SHARE * radius * np.array([np.cos(angles), np.sin(angles), 0.0 * angles]).T
         self._ring = np.vstack([ring, np.zeros(3)])
         model.grip_firmly(self._frame)
-        self.gripper = SuctionGripper(dt)
+        self.gripper = SuctionGripperHardware(dt)
 
     def opening(self, positions: np.ndarray) -> float:
         """How far it is open [%]."""
@@ -176,7 +176,7 @@ class NoHand:
     """
 
     def __init__(self) -> None:
-        self.gripper = CustomGripper()
+        self.gripper = CustomGripperHardware()
 
     def opening(self, positions: np.ndarray) -> float:
         """How far it is open [%]."""

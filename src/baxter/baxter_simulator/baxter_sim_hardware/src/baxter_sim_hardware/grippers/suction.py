@@ -10,7 +10,7 @@ from typing import Any
 from baxter_model import SUCTION
 from baxter_sim_hardware.errors import CommandRefused
 
-from .commands import Gripper, is_number
+from .commands import GripperHardware, is_number
 
 FULL_VACUUM_PA = 60e3  # below the air around, at a sensor reading of 100 %; what a venturi pump of this size reaches
 BLOW_PA = 1e3  # above the air around
@@ -22,7 +22,7 @@ ATTEMPT_S = 5.0  # of a command that names no time
 LARGEST = {"vacuum_sensor_threshold": 100.0, "blow_off_seconds": 60.0}  # of each parameter [%], [s]
 
 
-class SuctionGripper(Gripper):
+class SuctionGripperHardware(GripperHardware):
     """One cup on a pump.
 
     Attributes: sucking: whether the pump does; missed: an attempt ended without a vacuum. dt: length of a tick [s].

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 from command_line.options import counted
 from sensor_renderer.pinhole import Pinhole
 
@@ -32,7 +32,7 @@ CONTROLS = {
 _NEUTRAL_EXPOSURE, _NEUTRAL_WHITE, _DOUBLING_GAIN = 50.0, 2048.0, 79.0
 
 
-class CameraRefused(HardwareError):
+class CameraRefused(BaxterHardwareError):
     """A request that a camera cannot follow. ``code`` is the errno of the service's answer."""
 
     def __init__(self, code: int, text: str) -> None:

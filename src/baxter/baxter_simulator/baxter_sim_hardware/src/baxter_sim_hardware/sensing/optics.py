@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from baxter_sim_hardware import effects
-from baxter_sim_hardware.individual import DRAWING, Lens
+from baxter_sim_hardware.individual import DRAWING, LensFactors
 
 from .noise import generator
 
@@ -34,7 +34,7 @@ class Optics:
         if "noise" in chosen or serial != DRAWING:
             rows = effects.read(effects.physical_robot())
             if serial != DRAWING:
-                self._lens = Lens.of(serial, name, rows["serial"])
+                self._lens = LensFactors.of(serial, name, rows["serial"])
             if "noise" in chosen:
                 self._focal = effects.positive(rows["senses"], "focal_length", "camera")
                 self._noise = PictureNoise(rows["senses"], name, seed)

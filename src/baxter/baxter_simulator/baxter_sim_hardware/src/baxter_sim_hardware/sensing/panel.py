@@ -52,7 +52,7 @@ def navigator_name(navigator: str) -> str:
     return "%s_navigator" % navigator
 
 
-class Panel:
+class ControlPanel:
     """The present value of every channel: `digital` {name: bool}, `analog` {name: int}; all zero at the start."""
 
     def __init__(self) -> None:

@@ -14,7 +14,7 @@ from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
 
 from . import convert
-from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
+from .row import JOINT_STATE_RATE, STATE_RATE_HZ, RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from trajectory_msgs.msg import JointTrajectoryPoint
 
     from arm_kinematics import Chain
-    from baxter_sim_hardware.robot import Baxter
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.robot import BaxterHardware
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from baxter_sim_hardware.warnings import Warnings
 
 SPRING_JOINT = JOINTS.index("s1")  # the one with the spring; the message has one state of hysteresis for all joints
@@ -50,15 +50,15 @@ def _single(mode: Mode) -> Callable[[ArmTopics, tuple[str, str], Float64, float]
     return handle
 
 
-class ArmTopics(Part):
-    """baxter: `robot.Baxter`; chains: {side: Chain}; limb_index: {side: (7,) indices of its joints in the model's};
-    warnings: `warnings.Warnings`.
+class ArmTopics(RobotPart):
+    """baxter: `robot.BaxterHardware`; chains: {side: Chain}; limb_index: {side: (7,) indices of its joints in the
+    model's}; warnings: `warnings.Warnings`.
 
     Attribute `command_observers`: functions that are called in the loop with (side, message, JointCommand or None if it
     was refused) for each joint command.
     """
 
-    def __init__(self, baxter: Baxter, chains: Mapping[str, Chain], limb_index: Mapping[str, np.ndarray],
+    def __init__(self, baxter: BaxterHardware, chains: Mapping[str, Chain], limb_index: Mapping[str, np.ndarray],
                  warnings: Warnings) -> None:
         self._baxter, self._chains, self._limb_index = baxter, chains, limb_index
         self._warnings = warnings
@@ -70,7 +70,7 @@ class ArmTopics(Part):
 
     # -- out
 
-    def _endpoint_state(self, time_s: float, side: str, snapshot: Snapshot) -> EndpointState:
+    def _endpoint_state(self, time_s: float, side: str, snapshot: JointSnapshot) -> EndpointState:
         index = self._limb_index[side]
         position, velocity, _ = snapshot.sensed
         pose, jacobian = self._chains[side].fk_and_jacobian(position[index])
@@ -78,14 +78,14 @@ class ArmTopics(Part):
             time_s, BASE_FRAME, pose, endpoint.twist(jacobian, velocity[index]),
             endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
 
-    def _commanded_endpoint(self, time_s: float, side: str, snapshot: Snapshot) -> EndpointState:
+    def _commanded_endpoint(self, time_s: float, side: str, snapshot: JointSnapshot) -> EndpointState:
         arms = self._baxter.arms
         joints = arms.joints_of(side)
         pose, jacobian = self._chains[side].fk_and_jacobian(arms.commanded_position[joints])
         return convert.endpoint_state(time_s, BASE_FRAME, pose,
                                       endpoint.twist(jacobian, arms.commanded_velocity[joints]), np.zeros(6))
 
-    def _gravity_compensation(self, time_s: float, side: str, snapshot: Snapshot) -> SEAJointState:
+    def _gravity_compensation(self, time_s: float, side: str, snapshot: JointSnapshot) -> SEAJointState:
         index, arms, actuators = self._limb_index[side], self._baxter.arms, self._baxter.actuators
         joints, gravity = arms.joints_of(side), snapshot.gravity[index]
         nothing = np.zeros(len(joints))
@@ -103,19 +103,21 @@ class ArmTopics(Part):
             (arms.commanded_position[joints], arms.commanded_velocity[joints], acceleration, effort),
             tuple(values[index] for values in snapshot.sensed), model)
 
-    def _reference_joint_states(self, time_s: float, component: None, snapshot: Snapshot) -> JointState:
+    def _reference_joint_states(self, time_s: float, component: None, snapshot: JointSnapshot) -> JointState:
         arms, order = self._baxter.arms, self._order
         return self._reference_message.message(
             time_s, arms.commanded_position[order], arms.commanded_velocity[order], arms.commanded_torque[order])
 
-    def _position_state(self, time_s: float, limb_joint: tuple[str, str], snapshot: Snapshot) -> JointControllerState:
+    def _position_state(self, time_s: float, limb_joint: tuple[str, str],
+                        snapshot: JointSnapshot) -> JointControllerState:
         return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_position, snapshot, 0)
 
-    def _velocity_state(self, time_s: float, limb_joint: tuple[str, str], snapshot: Snapshot) -> JointControllerState:
+    def _velocity_state(self, time_s: float, limb_joint: tuple[str, str],
+                        snapshot: JointSnapshot) -> JointControllerState:
         return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_velocity, snapshot, 1)
 
-    def _controller_state(self, time_s: float, limb_joint: tuple[str, str], set_points: np.ndarray, snapshot: Snapshot,
-                          quantity: int) -> JointControllerState:
+    def _controller_state(self, time_s: float, limb_joint: tuple[str, str], set_points: np.ndarray,
+                          snapshot: JointSnapshot, quantity: int) -> JointControllerState:
         side = limb_joint[0]
         place, arms = self._chains[side].joint_names.index("%s_%s" % limb_joint), self._baxter.arms
         index = self._limb_index[side][place]
@@ -173,40 +175,42 @@ class ArmTopics(Part):
                 side, ", ".join(command.clamped)))
 
     TOPICS = (
-        Topic("endpoint_state", "limb/{limb}/endpoint_state", "baxter_core_msgs/EndpointState", STATE_RATE_HZ,
-              _endpoint_state, "`<limb>_gripper` in `base`: pose, twist (Jacobian times joint velocity), "
-              "wrench that the surroundings exert on the tip"),
-        Topic("gravity_compensation_torques", "limb/{limb}/gravity_compensation_torques",
-              "baxter_core_msgs/SEAJointState", STATE_RATE_HZ, _gravity_compensation,
-              "per joint, torso to wrist: set-points, measured state, torque that balances gravity; with the effect "
-              "`lag` also what the controller adds, and the spring and the hysteresis in the effort"),
-        Topic("ref_joint_states", "ref_joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE,
-              _reference_joint_states,
-              "set-points of the arms' joints, in alphabetical order; effort is what torque mode adds to gravity"),
-        Topic("commanded_endpoint_state", "limb/{limb}/commanded_endpoint_state", "baxter_core_msgs/EndpointState",
-              STATE_RATE_HZ, _commanded_endpoint, "the end point where the set-points are; no wrench is commanded"),
-        Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None, joint_command,
-              "any subset of the limb's joints in any order; mode 1 position, 2 velocity, 3 torque, 4 raw position"),
-        Topic("set_speed_ratio", "limb/{limb}/set_speed_ratio", "std_msgs/Float64", None, _speed_ratio,
-              "0 to 1: position mode's share of the joints' velocity limits"),
-        Topic("joint_command_timeout", "limb/{limb}/joint_command_timeout", "std_msgs/Float64", None, _timeout,
-              "[s] > 0, 0.2 at start: age at which a velocity, torque or raw position command expires"),
-        Topic("inverse_dynamics_command", "limb/{limb}/inverse_dynamics_command",
-              "trajectory_msgs/JointTrajectoryPoint", None, _feed_forward,
-              "velocities (s0 to w2) of the raw set-points that come in with it: they are followed without lag"),
-        Topic("command_twist_stamped", "limb/{limb}/command_twist_stamped", "geometry_msgs/TwistStamped", None, _twist,
-              "velocity of the tip in `base` (or no frame) or in `<limb>_gripper`; expires like a joint velocity "
-              "command"),
-        Topic("command_velocity_tozero", "limb/{limb}/command_velocity_tozero", "std_msgs/Bool", None, _stop,
-              "true stops the limb, which then holds"),
-        *(Topic(key, "{limb}_%s/joints/{limb}_{joint}_controller/command" % key, "std_msgs/Float64", None,
-                _single(mode),
-                "%s, as a joint command with this joint alone: for programs made for the vendor's simulator" % meaning)
+        TopicRow("endpoint_state", "limb/{limb}/endpoint_state", "baxter_core_msgs/EndpointState", STATE_RATE_HZ,
+                 _endpoint_state, "`<limb>_gripper` in `base`: pose, twist (Jacobian times joint velocity), "
+                 "wrench that the surroundings exert on the tip"),
+        TopicRow("gravity_compensation_torques", "limb/{limb}/gravity_compensation_torques",
+                 "baxter_core_msgs/SEAJointState", STATE_RATE_HZ, _gravity_compensation,
+                 "per joint, torso to wrist: set-points, measured state, torque that balances gravity; with the effect "
+                 "`lag` also what the controller adds, and the spring and the hysteresis in the effort"),
+        TopicRow("ref_joint_states", "ref_joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE,
+                 _reference_joint_states,
+                 "set-points of the arms' joints, in alphabetical order; effort is what torque mode adds to gravity"),
+        TopicRow("commanded_endpoint_state", "limb/{limb}/commanded_endpoint_state", "baxter_core_msgs/EndpointState",
+                 STATE_RATE_HZ, _commanded_endpoint, "the end point where the set-points are; no wrench is commanded"),
+        TopicRow("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None, joint_command,
+                 "any subset of the limb's joints in any order; mode 1 position, 2 velocity, 3 torque, 4 raw position"),
+        TopicRow("set_speed_ratio", "limb/{limb}/set_speed_ratio", "std_msgs/Float64", None, _speed_ratio,
+                 "0 to 1: position mode's share of the joints' velocity limits"),
+        TopicRow("joint_command_timeout", "limb/{limb}/joint_command_timeout", "std_msgs/Float64", None, _timeout,
+                 "[s] > 0, 0.2 at start: age at which a velocity, torque or raw position command expires"),
+        TopicRow("inverse_dynamics_command", "limb/{limb}/inverse_dynamics_command",
+                 "trajectory_msgs/JointTrajectoryPoint", None, _feed_forward,
+                 "velocities (s0 to w2) of the raw set-points that come in with it: they are followed without lag"),
+        TopicRow("command_twist_stamped", "limb/{limb}/command_twist_stamped", "geometry_msgs/TwistStamped", None,
+                 _twist,
+                 "velocity of the tip in `base` (or no frame) or in `<limb>_gripper`; expires like a joint velocity "
+                 "command"),
+        TopicRow("command_velocity_tozero", "limb/{limb}/command_velocity_tozero", "std_msgs/Bool", None, _stop,
+                 "true stops the limb, which then holds"),
+        *(TopicRow(key, "{limb}_%s/joints/{limb}_{joint}_controller/command" % key, "std_msgs/Float64", None,
+                   _single(mode),
+                   "%s, as a joint command with this joint alone: for programs made for the vendor's simulator"
+                   % meaning)
           for key, (mode, meaning) in CONTROLLERS.items()),
-        *(Topic(key + "_state", "{limb}_%s/joints/{limb}_{joint}_controller/state" % key,
-                "control_msgs/JointControllerState", STATE_RATE_HZ, function,
-                "set-point, measured value, error [%s] and effort [Nm] in any mode; gains are 0: for programs made for "
-                "the vendor's simulator" % unit)
+        *(TopicRow(key + "_state", "{limb}_%s/joints/{limb}_{joint}_controller/state" % key,
+                   "control_msgs/JointControllerState", STATE_RATE_HZ, function,
+                   "set-point, measured value, error [%s] and effort [Nm] in any mode; gains are 0: for programs made "
+                   "for the vendor's simulator" % unit)
           for key, unit, function in (("joint_position_controller", "rad", _position_state),
                                       ("joint_velocity_controller", "rad/s", _velocity_state))),
     )

@@ -18,12 +18,12 @@ from baxter_core_msgs.srv import (
 from std_srvs.srv import Empty, EmptyResponse
 
 from baxter_sim_hardware import effects, individual
-from baxter_sim_hardware.errors import HardwareError
+from baxter_sim_hardware.errors import BaxterHardwareError
 from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, CaptureSettings, Rack
 from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer import convert
 from sensor_renderer.camera_sensor import CameraSensor
-from sensor_renderer.camera_settings import CameraSettings
+from sensor_renderer.camera_settings import ServedCameraSettings
 from sensor_renderer.drivers import Driver
 from sensor_renderer.errors import SensorError
 from sensor_renderer.lens import Lens
@@ -81,7 +81,7 @@ class CameraServices:
             return Optics(name, effects.chosen(self._effects),
                           individual.checked(rospy.get_param(_PARAMETERS + "serial", individual.DRAWING)),
                           rospy.get_param("/gazebo/seed", 0))
-        except HardwareError as error:
+        except BaxterHardwareError as error:
             raise SensorError("%s: %s" % (name, error)) from error
 
     def add(self, driver: BaxterCamera) -> None:
@@ -157,7 +157,8 @@ class BaxterCamera(Driver):
         self._learning = LearningTopics(self.name(self.camera_name))
         self._services = CameraServices.of(entry.namespace)
         self._optics = self._services.optics(self.camera_name)
-        self._settings = CameraSettings(self.name(self.camera_name), self._apply, (camera.noise_mean, camera.noise))
+        self._settings = ServedCameraSettings(self.name(self.camera_name), self._apply,
+                                              (camera.noise_mean, camera.noise))
         pinhole = camera.pinhole
         controls = _UPRIGHT if self.camera_name == _HEAD else {}
         if self._services.as_robot:
@@ -191,7 +192,7 @@ class BaxterCamera(Driver):
         self._apply(self._settings)
         self.topics = [*topics.all, self._learning]
 
-    def _apply(self, settings: CameraSettings) -> None:
+    def _apply(self, settings: ServedCameraSettings) -> None:
         self.memory_s = settings.exposure.exposure_time
         use = self._use
         if use is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The head's ROS side: messages from and to `head.Head`."""
+"""The head's ROS side: messages from and to `head.HeadHardware`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baxter_core_msgs.msg import HeadPanCommand, HeadState
 from baxter_sim_hardware.head import TURNING_SPEED
 
 from . import convert
-from .row import STATE_RATE_HZ, Part, Topic
+from .row import STATE_RATE_HZ, RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from control_msgs.msg import JointControllerState
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
     from baxter_sim_hardware.head import PanDrive
     from baxter_sim_hardware.robot_state import RobotState
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.snapshot import JointSnapshot
 
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
 
-class HeadTopics(Part):
+class HeadTopics(RobotPart):
     """drive: `head.PanDrive`; state: the robot's RobotState; dt: length of a tick [s]."""
 
     def __init__(self, drive: PanDrive, state: RobotState, dt: float) -> None:
@@ -45,27 +45,28 @@ class HeadTopics(Part):
             self._state.require_enabled()
             self._head.nod(time_s)
 
-    def _head_state(self, time_s: float, component: None, snapshot: Snapshot) -> HeadState:
+    def _head_state(self, time_s: float, component: None, snapshot: JointSnapshot) -> HeadState:
         joint = self._joint
         return HeadState(snapshot.position[joint], bool(abs(snapshot.velocity[joint]) > TURNING_SPEED),
                          self._head.is_nodding(time_s), self._head.pan_enabled)
 
-    def _controller_state(self, time_s: float, component: None, snapshot: Snapshot) -> JointControllerState:
+    def _controller_state(self, time_s: float, component: None, snapshot: JointSnapshot) -> JointControllerState:
         joint = self._joint
         return convert.joint_controller_state(
             time_s, self._head.commanded_position, snapshot.position[joint], snapshot.effort[joint], self._dt)
 
     TOPICS = (
-        Topic("head_state", "head/head_state", "baxter_core_msgs/HeadState", STATE_RATE_HZ, _head_state,
-              "pan [rad], turning, nodding, panning enabled"),
-        Topic("command_head_pan", "head/command_head_pan", "baxter_core_msgs/HeadPanCommand", None, _command_pan,
-              "target [rad]; speed ratio of 8.4 rad/s, where 0 means full speed; enable request"),
-        Topic("command_head_nod", "head/command_head_nod", "std_msgs/Bool", None, _command_nod,
-              "true begins a nod of 1 s"),
-        Topic("head_position_controller", "head_position_controller/joints/head_controller/command", "std_msgs/Float64",
-              None, _command_position, "pan [rad] at full speed: for programs made for the vendor's simulator"),
-        Topic("head_position_controller_state", "head_position_controller/joints/head_controller/state",
-              "control_msgs/JointControllerState", STATE_RATE_HZ, _controller_state,
-              "set-point, measured value, error [rad] and effort [Nm]; gains are 0: for programs made for the vendor's "
-              "simulator"),
+        TopicRow("head_state", "head/head_state", "baxter_core_msgs/HeadState", STATE_RATE_HZ, _head_state,
+                 "pan [rad], turning, nodding, panning enabled"),
+        TopicRow("command_head_pan", "head/command_head_pan", "baxter_core_msgs/HeadPanCommand", None, _command_pan,
+                 "target [rad]; speed ratio of 8.4 rad/s, where 0 means full speed; enable request"),
+        TopicRow("command_head_nod", "head/command_head_nod", "std_msgs/Bool", None, _command_nod,
+                 "true begins a nod of 1 s"),
+        TopicRow("head_position_controller", "head_position_controller/joints/head_controller/command",
+                 "std_msgs/Float64",
+                 None, _command_position, "pan [rad] at full speed: for programs made for the vendor's simulator"),
+        TopicRow("head_position_controller_state", "head_position_controller/joints/head_controller/state",
+                 "control_msgs/JointControllerState", STATE_RATE_HZ, _controller_state,
+                 "set-point, measured value, error [rad] and effort [Nm]; gains are 0: for programs made for the "
+                 "vendor's simulator"),
     )

@@ -14,16 +14,16 @@ from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.arms.procedures import (
     PROCEDURES,
     STATUS_RATE_HZ,
-    Arm,
     Order,
     Procedure,
-    Updater,
+    ProcedureArm,
+    RefusingUpdater,
     postures,
 )
 from baxter_sim_hardware.errors import CommandRefused
 from sim_time.pace import Schedule
 
-from .row import Part, Topic
+from .row import RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,15 +31,15 @@ if TYPE_CHECKING:
     import numpy as np
     from std_msgs.msg import Empty, String
 
-    from baxter_sim_hardware.robot import Baxter
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.robot import BaxterHardware
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from baxter_sim_hardware.warnings import Warnings
 
 UPDATER_RATE_HZ = 1.0
 TYPES = {"Tare": "TareEnable", "CalibrateArm": "CalibrateArmEnable"}  # messages that ask for PROCEDURES
 
 
-def _status_of(name: str) -> Callable[[ProcedureTopics, float, str, Snapshot], RobustControllerStatus]:
+def _status_of(name: str) -> Callable[[ProcedureTopics, float, str, JointSnapshot], RobustControllerStatus]:
     def status(part, time_s, side, snapshot):
         procedure = part.procedures[name, side]
         return RobustControllerStatus(procedure.is_enabled, procedure.complete, procedure.uid, procedure.timed_out,
@@ -55,13 +55,13 @@ def _take(name: str) -> Callable[[ProcedureTopics, str, Any, float], None]:
     return handle
 
 
-class ProcedureTopics(Part):
-    """baxter: `robot.Baxter`; warnings: `warnings.Warnings`."""
+class ProcedureTopics(RobotPart):
+    """baxter: `robot.BaxterHardware`; warnings: `warnings.Warnings`."""
 
-    def __init__(self, baxter: Baxter, warnings: Warnings) -> None:
+    def __init__(self, baxter: BaxterHardware, warnings: Warnings) -> None:
         self._baxter, self._warnings = baxter, warnings
         self.procedures = {(name, side): Procedure(postures(name, side)) for name in PROCEDURES for side in SIDES}
-        self._updater = Updater()
+        self._updater = RefusingUpdater()
         self._schedule = Schedule(STATUS_RATE_HZ)
 
     def reset(self) -> None:
@@ -82,7 +82,7 @@ class ProcedureTopics(Part):
                 feel: Callable[[str], np.ndarray]) -> None:
         baxter = self._baxter
         own = baxter.arms.joints_of(side)
-        arm = Arm(baxter.measured.position[own], baxter.measured.velocity[own], feel(side))
+        arm = ProcedureArm(baxter.measured.position[own], baxter.measured.velocity[own], feel(side))
         order = procedure.update(time_s, baxter.state.enabled, arm)
         try:
             if order is Order.STOP:
@@ -99,45 +99,45 @@ class ProcedureTopics(Part):
     def _stop_update(self, component: None, msg: Empty, time_s: float) -> None:
         self._updater.reset()
 
-    def _plugins_loaded(self, time_s: float, side: str, snapshot: Snapshot) -> Bool:
+    def _plugins_loaded(self, time_s: float, side: str, snapshot: JointSnapshot) -> Bool:
         return Bool(True)
 
-    def _update_sources(self, time_s: float, component: None, snapshot: Snapshot) -> UpdateSources:
+    def _update_sources(self, time_s: float, component: None, snapshot: JointSnapshot) -> UpdateSources:
         return UpdateSources("", [])
 
-    def _usb_ready(self, time_s: float, component: None, snapshot: Snapshot) -> Bool:
+    def _usb_ready(self, time_s: float, component: None, snapshot: JointSnapshot) -> Bool:
         return Bool(False)
 
-    def _updater_status(self, time_s: float, component: None, snapshot: Snapshot) -> UpdateStatus:
+    def _updater_status(self, time_s: float, component: None, snapshot: JointSnapshot) -> UpdateStatus:
         return UpdateStatus(self._updater.status, 0.0, self._updater.description)
 
-    def _update_status(self, time_s: float, component: None, snapshot: Snapshot) -> Int32:
+    def _update_status(self, time_s: float, component: None, snapshot: JointSnapshot) -> Int32:
         return Int32(self._updater.status)
 
-    def _update_progress(self, time_s: float, component: None, snapshot: Snapshot) -> Int32:
+    def _update_progress(self, time_s: float, component: None, snapshot: JointSnapshot) -> Int32:
         return Int32(0)
 
     TOPICS = (
-        *(Topic("procedure_status_" + name, "/robustcontroller/{limb}/%s/status" % name,
-                "baxter_core_msgs/RobustControllerStatus", STATUS_RATE_HZ, _status_of(name),
-                "how the procedure that %s the arm is getting on" % verb) for name, (verb, _) in PROCEDURES.items()),
-        Topic("plugins_loaded", "/robustcontroller/{limb}/rc_plugins_loaded", "std_msgs/Bool", UPDATER_RATE_HZ,
-              _plugins_loaded, "true"),
-        Topic("update_sources", "/usb/update_sources", "baxter_maintenance_msgs/UpdateSources", UPDATER_RATE_HZ,
-              _update_sources,
-              "none: no stick is plugged into a simulated robot"),
-        Topic("usb_ready", "/usb/ready", "std_msgs/Bool", UPDATER_RATE_HZ, _usb_ready, "false: no stick"),
-        Topic("updater_status", "/updater/status", "baxter_maintenance_msgs/UpdateStatus", UPDATER_RATE_HZ,
-              _updater_status,
-              "idle, or invalid after an unknown update was to be started"),
-        Topic("update_status", "/update/status", "std_msgs/Int32", UPDATER_RATE_HZ,
-              _update_status, "the same as a number"),
-        Topic("update_progress", "/update/progress", "std_msgs/Int32", UPDATER_RATE_HZ, _update_progress, "0 %"),
-        *(Topic("procedure_enable_" + name, "/robustcontroller/{limb}/%s/enable" % name,
-                "baxter_maintenance_msgs/" + TYPES[name], None, _take(name),
-                "starts and keeps alive (at least once in 1.5 s) or ends the procedure that %s the arm" % verb)
+        *(TopicRow("procedure_status_" + name, "/robustcontroller/{limb}/%s/status" % name,
+                   "baxter_core_msgs/RobustControllerStatus", STATUS_RATE_HZ, _status_of(name),
+                   "how the procedure that %s the arm is getting on" % verb) for name, (verb, _) in PROCEDURES.items()),
+        TopicRow("plugins_loaded", "/robustcontroller/{limb}/rc_plugins_loaded", "std_msgs/Bool", UPDATER_RATE_HZ,
+                 _plugins_loaded, "true"),
+        TopicRow("update_sources", "/usb/update_sources", "baxter_maintenance_msgs/UpdateSources", UPDATER_RATE_HZ,
+                 _update_sources,
+                 "none: no stick is plugged into a simulated robot"),
+        TopicRow("usb_ready", "/usb/ready", "std_msgs/Bool", UPDATER_RATE_HZ, _usb_ready, "false: no stick"),
+        TopicRow("updater_status", "/updater/status", "baxter_maintenance_msgs/UpdateStatus", UPDATER_RATE_HZ,
+                 _updater_status,
+                 "idle, or invalid after an unknown update was to be started"),
+        TopicRow("update_status", "/update/status", "std_msgs/Int32", UPDATER_RATE_HZ,
+                 _update_status, "the same as a number"),
+        TopicRow("update_progress", "/update/progress", "std_msgs/Int32", UPDATER_RATE_HZ, _update_progress, "0 %"),
+        *(TopicRow("procedure_enable_" + name, "/robustcontroller/{limb}/%s/enable" % name,
+                   "baxter_maintenance_msgs/" + TYPES[name], None, _take(name),
+                   "starts and keeps alive (at least once in 1.5 s) or ends the procedure that %s the arm" % verb)
           for name, (verb, _) in PROCEDURES.items()),
-        Topic("updater_start", "/updater/start", "std_msgs/String", None,
-              _start_update, "starts an update by its id; none is known"),
-        Topic("updater_stop", "/updater/stop", "std_msgs/Empty", None, _stop_update, "back to idle"),
+        TopicRow("updater_start", "/updater/start", "std_msgs/String", None,
+                 _start_update, "starts an update by its id; none is known"),
+        TopicRow("updater_stop", "/updater/stop", "std_msgs/Empty", None, _stop_update, "back to idle"),
     )

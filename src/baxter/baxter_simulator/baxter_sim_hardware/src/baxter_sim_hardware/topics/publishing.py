@@ -14,17 +14,17 @@ from sim_time.pace import Schedule
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from loop_ros.protocol import Publisher
 
 
 class Publishing:
     """Topics by rate."""
 
-    def __init__(self, take_snapshot: Callable[[], Snapshot], survived: Callable[[str, Exception], None],
+    def __init__(self, take_snapshot: Callable[[], JointSnapshot], survived: Callable[[str, Exception], None],
                  now_s: Callable[[], float]) -> None:
-        """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception); now_s:
-        function -> simulation time [s]."""
+        """take_snapshot: function -> `snapshot.JointSnapshot`; survived: function(what was being done, exception);
+        now_s: function -> simulation time [s]."""
         self._take_snapshot, self._survived, self._now_s = take_snapshot, survived, now_s
         #: {rate of the table's rows: (its schedule, [(function, component, publisher)])}
         self._groups: dict[float | str, tuple[Schedule, list[tuple[Callable, object, Publisher]]]] = {}

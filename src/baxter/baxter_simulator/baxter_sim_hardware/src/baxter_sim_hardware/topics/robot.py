@@ -13,7 +13,7 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.robot_state import Event
 
 from . import convert
-from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
+from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from std_msgs.msg import Bool, UInt16
 
     from baxter_sim_hardware.simulated import SimulatedBaxter
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from baxter_sim_hardware.warnings import Warnings
     from gazebo_ros.model_plugin import PluginContext
     from loop_ros.protocol import Publisher
@@ -34,7 +34,7 @@ WITHOUT_SENSOR = ("head_nod", "torso_t0")
 _resets = itertools.count(1)
 
 
-class RobotTopics(Part):
+class RobotTopics(RobotPart):
     """simulated: `simulated.SimulatedBaxter`; set_joint_state_rate: function(Hz); as_robot: whether joint states come
     as the physical robot sends them: arms, head and torso in one message, grippers in another."""
 
@@ -79,11 +79,11 @@ class RobotTopics(Part):
         return [(convert.JointStates(group), np.array([names.index(name) if name in names else len(names)
                                                        for name in group])) for group in groups if group]
 
-    def _joint_states(self, time_s: float, component: None, snapshot: Snapshot) -> tuple[JointState, ...]:
+    def _joint_states(self, time_s: float, component: None, snapshot: JointSnapshot) -> tuple[JointState, ...]:
         sensed = [np.append(values, 0.0) for values in snapshot.sensed]
         return tuple(states.message(time_s, *(values[order] for values in sensed)) for states, order in self._joints)
 
-    def _assembly(self, time_s: float, component: str | None, snapshot: Snapshot) -> AssemblyState:
+    def _assembly(self, time_s: float, component: str | None, snapshot: JointSnapshot) -> AssemblyState:
         return convert.assembly_state(self._baxter.state.assembly)
 
     def _keep_started(self, publisher: Publisher) -> None:
@@ -110,28 +110,28 @@ class RobotTopics(Part):
         self.apply(Event.RESET)
 
     TOPICS = (
-        Topic("joint_states", "joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE, _joint_states,
-              "all movable joints, names in alphabetical order [rad, m; rad/s, m/s; Nm, N]; "
-              "15 without grippers, 19 with two electric ones; with the effect `states` 17 and `head_nod`, `torso_t0` "
-              "among them, and a second message for the fingers"),
-        Topic("joint_state_publish_rate", "joint_state_publish_rate", "std_msgs/UInt16", None,
-              _joint_state_publish_rate, "[Hz] 1 to 1000: rate of joint_states"),
-        Topic("state", "state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
-              "enabled, stopped, ready, emergency stop"),
-        Topic("assembly_state", "assembly/{assembly}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ,
-              _assembly, "the same as `state`: assemblies are enabled and stopped together"),
-        Topic("limb_state", "limb/{limb}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
-              "the same for the limb"),
-        Topic("head_assembly_state", "head/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
-              "the same for the head"),
-        Topic("set_super_enable", "set_super_enable", "std_msgs/Bool", None, _super_enable,
-              "true enables, false disables"),
-        Topic("set_super_stop", "set_super_stop", "std_msgs/Empty", None, _super_stop, "software stop"),
-        Topic("set_super_reset", "set_super_reset", "std_msgs/Empty", None, _super_reset,
-              "clears a stop; leaves the robot disabled"),
-        Topic("resets", "sim/resets", "std_msgs/UInt32", LATCHED, _begin_resets,
-              "a number that changes whenever the joints are put elsewhere: by a reset of the world or the simulation, "
-              "by set_model_configuration, by another robot in this one's place"),
-        Topic("started", "sim/started", "std_msgs/Empty", LATCHED, _keep_started,
-              "the robot stands, publishes and listens"),
+        TopicRow("joint_states", "joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE, _joint_states,
+                 "all movable joints, names in alphabetical order [rad, m; rad/s, m/s; Nm, N]; "
+                 "15 without grippers, 19 with two electric ones; with the effect `states` 17 and `head_nod`, "
+                 "`torso_t0` among them, and a second message for the fingers"),
+        TopicRow("joint_state_publish_rate", "joint_state_publish_rate", "std_msgs/UInt16", None,
+                 _joint_state_publish_rate, "[Hz] 1 to 1000: rate of joint_states"),
+        TopicRow("state", "state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+                 "enabled, stopped, ready, emergency stop"),
+        TopicRow("assembly_state", "assembly/{assembly}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ,
+                 _assembly, "the same as `state`: assemblies are enabled and stopped together"),
+        TopicRow("limb_state", "limb/{limb}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+                 "the same for the limb"),
+        TopicRow("head_assembly_state", "head/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+                 "the same for the head"),
+        TopicRow("set_super_enable", "set_super_enable", "std_msgs/Bool", None, _super_enable,
+                 "true enables, false disables"),
+        TopicRow("set_super_stop", "set_super_stop", "std_msgs/Empty", None, _super_stop, "software stop"),
+        TopicRow("set_super_reset", "set_super_reset", "std_msgs/Empty", None, _super_reset,
+                 "clears a stop; leaves the robot disabled"),
+        TopicRow("resets", "sim/resets", "std_msgs/UInt32", LATCHED, _begin_resets,
+                 "a number that changes whenever the joints are put elsewhere: by a reset of the world or the "
+                 "simulation, by set_model_configuration, by another robot in this one's place"),
+        TopicRow("started", "sim/started", "std_msgs/Empty", LATCHED, _keep_started,
+                 "the robot stands, publishes and listens"),
     )

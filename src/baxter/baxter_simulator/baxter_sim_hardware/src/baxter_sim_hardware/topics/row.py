@@ -21,19 +21,19 @@ COMPONENTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG),
 
 
 @dataclass(frozen=True)
-class Topic:
+class TopicRow:
     """One row.
 
     key: short name, used in log lines. name: below the robot's namespace unless it begins with a slash, with one of
     COMPONENTS in braces if each has its own topic. rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics that the
-    robot subscribes to. function: the method of a `Part` behind the topic. Its arguments are
+    robot subscribes to. function: the method of a `RobotPart` behind the topic. Its arguments are
 
     - (time_s, component, snapshot) for a topic with a rate; it returns the message;
     - (publisher) for a latched topic; it is called once and publishes on its own;
     - (component, message, time_s) for a topic that the robot subscribes to; it raises CommandRefused.
 
     component: one of COMPONENTS, None for a single topic, (limb, joint) for a topic of each joint; snapshot:
-    `snapshot.Snapshot`.
+    `snapshot.JointSnapshot`.
     """
 
     key: str
@@ -57,10 +57,10 @@ class Topic:
         return names
 
 
-class Part:
+class RobotPart:
     """A part of the robot that has topics. TOPICS: its rows; their functions are methods of this class."""
 
-    TOPICS: tuple[Topic, ...] = ()
+    TOPICS: tuple[TopicRow, ...] = ()
 
     @property
     def publishers(self) -> dict[str, MethodType]:

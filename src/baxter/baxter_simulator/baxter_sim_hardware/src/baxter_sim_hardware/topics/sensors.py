@@ -18,13 +18,13 @@ from baxter_sim_hardware.sensing.panel import RANGE_SENSORS
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 
-from .row import STATE_RATE_HZ, Part, Topic
+from .row import STATE_RATE_HZ, RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from baxter_sim_hardware.sensing.noise import HandSensors
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from gazebo_ros.model_plugin import PluginContext
 
     from .panel import PanelTopics
@@ -45,7 +45,7 @@ def _moving(chain: Chain, position: np.ndarray, velocity: np.ndarray) -> tuple[n
     return pose, jacobian[:3] @ velocity
 
 
-class SensorTopics(Part):
+class SensorTopics(RobotPart):
     """context: the plugin's PluginContext; limb_index: {side: (7,) indices of its joints in the model's}; dt: length of
     a tick [s]; hands: `sensing.noise.HandSensors`, or None where sensors are exact.
 
@@ -108,16 +108,16 @@ class SensorTopics(Part):
         distance = float(fraction) * sensors.RANGE_MAX_M
         return distance if self._hands is None else self._hands.range(side, self._world.time_s, distance)
 
-    def _range(self, time_s: float, side: str, snapshot: Snapshot) -> Range:
+    def _range(self, time_s: float, side: str, snapshot: JointSnapshot) -> Range:
         return Range(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), Range.INFRARED, sensors.RANGE_FIELD_RAD,
                      sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, sensors.range_from_hit(self._hit(side)))
 
-    def _scan(self, time_s: float, side: str, snapshot: Snapshot) -> LaserScan:
+    def _scan(self, time_s: float, side: str, snapshot: JointSnapshot) -> LaserScan:
         hit = self._hit(side)
         return LaserScan(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), 0.0, 0.0, 0.0, 0.0, 0.0,
                          sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, [math.inf if hit is None else hit], [])
 
-    def _accelerometer(self, time_s: float, side: str, snapshot: Snapshot) -> Imu:
+    def _accelerometer(self, time_s: float, side: str, snapshot: JointSnapshot) -> Imu:
         force = np.zeros(3)
         if side in self._chains:
             chain, index = self._chains[side], self._limb_index[side]
@@ -146,7 +146,7 @@ class SensorTopics(Part):
         fractions = self._world.ray_test_batch(near, near + span * rays).reshape(directions.shape[:2]).min(axis=1)
         return np.where(fractions < 1.0, sensors.SONAR_MIN_M + span * fractions, np.inf)
 
-    def _sonar(self, time_s: float, component: None, snapshot: Snapshot) -> PointCloud:
+    def _sonar(self, time_s: float, component: None, snapshot: JointSnapshot) -> PointCloud:
         echoes = self._ring.echoes(self._distances())
         # The beam's axis lies in the plane of the ring.
         ahead = self._directions.sum(axis=1)
@@ -161,16 +161,16 @@ class SensorTopics(Part):
         mask = self._ring.overridden(time_s)
         return self._ring.heard(self._distances()) if mask is None else mask
 
-    def _lights(self, time_s: float, component: None, snapshot: Snapshot) -> UInt16:
+    def _lights(self, time_s: float, component: None, snapshot: JointSnapshot) -> UInt16:
         return UInt16(self._lit(time_s))
 
-    def _sonars_enabled(self, time_s: float, component: None, snapshot: Snapshot) -> UInt16:
+    def _sonars_enabled(self, time_s: float, component: None, snapshot: JointSnapshot) -> UInt16:
         return UInt16(self._ring.enabled)
 
-    def _green_level(self, time_s: float, component: None, snapshot: Snapshot) -> Float32:
+    def _green_level(self, time_s: float, component: None, snapshot: JointSnapshot) -> Float32:
         return Float32(self._ring.levels["green"])
 
-    def _red_level(self, time_s: float, component: None, snapshot: Snapshot) -> Float32:
+    def _red_level(self, time_s: float, component: None, snapshot: JointSnapshot) -> Float32:
         return Float32(self._ring.levels["red"])
 
     def _enable_sonars(self, component: None, msg: UInt16, time_s: float) -> None:
@@ -186,32 +186,32 @@ class SensorTopics(Part):
         self._ring.set_level("red", msg.data)
 
     TOPICS = (
-        Topic("hand_range", "range/{limb}_hand_range/state", "sensor_msgs/Range", STATE_RATE_HZ, _range,
-              "infrared, 0.004 to 0.4 m along x of `<limb>_hand_range`; 65.535 m where it sees nothing"),
-        Topic("hand_range_scan", "/sim/laserscan/{limb}_hand_range/state", "sensor_msgs/LaserScan", STATE_RATE_HZ,
-              _scan,
-              "the same as a scan of one ray, as the vendor's simulator has it; `inf` where it sees nothing"),
-        Topic("accelerometer", "accelerometer/{limb}_accelerometer/state", "sensor_msgs/Imu", STATE_RATE_HZ,
-              _accelerometer,
-              "acceleration less gravity in `<limb>_hand_accelerometer` [m/s^2]: 9.81 upwards at rest; no rates, no "
-              "orientation"),
-        Topic("sonar", "sonar/head_sonar/state", "sensor_msgs/PointCloud", SONAR_RATE_HZ, _sonar,
-              "a point in `sonar_ring` for each of the 12 sonars that is switched on and hears something within 10 m; "
-              "channels SensorId, Distance [m]"),
-        Topic("sonars_enabled", "sonar/head_sonar/sonars_enabled", "std_msgs/UInt16", SONAR_RATE_HZ, _sonars_enabled,
-              "a bit for each sonar; 4095, all on, at the start"),
-        Topic("sonar_lights", "sonar/head_sonar/lights/state", "std_msgs/UInt16", SONAR_RATE_HZ, _lights,
-              "a bit for each light: those that `set_lights` asks for, else those whose sonar hears something"),
-        Topic("sonar_green_level", "sonar/head_sonar/lights/green_level", "std_msgs/Float32", SONAR_RATE_HZ,
-              _green_level, "0 to 100"),
-        Topic("sonar_red_level", "sonar/head_sonar/lights/red_level", "std_msgs/Float32", SONAR_RATE_HZ,
-              _red_level, "0 to 100"),
-        Topic("set_sonars_enabled", "sonar/head_sonar/set_sonars_enabled", "std_msgs/UInt16", None, _enable_sonars,
-              "a bit for each sonar, 0 to 4095"),
-        Topic("set_lights", "sonar/head_sonar/lights/set_lights", "std_msgs/UInt16", None, _set_lights,
-              "for 0.2 s: bit 15 and a bit for each light to be lit"),
-        Topic("set_green_level", "sonar/head_sonar/lights/set_green_level", "std_msgs/Float32", None,
-              _set_green_level, "0 to 100"),
-        Topic("set_red_level", "sonar/head_sonar/lights/set_red_level", "std_msgs/Float32", None,
-              _set_red_level, "0 to 100"),
+        TopicRow("hand_range", "range/{limb}_hand_range/state", "sensor_msgs/Range", STATE_RATE_HZ, _range,
+                 "infrared, 0.004 to 0.4 m along x of `<limb>_hand_range`; 65.535 m where it sees nothing"),
+        TopicRow("hand_range_scan", "/sim/laserscan/{limb}_hand_range/state", "sensor_msgs/LaserScan", STATE_RATE_HZ,
+                 _scan,
+                 "the same as a scan of one ray, as the vendor's simulator has it; `inf` where it sees nothing"),
+        TopicRow("accelerometer", "accelerometer/{limb}_accelerometer/state", "sensor_msgs/Imu", STATE_RATE_HZ,
+                 _accelerometer,
+                 "acceleration less gravity in `<limb>_hand_accelerometer` [m/s^2]: 9.81 upwards at rest; no rates, no "
+                 "orientation"),
+        TopicRow("sonar", "sonar/head_sonar/state", "sensor_msgs/PointCloud", SONAR_RATE_HZ, _sonar,
+                 "a point in `sonar_ring` for each of the 12 sonars that is switched on and hears something within 10 "
+                 "m; channels SensorId, Distance [m]"),
+        TopicRow("sonars_enabled", "sonar/head_sonar/sonars_enabled", "std_msgs/UInt16", SONAR_RATE_HZ, _sonars_enabled,
+                 "a bit for each sonar; 4095, all on, at the start"),
+        TopicRow("sonar_lights", "sonar/head_sonar/lights/state", "std_msgs/UInt16", SONAR_RATE_HZ, _lights,
+                 "a bit for each light: those that `set_lights` asks for, else those whose sonar hears something"),
+        TopicRow("sonar_green_level", "sonar/head_sonar/lights/green_level", "std_msgs/Float32", SONAR_RATE_HZ,
+                 _green_level, "0 to 100"),
+        TopicRow("sonar_red_level", "sonar/head_sonar/lights/red_level", "std_msgs/Float32", SONAR_RATE_HZ,
+                 _red_level, "0 to 100"),
+        TopicRow("set_sonars_enabled", "sonar/head_sonar/set_sonars_enabled", "std_msgs/UInt16", None, _enable_sonars,
+                 "a bit for each sonar, 0 to 4095"),
+        TopicRow("set_lights", "sonar/head_sonar/lights/set_lights", "std_msgs/UInt16", None, _set_lights,
+                 "for 0.2 s: bit 15 and a bit for each light to be lit"),
+        TopicRow("set_green_level", "sonar/head_sonar/lights/set_green_level", "std_msgs/Float32", None,
+                 _set_green_level, "0 to 100"),
+        TopicRow("set_red_level", "sonar/head_sonar/lights/set_red_level", "std_msgs/Float32", None,
+                 _set_red_level, "0 to 100"),
     )

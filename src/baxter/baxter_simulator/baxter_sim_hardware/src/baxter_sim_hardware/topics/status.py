@@ -14,32 +14,32 @@ from baxter_sim_hardware import status
 from baxter_sim_hardware.arms.joint_command import Mode
 from sim_time.stamps import stamp
 
-from .row import LATCHED, Part, Topic
+from .row import LATCHED, RobotPart, TopicRow
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from baxter_sim_hardware.robot import Baxter
-    from baxter_sim_hardware.snapshot import Snapshot
+    from baxter_sim_hardware.robot import BaxterHardware
+    from baxter_sim_hardware.snapshot import JointSnapshot
     from loop_ros.protocol import Log, Publisher
 
 DIAGNOSTICS_RATE_HZ = 1.0
 AGGREGATE = "/Baxter"
 
 
-class StatusTopics(Part):
-    """baxter: `robot.Baxter`; limb_index: {side: (7,) indices of its joints in the model's}; links: names of the
-    robot's; urdf_xml: its description; log: of the plugin's context."""
+class StatusTopics(RobotPart):
+    """baxter: `robot.BaxterHardware`; limb_index: {side: (7,) indices of its joints in the model's}; links: names of
+    the robot's; urdf_xml: its description; log: of the plugin's context."""
 
     _urdf: Publisher  # from `_begin_urdf` on, before any message
 
-    def __init__(self, baxter: Baxter, limb_index: Mapping[str, np.ndarray], links: Collection[str], urdf_xml: str,
-                 log: Log) -> None:
+    def __init__(self, baxter: BaxterHardware, limb_index: Mapping[str, np.ndarray], links: Collection[str],
+                 urdf_xml: str, log: Log) -> None:
         self._baxter, self._limb_index = baxter, limb_index
         self._links, self._urdf_xml, self._log = links, urdf_xml, log
         self._fragment_time = None
 
-    def _statuses(self, snapshot: Snapshot) -> list[DiagnosticStatus]:
+    def _statuses(self, snapshot: JointSnapshot) -> list[DiagnosticStatus]:
         arms = self._baxter.arms
         level, text = status.level_of(self._baxter.state.state)
         statuses = [DiagnosticStatus(level, "state", text, "baxter", [])]
@@ -53,17 +53,17 @@ class StatusTopics(Part):
                                              [KeyValue(key, value) for key, value in values.items()]))
         return statuses
 
-    def _diagnostics(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticArray:
+    def _diagnostics(self, time_s: float, component: None, snapshot: JointSnapshot) -> DiagnosticArray:
         return _array(time_s, self._statuses(snapshot))
 
-    def _aggregate(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticArray:
+    def _aggregate(self, time_s: float, component: None, snapshot: JointSnapshot) -> DiagnosticArray:
         statuses = self._statuses(snapshot)
         top = _worst(AGGREGATE, statuses)
         for each in statuses:
             each.name = "%s/%s" % (AGGREGATE, each.name)
         return _array(time_s, [top, *statuses])
 
-    def _toplevel(self, time_s: float, component: None, snapshot: Snapshot) -> DiagnosticStatus:
+    def _toplevel(self, time_s: float, component: None, snapshot: JointSnapshot) -> DiagnosticStatus:
         return _worst("toplevel_state", self._statuses(snapshot))
 
     def _begin_urdf(self, publisher: Publisher) -> None:
@@ -82,16 +82,16 @@ class StatusTopics(Part):
         self._log.info("urdf fragment on link '%s' is passed on; it weighs nothing here" % msg.link)
 
     TOPICS = (
-        Topic("urdf", "urdf", "baxter_core_msgs/URDFConfiguration", LATCHED, _begin_urdf,
-              "the robot's description; after a fragment was accepted, that fragment"),
-        Topic("urdf_fragment", "urdf", "baxter_core_msgs/URDFConfiguration", None, _take_fragment,
-              "a fragment to hang on a link of the robot: checked and passed on; it weighs nothing here"),
-        Topic("diagnostics", "/diagnostics", "diagnostic_msgs/DiagnosticArray", DIAGNOSTICS_RATE_HZ, _diagnostics,
-              "robot state and, for each arm, mode, speed ratio, time-out, largest torque"),
-        Topic("diagnostics_agg", "/diagnostics_agg", "diagnostic_msgs/DiagnosticArray", DIAGNOSTICS_RATE_HZ,
-              _aggregate, "the same below `/Baxter`, which has the worst level of all"),
-        Topic("diagnostics_toplevel_state", "/diagnostics_toplevel_state", "diagnostic_msgs/DiagnosticStatus",
-              DIAGNOSTICS_RATE_HZ, _toplevel, "the worst level of all"),
+        TopicRow("urdf", "urdf", "baxter_core_msgs/URDFConfiguration", LATCHED, _begin_urdf,
+                 "the robot's description; after a fragment was accepted, that fragment"),
+        TopicRow("urdf_fragment", "urdf", "baxter_core_msgs/URDFConfiguration", None, _take_fragment,
+                 "a fragment to hang on a link of the robot: checked and passed on; it weighs nothing here"),
+        TopicRow("diagnostics", "/diagnostics", "diagnostic_msgs/DiagnosticArray", DIAGNOSTICS_RATE_HZ, _diagnostics,
+                 "robot state and, for each arm, mode, speed ratio, time-out, largest torque"),
+        TopicRow("diagnostics_agg", "/diagnostics_agg", "diagnostic_msgs/DiagnosticArray", DIAGNOSTICS_RATE_HZ,
+                 _aggregate, "the same below `/Baxter`, which has the worst level of all"),
+        TopicRow("diagnostics_toplevel_state", "/diagnostics_toplevel_state", "diagnostic_msgs/DiagnosticStatus",
+                 DIAGNOSTICS_RATE_HZ, _toplevel, "the worst level of all"),
     )
 
 
