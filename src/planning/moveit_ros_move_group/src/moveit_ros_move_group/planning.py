@@ -16,7 +16,7 @@ from moveit_msgs.msg import MoveItErrorCodes
 from motion_planning import pipeline
 from motion_planning.constraints import sampler
 from motion_planning.errors import PlanningError
-from motion_planning.planners import SearchOptions, plan_path
+from motion_planning.planners import SearchOptions, plan_path, warm_up
 from motion_planning.planners.names import config_name, kind_of, planner_of
 from motion_planning.replanning import redirected
 from motion_planning.scene import Scene
@@ -147,6 +147,8 @@ class Planner:
                 raise RequestError(MoveItErrorCodes.PREEMPTED, "stopped while the robot was prepared for planning")
 
     def _warm_up(self) -> None:
+        # What these plans do not call, a later one does, while an arm moves.
+        warm_up()
         context = self._context
         scene = Scene(context.model)
         for name, group in context.model.groups.items():
