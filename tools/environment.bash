@@ -129,12 +129,20 @@ fingerprint() {
     } | sha256sum
 }
 
+# loops_are_compiled: are the inner loops what the last set-up compiled? Else each node that needs them would compile them
+# for itself, for two minutes.
+loops_are_compiled() {
+    local sums=$LAB_ROOT/.baxter/kernels.sums
+    [[ ! -f $sums ]] || sha256sum --check --status "$sums" 2>/dev/null
+}
+
 # is_set_up FINGERPRINT: does everything exist that the lab needs? A set-up that runs in another shell on unchanged
 # files removes nothing; an interrupted one may have removed files.
 is_set_up() {
     local state=$LAB_ROOT/.baxter
     [[ -f $state/done && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 && $(<"$state/done") == "$1" ]] ||
         return 1
+    loops_are_compiled || return 1
     [[ ! -f $state/at_work ]] || ! flock -n "$state/lock" true
 }
 

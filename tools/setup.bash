@@ -341,10 +341,16 @@ step_kernels() {
     fi
     # Some packages have files that are no Python of this version.
     groups+=("python3 -m compileall -q $(printf '%q' "$VENV")/lib/python3*/site-packages >/dev/null || true")
+    rm -f "$STATE/kernels.list"
     # On all cores. What fails, perhaps for lack of memory, is repeated alone and told: numba does not compile again what
     # is in the cache.
-    run bash -c 'source "$1/tools/environment.bash" && use_build && shift && printf "%s\0" "$@" |
-        xargs -0 -P "$(nproc)" -n 1 bash -c || echo "A group failed; each is repeated alone."' compile "$LAB_ROOT" "${groups[@]}"
+    run bash -c 'source "$1/tools/environment.bash" && use_build && export LAB_COMPILED_SOURCES=$2 && shift 2 &&
+        printf "%s\0" "$@" | xargs -0 -P "$(nproc)" -n 1 bash -c || echo "A group failed; each is repeated alone."' compile "$LAB_ROOT" \
+        "$STATE/kernels.list" "${groups[@]}"
+    if [[ -f $STATE/kernels.list ]]; then
+        sort -u "$STATE/kernels.list" | tr '\n' '\0' | xargs -0 sha256sum >"$STATE/kernels.sums.new"
+        mv "$STATE/kernels.sums.new" "$STATE/kernels.sums"
+    fi
     if grep -q "^A group failed" "$step_log"; then
         for group in "${COMPILED[@]}"; do
             run bash -c 'source "$1/tools/environment.bash" && use_build && eval "$2"' compile "$LAB_ROOT" "$group"

@@ -279,6 +279,21 @@ def set_up_copy(tmp_path):
     return copy
 
 
+def test_set_up_is_stale_when_an_inner_loop_has_changed(set_up_copy):
+    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; is_set_up "$(fingerprint)"'
+    loop = set_up_copy / "loop.py"
+    for text, is_set_up in (("one", True), ("two", False), (None, False)):
+        if text is None:
+            loop.unlink()
+        else:
+            loop.write_text(text)
+        if is_set_up:
+            sums = subprocess.run(["sha256sum", str(loop)], capture_output=True, text=True, check=True).stdout
+            (set_up_copy / ".baxter/kernels.sums").write_text(sums)
+        done = subprocess.run(["bash", "-c", script, "x", str(set_up_copy)], capture_output=True, text=True)
+        assert (done.returncode == 0, done.stdout, done.stderr) == (is_set_up, "", "")
+
+
 def new_package(copy, name):
     (copy / "src" / name).mkdir()
     (copy / "src" / name / "package.xml").write_text(

@@ -68,7 +68,7 @@ def check_build(facts: Facts) -> Iterator[Finding]:
         what = "no set-up has been completed with the present packages"
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
     elif facts.is_fresh is False:
-        what = "packages, messages or requirements have changed since the last set-up"
+        what = "packages, messages, requirements or inner loops have changed since the last set-up"
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
     else:
         yield Finding("build", Level.OK, f"{facts.root} is built and up to date")

@@ -316,8 +316,9 @@ def own_packages(root: Path) -> list[str]:
 
 
 def is_fresh(root: Path) -> bool:
-    """Whether the fingerprint of the last set-up is still valid, by baxter.sh's own function."""
-    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; [[ $(<"$1/.baxter/done") == "$(fingerprint)" ]]'
+    """Whether the last set-up is still valid, by baxter.sh's own functions."""
+    script = ('LAB_ROOT=$1; source "$1/tools/environment.bash"; '
+              '[[ $(<"$1/.baxter/done") == "$(fingerprint)" ]] && loops_are_compiled')
     return subprocess.run(["bash", "-c", script, "fresh", str(root)], capture_output=True).returncode == 0
 
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from disk_cache.files import cache_home, spare_folder
 
+#: Environment variable: a file to which the paths of the sources of compiled code are added, one a line.
+SOURCES_VARIABLE = "LAB_COMPILED_SOURCES"
 # Number of folders of other states of the sources that are kept: a second checkout may use the same cache.
 _KEPT = 3
 
@@ -28,7 +30,11 @@ def compiler(name: str, sources: Iterable[str | Path], **options: Any) -> Callab
     import numba  # callers of folder() need no numba
     from numba.core import config as settings
 
+    sources = list(sources)
     place = folder(name, sources)
+    if listed := os.environ.get(SOURCES_VARIABLE):
+        with open(listed, "a", encoding="utf-8") as file:  # one call of write: processes that run beside each other
+            file.write("".join(f"{os.path.abspath(source)}\n" for source in sources))
 
     def compiled(function: Callable[..., Any]) -> Any:
         config: Any = settings  # its entries are made at run time

@@ -86,6 +86,14 @@ def _double(value):
     return 2 * value
 
 
+def test_sources_of_compiled_code_are_listed_where_that_is_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("LAB_COMPILED_SOURCES", str(tmp_path / "sources"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    for _ in range(2):
+        compiler("some", iter([Path(__file__)]))
+    assert (tmp_path / "sources").read_text() == 2 * f"{__file__}\n"
+
+
 def test_without_numba_it_says_so_when_something_is_to_be_compiled(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     with pytest.raises(ImportError):
