@@ -129,10 +129,10 @@ def answers(path):
 
 
 def posture():
-    """The joint states of a robot at rest in its neutral posture, at the robot's own rate."""
+    """The joint states of a robot at rest in its neutral posture, at the robot's own rate. The kinematics node listens
+    from its first request on."""
     names = [name for side in SIDES for name in joint_names(side)]
     publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
-    wait_until(publisher.get_num_connections, "a subscriber", 60.0)
     up()
     for _ in beats(50.0, rospy.is_shutdown):
         message = JointState(name=names, position=2 * NEUTRAL)

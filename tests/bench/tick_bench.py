@@ -91,7 +91,7 @@ class Loop(BareWorld):
         writer = SnapshotWriter()
         stack.callback(writer.close)
         ros, log = _Ros(), SimpleNamespace(info=lambda text: None, warn=print, error=_refuse)
-        source, host = PluginSource(self.robot, namespace="/robot"), PluginHost(add_screen=lambda *_: None)
+        source, host = PluginSource(self.robot, None, "/robot"), PluginHost(add_screen=lambda *_: None)
         parameters = {"baxter_sim_hardware": {"enable": True}}
         context = PluginContext(self.world, self.model, source, log, ros, parameters, host)
         self._subscriptions = ros.subscriptions
