@@ -18,8 +18,10 @@ Errors = Callable[[Array], Array]
 BLOCKS = 10
 MAX_ROUNDS = 16
 TRIES = 5
-#: By how much of itself a number is changed where no step makes the cost less.
-SHARES = (0.05, 0.15)
+#: By how many of its steps, and by how much of itself, a number is changed where no step makes the cost less.
+STEPS, SHARES = (1.0, 3.0), (0.05, 0.15)
+#: By how many standard deviations numbers are changed together there.
+DEVIATIONS = (1.0, 5.0)
 #: A round that makes the cost less by a smaller share is the last one.
 ENOUGH = 1e-4
 MIN_EIGENVALUE = 1e-9  # of the slopes' correlation
@@ -62,7 +64,9 @@ def least_squares(errors: Errors, start: Array, bounds: FitBounds, rows: NDArray
             damping *= 10.0
         if before - _cost(error[counts]) < ENOUGH * before:
             # Friction makes corners, at which slopes mislead.
-            numbers, error, damping = *_one_by_one(errors, numbers, error, counts, bounds), 1e-3
+            numbers, error = _one_by_one(errors, numbers, error, counts, bounds)
+            numbers, error = _along_valleys(errors, numbers, error, slopes, counts, bounds)
+            damping = 1e-3
             if before - _cost(error[counts]) < ENOUGH * before:
                 break
         slopes = slopes_of(errors, numbers, error, bounds)
@@ -71,14 +75,40 @@ def least_squares(errors: Errors, start: Array, bounds: FitBounds, rows: NDArray
 
 def _one_by_one(errors: Errors, numbers: Array, error: Array, counts: NDArray[np.bool_],
                 bounds: FitBounds) -> tuple[Array, Array]:
-    """Change each number by itself, by a step or by a share of itself, and by twice as much each time, as long as the
+    """Change each number by itself, by steps or by a share of itself, and by twice as much each time, as long as the
     cost becomes less."""
     for index in range(len(numbers)):
-        for by in (sign * size for size in (bounds.step[index], *(share * abs(numbers[index]) for share in SHARES))
-                   for sign in (1.0, -1.0)):
+        sizes = (*(many * bounds.step[index] for many in STEPS), *(share * abs(numbers[index]) for share in SHARES))
+        for by in (sign * size for size in sizes for sign in (1.0, -1.0)):
             while True:
                 tried = numbers.copy()
                 tried[index] = np.clip(tried[index] + by, bounds.least[index], bounds.most[index])
+                new = errors(tried)
+                if not _cost(new[counts]) < _cost(error[counts]):
+                    break
+                numbers, error, by = tried, new, 2.0 * by
+    return numbers, error
+
+
+def _along_valleys(errors: Errors, numbers: Array, error: Array, slopes: Array, counts: NDArray[np.bool_],
+                   bounds: FitBounds) -> tuple[Array, Array]:
+    """Change the numbers together, along the principal directions of their slopes, by a standard deviation in that
+    direction or by several, and by twice as much each time, as long as the cost becomes less. Numbers that make up for
+    each other, as the gain and the damping of a joint, move together or not at all."""
+    flat = slopes[:, counts].reshape(len(slopes), -1)
+    size = np.sqrt(np.einsum("ij,ij->i", flat, flat))
+    moves = size > 1e-6
+    unit = flat[moves] / size[moves, None]
+    values, vectors = np.linalg.eigh(unit @ unit.T)
+    noise = np.sqrt(np.mean(error[counts] ** 2))
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value < MIN_EIGENVALUE:
+            continue
+        along = np.zeros(len(numbers))
+        along[moves] = noise / np.sqrt(value) * vector / size[moves]
+        for by in (sign * many for many in DEVIATIONS for sign in (1.0, -1.0)):
+            while True:
+                tried = np.clip(numbers + by * along, bounds.least, bounds.most)
                 new = errors(tried)
                 if not _cost(new[counts]) < _cost(error[counts]):
                     break

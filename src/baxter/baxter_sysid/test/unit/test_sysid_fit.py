@@ -60,6 +60,24 @@ def test_a_number_that_changes_nothing_is_kept_and_has_no_certainty():
     assert fit.numbers == pytest.approx([1.0, 1.5]) and np.isinf(fit.deviation[1])
 
 
+def test_numbers_that_make_up_for_each_other_move_together():
+    """Any change of one of them alone is worse, and at the corner slopes say that both are."""
+    def errors(numbers):
+        return np.array([[100.0 * abs(numbers[0] - numbers[1])], [0.5 * numbers.sum() - 1.0]])
+
+    found = least_squares(errors, np.array([0.5, 0.5]), FitBounds(np.zeros(2), np.full(2, 5.0), np.full(2, 0.01)))
+    np.testing.assert_allclose(found.numbers, 1.0, atol=1e-3)
+
+
+def test_a_number_leaves_a_hollow_of_a_few_steps():
+    """As the torque that friction held at the start: the cost has a second least value beside the true one."""
+    def errors(numbers):
+        return np.interp(numbers[:1], (-0.2, -0.05, -0.02, 0.0, 0.2), (4.0, 1.5, 1.6, 0.0, 4.0))[:, None]
+
+    found = least_squares(errors, np.array([-0.05]), FitBounds(np.array([-1.0]), np.array([1.0]), np.array([0.02])))
+    assert abs(found.numbers[0]) < 0.005
+
+
 def test_numbers_stay_within_their_bounds():
     tight = BOUNDS._replace(most=np.array([1.5, 5.0]))
     fit = least_squares(lambda numbers: model(numbers) - model(TRUE), np.array([1.0, 0.5]), tight)
