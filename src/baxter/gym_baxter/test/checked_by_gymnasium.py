@@ -33,6 +33,8 @@ def main():
     np.testing.assert_array_equal(first["agent_pos"], second["agent_pos"])
     pixels.close()
     many = gymnasium.make_vec("gym_baxter/Reach-v0", num_envs=2, vectorization_mode="async", options=PLAIN)
+    # LeRobot asks for both, and processes that lack one end.
+    assert many.call("task") == ("Reach", "Reach") and all(many.call("task_description"))
     alone = gymnasium.make("gym_baxter/Reach-v0", options=PLAIN)
     both = [many.reset(seed=[3, 4])[0]]
     both += [many.step(np.full((2, 16), value, dtype=np.float32))[0] for value in (0.2, -0.4)]

@@ -125,7 +125,7 @@ def sets_are_joined_cut_and_continued():
 def a_policy_is_trained_and_evaluated():
     run("lerobot-train", "--dataset.repo_id=local/%s" % SET.name, "--dataset.root=%s" % SET, *_SMALL, "--steps=2",
         "--batch_size=4", "--num_workers=0", "--output_dir=%s" % (SCRATCH / "trained"), "--wandb.enable=false")
-    about = json.loads((SET / "meta/baxter.json").read_text(encoding="utf-8"))
+    about = json.loads((SET / "meta/baxter.json").read_text(encoding="utf-8"))["about"]
     policy = next((SCRATCH / "trained/checkpoints").glob("*2/pretrained_model"))
     for name, batch in (("alone", 1), ("together", 2)):
         run("lerobot-eval", "--policy.path=%s" % policy, "--policy.device=cpu", "--env.type=baxter",

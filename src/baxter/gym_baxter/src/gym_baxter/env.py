@@ -22,7 +22,7 @@ _FAR = 100.0
 class BaxterEnv(gymnasium.Env, EzPickle):
     """One task: the arguments are those of `core.Choices`. An episode ends when the task is done, and is truncated by
     Gymnasium's TimeLimit. `info` has ``is_success``. `reset(options={"state": s})` begins at a state of ``save()``.
-    Attribute `task_description`: the task in words."""
+    Attributes `task`: its name; `task_description`: the task in words."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
@@ -33,7 +33,8 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         self.render_mode = render_mode
         self._core = Core(task, Choices(**choices))
         self.metadata = {**type(self).metadata, "render_fps": self._core.choices.control_freq}
-        self.task_description = self._core.task.SENTENCE
+        # lerobot-eval asks a vector of processes for both, and one that lacks either loses its processes.
+        self.task, self.task_description = task, self._core.task.SENTENCE
         self.action_space = spaces.Box(-1.0, 1.0, (self._core.action_size,), np.float32)
         self._core.reset(np.random.default_rng(0))
         self.observation_space = _space(self._given(self._core.observation()))
