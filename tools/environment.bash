@@ -133,7 +133,7 @@ fingerprint() {
 # for itself, for two minutes.
 loops_are_compiled() {
     local sums=$LAB_ROOT/.baxter/kernels.sums
-    [[ ! -f $sums ]] || sha256sum --check --status "$sums" 2>/dev/null
+    [[ ! -s $sums ]] || sha256sum --check --status "$sums" 2>/dev/null
 }
 
 # is_set_up FINGERPRINT: does everything exist that the lab needs? A set-up that runs in another shell on unchanged

@@ -115,11 +115,11 @@ def _redirected(query: PlanQuery, tools: Tools, running: Running, choices: Seque
     again = replace(query, scene=scene, goals=_goals(query, tools, running, scene), attempts=1,
                     allowed_time=max(1e-3, searched - running.now()))
     found = plan(again, replace(tools, stop=lambda: tools.stop() or running.now() > searched))
-    tools = replace(tools, stop=lambda stop=tools.stop: stop() or running.now() > end)
+    joining = replace(tools, stop=lambda: tools.stop() or running.now() > end)
     velocity = np.maximum(scene.model.velocity[group.indices] * query.velocity_scaling,
                           np.abs(running.timed.sampled([start])[1][0]))
     for overlap, timed in joinings(braking, found.timed, velocity, scene.model.acceleration[group.indices]):
-        flaw = checked(again, tools, timed, braking.duration + 1e-6)
+        flaw = checked(again, joining, timed, braking.duration + 1e-6)
         if running.now() > end:
             raise PlanningFailure(Code.TIMED_OUT, "another way was found too late, after %.3f s"
                                   % (running.now() - begin))
