@@ -32,6 +32,8 @@ _SENDING_S, _SEARCHING = 0.02, 0.5
 # How far ahead of now joints that are to stop begin to brake [s], and the multiples of their limits of acceleration
 # that are tried: what is near is worth a hard stop.
 _BRAKING_AHEAD_S, _HARDER = 0.05, (1.0, 2.0, 4.0, 8.0)
+# Shares of the time until the obstacle after which joints may still be able to stop, the longest first.
+_SHARES = (0.75, 0.5, 0.25, 0.1)
 # Distance of checked states [rad or m, in any joint].
 _APART = 0.01
 # Greatest deviation of goal joints [rad or m].
@@ -78,6 +80,17 @@ def stopped(exact: ExactChecker, scene: Scene, group: Group, running: Running) -
         if found is not None:
             return Stop(led(found[1]), found[0], harder)
     return None
+
+
+def last_stop(exact: ExactChecker, scene: Scene, group: Group, running: Running) -> float:
+    """Return until when a search may last: the latest of some times on a :class:`Running` trajectory [s] at which
+    :func:`stopped` still finds a way to rest within the joints' limits of acceleration; now, if there is none."""
+    now, limit = running.now(), scene.model.acceleration[group.indices]
+    for share in _SHARES:
+        until = now + share * (running.blocked_from - now)
+        if _at_rest(exact, scene, group, running, until + _BRAKING_AHEAD_S, limit) is not None:
+            return until
+    return now
 
 
 def redirected(query: PlanQuery, tools: Tools, running: Running) -> Redirection:

@@ -10,7 +10,7 @@ from motion_planning.constraints import ConstraintSet, JointTarget, sampler
 from motion_planning.exact import ExactChecker
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools
 from motion_planning.planners import plan_path
-from motion_planning.replanning import Running, redirected, stopped
+from motion_planning.replanning import Running, last_stop, redirected, stopped
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.timing import time_path
 from urdf_model import Box
@@ -139,6 +139,18 @@ def test_joints_stop_as_gently_as_the_room_allows(probot, exact):
         accelerations = found.timed.peaks()[1]
         assert (accelerations <= found.harder * probot.acceleration[lab.group.indices] * 1.02).all()
     assert multiples[0] == 1.0 and len(multiples) >= 2 and multiples[1] > 1.0
+
+
+def test_until_the_last_stop_there_is_room_to_rest(probot, exact):
+    lab = Lab(probot, exact).place_ahead(1.6)
+    until = last_stop(exact, lab.scene, lab.group, lab.running)
+    assert NOW_S + 0.1 < until < lab.running.blocked_from
+    then = lab.running._replace(now=lambda: until)
+    assert stopped(exact, lab.scene, lab.group, then).harder == 1.0
+    # What is near leaves no time for a search.
+    lab = Lab(probot, exact).place_ahead(0.3, size=0.02)
+    now = lab.running._replace(now=lambda: NOW_S)
+    assert last_stop(exact, lab.scene, lab.group, now) == NOW_S
 
 
 def test_joints_before_which_something_stands_already_are_stopped_by_whatever_can(probot, exact):

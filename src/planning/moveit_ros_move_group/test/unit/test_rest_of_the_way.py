@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Objects in the way of a running trajectory are seen, however thin they are and wherever they stand."""
+import threading
+
 import numpy as np
 import pytest
 import rospy
 
+from lab_testing.waiting import wait_until
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.replanning import Redirection
 from motion_planning.scene import WorldObject
 from motion_planning.timing import time_path
-from moveit_ros_move_group.rest_of_the_way import NewWay, RestOfTheWay
+from moveit_ros_move_group.rest_of_the_way import NewWay, Onward, RestOfTheWay
 from urdf_model import Box
 from urdf_model.transforms import rigid
 
@@ -36,7 +39,14 @@ def timed(model):
 
 
 def look(model, scene, timed, scenes, *more):
-    return RestOfTheWay(ExactChecker(model, None), model.groups["arm"], timed, iter(scenes).__next__, *more)
+    """scenes: taken from the front, one at each look; None where there is no change."""
+    return RestOfTheWay(ExactChecker(model, None), model.groups["arm"], timed,
+                        lambda: scenes.pop(0) if scenes else None, *more)
+
+
+def outcome(watch):
+    """What looking leads to, after a search."""
+    return wait_until(watch.hit, "another way or a stop", 10.0, 0.001)
 
 
 def why(found):
@@ -44,10 +54,10 @@ def why(found):
     return found.stops if isinstance(found, NewWay) else found
 
 
-def with_needle(scene, angle):
+def with_needle(scene, angle, name="needle"):
     """A tiny thing beside the arm, which is a box of 0.1 m: one of its edges is there at ``angle`` - 45 degrees."""
     place = rigid(np.eye(3), (0.06 * np.cos(angle), 0.06 * np.sin(angle), 0.5))
-    return scene.with_object(WorldObject("needle", place, ((Box((0.001, 0.001, 0.001)), np.eye(4)),)))
+    return scene.with_object(WorldObject(name, place, ((Box((0.001, 0.001, 0.001)), np.eye(4)),)))
 
 
 def test_what_is_anywhere_in_the_way_is_named(model, scene, timed, clock):
@@ -78,19 +88,22 @@ def test_time_that_goes_back_restarts(model, scene, clock):
 def test_another_way_takes_the_place_at_a_time_ahead(model, scene, clock):
     timed, other = (time_path(np.array(ends), np.ones(2), np.ones(2)) for ends in (
         [[0.9, 0.2], [-0.8, 0.2]], [[0.5, 0.2], [0.7, 0.2]]))
-    asked = []
+    asked, followed = [], []
 
-    def onward(_, running):
+    def search(_, running, stop):
         asked.append((running.now(), running.blocked_from))
         begin = running.now() + 0.1
         clock.now += 0.04  # what it takes
         return Redirection(other, begin, None, 0.0)
 
     blocked = with_needle(scene, np.pi / 4)
-    watch = look(model, scene, timed, [None, blocked, blocked], onward, lambda: clock.now - 0.3)
+    scenes = [None, blocked]
+    watch = look(model, scene, timed, scenes, Onward(search, follows=lambda found, _: followed.append(found.timed)),
+                 lambda: 100.04 - 0.3)
     watch.hit()
-    new = watch.hit()
-    assert not new.stops
+    clock.now += 0.04
+    new = outcome(watch)
+    assert not new.stops and followed == [other] and not watch.searching
     # The controller's word counts: it began 0.3 s before.
     (asked_at, blocked_from), = asked
     assert asked_at == pytest.approx(0.3) and 0.3 < blocked_from < timed.duration
@@ -100,20 +113,99 @@ def test_another_way_takes_the_place_at_a_time_ahead(model, scene, clock):
     # A controller leads to the first point from where it is.
     assert [point.time_from_start.to_sec() for point in message.points] == pytest.approx(other.times[1:].tolist())
     # From then on the new way is looked at.
-    assert watch.hit() is None
+    scenes.append(blocked)
+    assert watch.hit() is None and not scenes
 
 
-@pytest.mark.parametrize("ahead_s, sentence", [(0.0, "no other way while the joints move: a wall"), (0.1, "too late")])
-def test_without_another_way_in_time_the_sentence_says_why(model, scene, timed, clock, ahead_s, sentence):
-    def onward(_, running):
-        if not ahead_s:
-            raise PlanningError("a wall")
-        begin = running.now() + ahead_s
-        clock.now += 2.0 * ahead_s
+def raising(error):
+    def search(*_):
+        raise error
+    return search
+
+
+def late(clock, timed):
+    def search(_, running, stop):
+        begin = running.now() + 0.1
+        clock.now += 0.2
         return Redirection(timed, begin, None, 0.0)
+    return search
 
-    watch = look(model, scene, timed, [with_needle(scene, np.pi / 4)], onward)
-    assert sentence in why(watch.hit()) and watch.contacts[0].b == "needle"
+
+@pytest.mark.parametrize("error, sentence", [
+    (PlanningError("a wall"), "no other way while the joints move: a wall"),
+    (ZeroDivisionError("0"), "the search failed: ZeroDivisionError: 0"),
+    (None, "another way was found 0.100 s too late")])
+def test_without_another_way_in_time_the_sentence_says_why(model, scene, timed, clock, error, sentence):
+    search = raising(error) if error else late(clock, timed)
+    watch = look(model, scene, timed, [with_needle(scene, np.pi / 4)], Onward(search))
+    assert sentence in why(outcome(watch)) and watch.contacts[0].b == "needle"
+
+
+class Endless:
+    """A search that only ends when the test lets it, whether or not it is given up."""
+
+    def __init__(self, found=None):
+        self.found, self.may_end, self.asked, self.stops = found, threading.Event(), [], []
+
+    def __call__(self, scene, running, stop):
+        self.asked.append(scene)
+        self.stops.append(stop)
+        assert self.may_end.wait(10.0)
+        if self.found is None:
+            raise PlanningError("a wall")
+        return Redirection(self.found, running.now() + 0.1, None, 0.0)
+
+
+@pytest.fixture
+def endless():
+    search = Endless()
+    yield search
+    search.may_end.set()
+
+
+def test_a_search_that_does_not_end_does_not_hold_up_the_stop(model, scene, turning, clock, endless):
+    blocked = with_needle(scene, np.pi / 4)
+    watch = look(model, scene, turning, [None, blocked], Onward(endless))
+    watch.hit()
+    clock.now += 0.4
+    assert watch.hit() is None and watch.searching and not endless.stops[0]()
+    clock.now += 0.4
+    rest = watch.hit()
+    assert "no other way was found before the joints have to stop" in rest.stops
+    assert endless.stops[0]() and not watch.searching
+    state = scene.state.with_q(np.array(rest.trajectory.joint_trajectory.points[-1].positions),
+                               model.groups["arm"].indices)
+    assert ExactChecker(model, None).free(blocked, state, "arm")
+
+
+def test_what_changes_during_a_search_is_seen(model, scene, turning, clock, endless):
+    far = with_needle(scene, np.pi / 4)
+    near = with_needle(scene, 0.4 + np.pi / 4)
+    scenes = [None, far]
+    watch = look(model, scene, turning, scenes, Onward(endless))
+    watch.hit()
+    assert watch.hit() is None
+    scenes.append(near)  # what was searched for ends too late for this
+    assert watch.hit() is None and watch.searching
+    assert endless.asked == [far, near] and [stop() for stop in endless.stops] == [True, False]
+    scenes.append(scene)  # everything is gone
+    assert watch.hit() is None and not watch.searching and endless.stops[1]()
+
+
+def test_another_way_that_is_blocked_meanwhile_is_not_followed(model, scene, turning, clock, endless):
+    endless.found = time_path(np.array([[0.6, 0.2], [1.5, 0.2]]), np.ones(2), np.ones(2))
+    far = with_needle(scene, np.pi / 4)
+    scenes = [None, far]
+    watch = look(model, scene, turning, scenes, Onward(endless))
+    watch.hit()
+    clock.now += 0.2
+    assert watch.hit() is None
+    both = with_needle(far, 1.4 + np.pi / 4, "second")
+    scenes.append(both)
+    assert watch.hit() is None and endless.asked == [far]  # no nearer than what is there already
+    endless.may_end.set()
+    wait_until(lambda: watch.hit() or len(endless.asked) == 2, "a second search", 10.0, 0.001)
+    assert endless.asked[1] is both
 
 
 @pytest.fixture
@@ -142,15 +234,18 @@ def test_joints_with_room_come_to_rest_before_it_within_their_limits(model, scen
 
 
 def test_joints_that_stop_go_nowhere_else(model, scene, turning, clock):
-    def onward(_, running):
+    def search(_, running, stop):
         asked.append(running)
         raise PlanningError("a wall")
 
     asked, first = [], with_needle(scene, np.pi / 4)
-    watch = look(model, scene, turning, [None, first, with_needle(first, np.pi / 4 + 0.05)], onward)
+    scenes = [None, first]
+    watch = look(model, scene, turning, scenes, Onward(search))
     watch.hit()
     clock.now += 0.5
-    assert why(watch.hit()) and why(watch.hit()) is None and len(asked) == 1
+    assert why(outcome(watch))
+    scenes.append(with_needle(first, np.pi / 4 + 0.05))
+    assert why(watch.hit()) is None and not scenes and len(asked) == 1
 
 
 def test_what_is_too_near_for_any_braking_is_a_reason_to_stop_at_once(model, scene, turning, clock):

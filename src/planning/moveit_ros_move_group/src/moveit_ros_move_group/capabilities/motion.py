@@ -26,7 +26,7 @@ from motion_planning.errors import PlanningError
 from moveit_ros_move_group.context import RequestError, answered, tell
 from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
 from moveit_ros_move_group.planning import scene_with_diff
-from moveit_ros_move_group.rest_of_the_way import NewWay, RestOfTheWay
+from moveit_ros_move_group.rest_of_the_way import NewWay, Onward, RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ class MoveAction:
                                  self._onward(request, left, result) if options.replan else None,
                                  executor.began)
             outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested,
-                                       self._telling(watch.hit))
+                                       self._telling(watch))
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
             again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
@@ -188,31 +188,30 @@ class MoveAction:
 
         return changed
 
-    def _onward(self, request: MotionPlanRequest, left: _Attempts,
-                result: MoveGroupResult) -> Callable[[Scene, Running], Redirection]:
-        """A function that finds another way for joints that move, as RestOfTheWay asks for it."""
-        def onward(scene: Scene, running: Running) -> Redirection:
+    def _onward(self, request: MotionPlanRequest, left: _Attempts, result: MoveGroupResult) -> Onward:
+        """How another way is found for joints that move."""
+        def search(scene: Scene, running: Running, stop: Callable[[], bool]) -> Redirection:
             if not left.any():
                 raise RequestError(MoveItErrorCodes.FAILURE, "all attempts to plan again are used up")
-            begin = time.monotonic()
-            self._feedback("PLANNING")
-            found = self._planner.redirected(request, scene, running, self._server.is_preempt_requested)
+            return self._planner.redirected(request, scene, running,
+                                            lambda: stop() or self._server.is_preempt_requested())
+
+        def follows(found: Redirection, seconds: float) -> None:
             # Where there is no way while the joints move, the attempt is the plan from rest.
             left.take()
             rospy.loginfo("move_group: something new is in the way; another one was found in %.3f s, %s",
-                          time.monotonic() - begin, "without a stop" if found.overlap else "with a stop")
+                          seconds, "without a stop" if found.overlap else "with a stop")
             result.planned_trajectory = trajectory_message(self.context.model.groups[request.group_name].joints,
                                                            found.timed, self.context.model.frame)
             self.context.show_path(found.plan.start, result.planned_trajectory)
-            return found
 
-        return onward
+        return Onward(search, lambda: self._feedback("PLANNING"), follows)
 
-    def _telling(self, hit: Callable[[], str | NewWay | None]) -> Callable[[], str | NewWay | None]:
-        """``hit``, after which a client knows that another way is followed."""
+    def _telling(self, watch: RestOfTheWay) -> Callable[[], str | NewWay | None]:
+        """``watch.hit``, of which a client hears when a search has ended and the joints go on."""
         def told() -> str | NewWay | None:
-            found = hit()
-            if isinstance(found, NewWay) and not found.stops:
+            found = watch.hit()
+            if not watch.searching and (found is None or isinstance(found, NewWay) and not found.stops):
                 self._feedback("MONITOR")
             return found
 
