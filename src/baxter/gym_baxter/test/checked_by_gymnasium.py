@@ -15,6 +15,15 @@ from gym_baxter.tasks import TASKS
 PLAIN = Options(with_meshes=False)
 
 
+def refused(kind, text, use):
+    try:
+        use()
+    except kind as error:
+        assert text in str(error), error
+    else:
+        raise AssertionError("not refused: %s" % text)
+
+
 def main():
     for name in sys.argv[1:] or TASKS:
         with warnings.catch_warnings():
@@ -42,8 +51,13 @@ def main():
         one = [alone.reset(seed=seed)[0]]
         one += [alone.step(np.full(16, value, dtype=np.float32))[0] for value in (0.2, -0.4)]
         np.testing.assert_array_equal([step[row] for step in both], one)
-    many.close()
+    # Its processes say what was wrong, and end.
+    refused(ValueError, "16 numbers", lambda: many.step(np.full((2, 16), np.nan, dtype=np.float32)))
+    many.close(terminate=True)
     alone.close()
+    alone.close()
+    for use in (alone.unwrapped.reset, alone.unwrapped.save, lambda: alone.unwrapped.step(np.zeros(16))):
+        refused(gymnasium.error.ClosedEnvironmentError, "closed", use)
     print("states, pictures and processes agree")
 
 

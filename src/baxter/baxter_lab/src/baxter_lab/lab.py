@@ -142,6 +142,7 @@ class Lab:
         self.world = World(time_step_s=time_step_s, seed=seed, find_mesh=self.find_mesh,
                            warn=warn if options.with_meshes else lambda text: None)
         self.things: dict[str, Thing] = {}
+        self.forgotten_states: list[int] = []
         self._spawn(FLOOR, Plane(), (0.0, 0.0, -BASE_HEIGHT_M), 0.0, ThingProperties(colour=(0.75, 0.77, 0.80, 1.0)))
         self.robot = self._spawn_robot()
         self.world._warn = warn  # of objects that come later
@@ -212,8 +213,11 @@ class Lab:
         return SavedState(self)
 
     def restore(self, state: SavedState) -> None:
-        """Return to a saved state: the same calls then give the same numbers, bit for bit. Raises LabError where
-        objects have been added or removed since."""
+        """Return to a saved state: the same calls then give the same numbers, bit for bit. Raises LabError for the
+        state of another lab, and where objects have been added or removed since."""
+        if not isinstance(state, SavedState) or not state.is_of(self):
+            raise LabError("a lab returns to states of its own save(); found %s" % (
+                "one of another lab" if isinstance(state, SavedState) else repr(state)))
         if not state.restore():
             raise LabError("objects were added or removed since the state was saved; it fits the world no more")
 

@@ -106,13 +106,13 @@ class Arm:
 
     @property
     def angles(self) -> np.ndarray:
-        """(7,) [rad]."""
-        return self._simulated.model.read_joints()[0][self._index]
+        """(7,) [rad], as the robot's sensors have them."""
+        return self._simulated.readings()[0][self._index]
 
     @property
     def velocities(self) -> np.ndarray:
-        """(7,) [rad/s]."""
-        return self._simulated.model.read_joints()[1][self._index]
+        """(7,) [rad/s], as the robot's sensors have them."""
+        return self._simulated.readings()[1][self._index]
 
     @property
     def efforts(self) -> np.ndarray:
@@ -121,8 +121,8 @@ class Arm:
 
     @property
     def pose(self) -> np.ndarray:
-        """(4, 4) of the gripper's frame in `base`."""
-        positions = self._simulated.model.read_joints()[0]
+        """(4, 4) of the gripper's frame in `base`, where the sensors of its joints have it."""
+        positions = self._simulated.readings()[0]
         if positions is not self._posed_at:  # rewards and observations ask for it many times in a tick
             self._posed_at, self._pose = positions, self.chain.fk(positions[self._index])
         return self._pose.copy()

@@ -2,12 +2,15 @@
 """The state of a whole lab, to return to it as often as needed: physics, control logic, chance, time."""
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
 from bullet_sim.quiet_pybullet import pybullet
+
+from .errors import LabError
 
 if TYPE_CHECKING:
     from .lab import Lab
@@ -82,10 +85,13 @@ def _refilled(found, items):
 
 
 class SavedState:
-    """The state of a Lab at one moment; made by ``Lab.save``. It holds as long as no object is added or removed."""
+    """The state of a Lab at one moment; made by ``Lab.save``. It holds as long as no object is added or removed, and in
+    its own process alone. Bullet's copy is freed after the last reference to it."""
 
     def __init__(self, lab: Lab) -> None:
         world = lab.world
+        while lab.forgotten_states:
+            pybullet.removeState(lab.forgotten_states.pop(), physicsClientId=world._client)
         self._lab, self._client = lab, world._client
         self._models = {name: (model, {key: getattr(model, key) for key in _OF_MODEL}, model._effort_driven.copy(),
                                model._commanded_effort.copy()) for name, model in world.models.items()}
@@ -94,6 +100,16 @@ class SavedState:
         self._logic = restorer(lab.robot.simulated)
         self._forget_contacts()
         self._number = pybullet.saveState(physicsClientId=self._client)
+        # At the next save: the last reference may end in any thread, and one thread alone uses PyBullet.
+        weakref.finalize(self, lab.forgotten_states.append, self._number).atexit = False
+
+    def is_of(self, lab: Lab) -> bool:
+        """Whether a Lab has made it."""
+        return self._lab is lab
+
+    def __reduce__(self) -> NoReturn:
+        raise LabError("a saved state is of one lab, and cannot be copied or leave its process; save the actions that "
+                       "led to it instead")
 
     def restore(self) -> bool:
         """Return to it; False if objects have been added or removed since."""
@@ -127,9 +143,3 @@ class SavedState:
                 for name, link in model.merged.links.items():
                     if link.collisions:
                         model.renew_contacts(name)
-
-    def forget(self) -> None:
-        """Free Bullet's copy."""
-        if self._number is not None:
-            pybullet.removeState(self._number, physicsClientId=self._client)
-            self._number = None

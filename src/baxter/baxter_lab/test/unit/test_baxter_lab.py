@@ -82,7 +82,6 @@ def test_a_state_comes_again_to_the_bit(lab):
     lab.remove("block")
     with pytest.raises(LabError, match="removed"):
         lab.restore(state)
-    state.forget()
 
 
 def test_each_kind_of_gripper_has_its_descriptions():

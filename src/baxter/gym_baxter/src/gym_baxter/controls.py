@@ -78,5 +78,7 @@ def checked(action: Sequence[float] | np.ndarray, size: int) -> np.ndarray:
     """(size,) an action, clipped to -1 … 1. Raises ValueError for another size and for NaN."""
     action = np.asarray(action, dtype=float)
     if action.shape != (size,) or np.isnan(action).any():
-        raise ValueError("an action is %s from -1 to 1; found %s" % (counted(size, "number"), action))
+        # Gymnasium's vector of processes formats the traceback, with the raising line in it, by %.
+        text = "an action is %s from -1 to 1; found %s" % (counted(size, "number"), action)
+        raise ValueError(text)
     return np.clip(action, -1.0, 1.0)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import numbers
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from baxter_lab import Lab, Options
+from baxter_lab import Lab, LabError, Options
 from baxter_lab.saving import restorer
 from baxter_model import SIDES, poses
 from urdf_model.transforms import quaternion_from_matrix
@@ -57,20 +58,36 @@ class Stepped(NamedTuple):
     succeeded: bool
 
 
+class CoreState(NamedTuple):
+    """The whole state of a `Core`, made by its `save`: of the lab, and of what is not in it."""
+
+    lab: SavedState
+    controls: list[Callable[[], object]]
+    goal: dict[str, Any]
+    drawn: EpisodeDraw
+
+
 class Core:
-    """task: a name in `tasks.TASKS`; choices: `Choices`. Raises ValueError for unknown names, MeshesMissing."""
+    """task: a name in `tasks.TASKS`; choices: `Choices`. Raises ValueError for what is none of them, MeshesMissing."""
 
     def __init__(self, task: str, choices: Choices = Choices()) -> None:  # noqa: B008 (a tuple)
         if task not in TASKS:
             raise ValueError("task is %r; choices are %s" % (task, ", ".join(TASKS)))
-        if choices.obs_type not in OBSERVATIONS:
-            raise ValueError("obs_type is %r; choices are %s" % (choices.obs_type, ", ".join(OBSERVATIONS)))
+        _require(choices)
         self.choices, self._ticks = choices, _ticks(choices)
         self._stream_ticks = max(round(STREAM_S / choices.physics_step_s), 1)
         self.action_size = action_size(choices.control)  # before a world is made, as all refusals
         self.sides = SIDES[::-1] if choices.robosuite_order else SIDES
         options = TASKS[task].robot(choices.options)
         self.lab = Lab(options, time_step_s=choices.physics_step_s)
+        try:
+            self._furnish(task, options)
+        except Exception:
+            self.lab.close()
+            raise
+
+    def _furnish(self, task: str, options: Options) -> None:
+        choices = self.choices
         self.task = TASKS[task](self.lab)
         self._start_robot()
         self._controls = [ArmControl(self.lab.robot.arms[side], choices.control,
@@ -107,6 +124,9 @@ class Core:
         self.task.begin(random)
         if self._is_randomised:
             self._randomiser.draw(random)  # after the task, whose places are then those without it
+        simulated = self.lab.robot.simulated
+        if "noise" in simulated.chosen:  # a tick's noise follows from its number, which begins again
+            simulated.begin_noise(int(random.integers(2**32)))
         for control in self._controls:
             control.reset()
         return self.observation()
@@ -155,23 +175,44 @@ class Core:
 
     # -- states
 
-    def save(self) -> tuple[SavedState, list[Callable[[], object]], dict[str, Any], EpisodeDraw]:
-        """The whole state: the physics, the robot's control logic, the task's."""
+    def save(self) -> CoreState:
+        """The whole state: the physics, the robot's control logic, the task's. It cannot leave this process."""
         logic = [restorer(vars(control)) for control in self._controls]
         goal = {name: value for name, value in vars(self.task).items() if name == "goal"}
-        return self.lab.save(), logic, goal, self._randomiser.drawn
+        return CoreState(self.lab.save(), logic, goal, self._randomiser.drawn)
 
-    def restore(self, state: tuple[SavedState, list[Callable[[], object]], dict[str, Any], EpisodeDraw]) -> dict:
+    def restore(self, state: CoreState) -> dict:
         """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
-        for bit. Raises LabError."""
-        saved, logic, task, drawn = state
-        self.lab.restore(saved)
+        for bit. Raises LabError for what this environment has not saved."""
+        if not isinstance(state, CoreState):
+            raise LabError("an environment returns to states of its own save(); found %r" % (state,))
+        self.lab.restore(state.lab)
         if self._is_randomised:
-            self._randomiser.put(drawn)
-        for again in logic:
+            self._randomiser.put(state.drawn)
+        for again in state.controls:
             again()
-        vars(self.task).update(task)
+        vars(self.task).update(state.goal)
         return self.observation()
+
+
+def _require(choices: Choices) -> None:
+    """Before a world is made: raises ValueError for choices that are none."""
+    if choices.obs_type not in OBSERVATIONS:
+        raise ValueError("obs_type is %r; choices are %s" % (choices.obs_type, ", ".join(OBSERVATIONS)))
+    if not isinstance(choices.cameras, (list, tuple)) or not set(choices.cameras) <= set(CAMERAS):
+        raise ValueError("cameras is %r; it must be a list of some of %s" % (choices.cameras, ", ".join(CAMERAS)))
+    for name, kind in (("options", Options), ("randomised", Randomised)):
+        if not isinstance(getattr(choices, name), kind):
+            raise ValueError("%s is %r; it must be a %s.%s(...)" % (
+                name, getattr(choices, name), kind.__module__.partition(".")[0], kind.__name__))
+    choices.randomised.require()
+    for name, kind in (("size", numbers.Integral), ("control_freq", numbers.Real), ("physics_step_s", numbers.Real)):
+        value = getattr(choices, name)
+        if isinstance(value, bool) or not isinstance(value, kind) or not 0 < value < math.inf:
+            raise ValueError("%s is %r; it must be a %snumber above 0" % (
+                name, value, "whole " * (kind is numbers.Integral)))
+    if not isinstance(choices.robosuite_order, (bool, np.bool_)):
+        raise ValueError("robosuite_order is %r; it must be True or False" % (choices.robosuite_order,))
 
 
 def _ticks(choices: Choices) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces  # pyright: ignore[reportMissingImports]
 from gymnasium.utils import EzPickle  # pyright: ignore[reportMissingImports]
 
-from .core import Choices, Core
+from .core import Choices, Core, CoreState
 from .tasks import TASKS
 
 #: Where a picture for people is taken from, and what it looks at [m].
@@ -31,7 +31,7 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError("render_mode is %r; choices are None and rgb_array" % (render_mode,))
         self.render_mode = render_mode
-        self._core = Core(task, Choices(**choices))
+        self._open_core: Core | None = Core(task, Choices(**choices))
         self.metadata = {**type(self).metadata, "render_fps": self._core.choices.control_freq}
         # lerobot-eval asks a vector of processes for both, and one that lacks either loses its processes.
         self.task, self.task_description = task, self._core.task.SENTENCE
@@ -39,15 +39,24 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         self._core.reset(np.random.default_rng(0))
         self.observation_space = _space(self._given(self._core.observation()))
 
+    @property
+    def _core(self) -> Core:
+        """Raises ClosedEnvironmentError."""
+        if self._open_core is None:
+            raise gymnasium.error.ClosedEnvironmentError("the environment is closed; gymnasium.make gives a new one")
+        return self._open_core
+
     def _given(self, observation: dict[str, Any]) -> np.ndarray | dict[str, Any]:
         return observation["state"] if self._core.choices.obs_type == "state" else (
             observation if "agent_pos" in observation else observation["pixels"])
 
     def reset(self, *, seed: int | None = None,
               options: dict[str, Any] | None = None) -> tuple[np.ndarray | dict[str, Any], dict[str, Any]]:
-        """Begin an episode."""
+        """Begin an episode. Raises LabError for a state of another environment."""
         super().reset(seed=seed)
         state = (options or {}).get("state")
+        if unknown := set(options or {}) - {"state"}:
+            gymnasium.logger.warn("reset() knows the option state; without effect: %s" % ", ".join(map(str, unknown)))
         found = self._core.reset(self.np_random) if state is None else self._core.restore(state)
         return self._given(found), {"is_success": False}
 
@@ -56,8 +65,8 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         observation, reward, succeeded = self._core.step(action)
         return self._given(observation), float(reward), bool(succeeded), False, {"is_success": bool(succeeded)}
 
-    def save(self) -> tuple:
-        """The whole present state, for ``reset(options={"state": ...})`` of this environment."""
+    def save(self) -> CoreState:
+        """The whole present state, for ``reset(options={"state": ...})`` of this environment, in its process."""
         return self._core.save()
 
     def render(self) -> np.ndarray | None:
@@ -68,8 +77,10 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         return self._core.lab.cameras.look(_EYE, _TARGET, *_PICTURE).pixels
 
     def close(self) -> None:
-        """End the world."""
-        self._core.close()
+        """End the world. A second call does nothing."""
+        if self._open_core is not None:
+            self._open_core.close()
+        self._open_core = None
 
 
 def _space(value: np.ndarray | dict[str, Any]) -> spaces.Space:

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The environments without Gymnasium; `test_gym_env.py` has what needs it."""
+"""The environments without Gymnasium; `checked_by_gymnasium.py` has what needs it."""
+import copy
+import gc
+import pickle
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from baxter_lab import Options, Which, pose
+from baxter_lab import LabError, Options, Which, pose
 from gym_baxter.controls import CONTROLS, action_size
 from gym_baxter.core import Choices, Core
+from gym_baxter.randomised import Randomised
 from gym_baxter.tasks import TABLE_TOP_M, TASKS
 
 PLAIN = Options(with_meshes=False)
@@ -157,10 +161,85 @@ def test_an_arm_that_has_collided_stands_and_goes_on_from_where_it_is():
 @pytest.mark.parametrize(("task", "choices", "named"), [
     ("Juggle", Choices(), "PickPlace"), ("Reach", Choices(control="torque"), "osc_pose"),
     ("Reach", Choices(control_freq=30), "control_freq is 30"),
-    ("Reach", Choices(physics_step_s=0.0), "physics_step_s 0"), ("Reach", Choices(obs_type="smell"), "pixels")])
+    ("Reach", Choices(physics_step_s=0.0), "physics_step_s is 0"), ("Reach", Choices(obs_type="smell"), "pixels"),
+    ("Reach", Choices(cameras="head"), "cameras is 'head'"), ("Reach", Choices(cameras=("foot",)), "left_hand"),
+    ("Reach", Choices(randomised={"mass": 0.3}), "gym_baxter.Randomised"),
+    ("Reach", Choices(size=84.5), "whole number"),
+    ("Reach", Choices(randomised=Randomised(mass="much")), "randomised.mass is 'much'"),
+    ("Reach", Choices(options={}), "baxter_lab.Options"), ("Reach", Choices(control_freq="20"), "control_freq is '20'"),
+    ("Reach", Choices(robosuite_order="no"), "True or False")])
 def test_unknown_names_are_refused_with_the_choices(task, choices, named):
     with pytest.raises(ValueError, match=named):
         Core(task, choices)
+
+
+def test_the_state_of_another_environment_is_refused_and_changes_nothing(made):
+    reach, place = made("Reach"), made("PickPlace")
+    for core in (reach, place):
+        core.reset(np.random.default_rng(0))
+    state = reach.save()
+    for _ in range(3):
+        reach.step(np.full(reach.action_size, 0.5))
+    before = reach.observation()["state"], place.observation()["state"]
+    for other in (state, None, "state"):
+        with pytest.raises(LabError, match=r"its own save\(\)|of its own"):
+            place.restore(other)
+    np.testing.assert_array_equal(before[0], reach.observation()["state"])
+    np.testing.assert_array_equal(before[1], place.observation()["state"])
+
+
+def test_a_state_cannot_be_copied_nor_leave_its_process(made):
+    state = made("Reach").save()
+    for leave in (pickle.dumps, copy.deepcopy):
+        with pytest.raises(LabError, match="leave its process"):
+            leave(state)
+
+
+def test_states_that_nobody_holds_are_freed(made):
+    lab = made("Reach").lab
+    lab.save()
+    gc.collect()
+    lab.save()
+    numbers = {lab.save()._number for _ in range(20)}
+    assert len(numbers) < 5  # Bullet gives the number of a freed state again
+    assert len(lab.forgotten_states) <= 1
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    core = Core("Reach", Choices("osc_pose", options=Options(which=Which(profile="robot"), with_meshes=False)))
+    yield core
+    core.close()
+
+
+def held(core, seed, count=4):
+    """(count, n) angles that an arm at rest has by its sensors, in an episode."""
+    core.reset(np.random.default_rng(seed))
+    found = []
+    for _ in range(count):
+        core.step(np.zeros(core.action_size))
+        found.append(core.agent_pos()[:7])
+    return np.array(found)
+
+
+def test_the_physical_robots_sensors_have_noise_of_each_episode(noisy):
+    """What was observed was the truth, though the profile has noise."""
+    one, again, other = held(noisy, 1), held(noisy, 1), held(noisy, 2)
+    np.testing.assert_array_equal(one, again)
+    assert 1e-4 < np.abs(np.diff(one, axis=0)).max() < 0.01  # [rad]
+    assert (one != other).any(axis=0).all()
+    robot = noisy.lab.robot
+    true = robot.simulated.model.read_joints()[0][robot.simulated.limb_index["left"]]
+    assert 0.0 < np.abs(robot.left.angles - true).max() < 0.005
+
+
+def test_a_state_holds_the_noise_as_well(noisy):
+    held(noisy, 3)
+    state, action = noisy.save(), np.full(noisy.action_size, 0.1)
+    one = [noisy.step(action).observation["state"] for _ in range(3)]
+    held(noisy, 4)
+    noisy.restore(state)
+    np.testing.assert_array_equal(one, [noisy.step(action).observation["state"] for _ in range(3)])
 
 
 def test_an_action_of_another_size_is_refused(made):

@@ -21,6 +21,10 @@ class NumberedRandom:
         self._bits = np.random.Philox(key=key)
         self._state, self._generator = self._bits.state, np.random.Generator(self._bits)
 
+    def begin_again(self, key: int | Sequence[int]) -> None:
+        """Go on with another key."""
+        self._state["state"]["key"][:] = np.random.Philox(key=key).state["state"]["key"]
+
     def at(self, *counter: int) -> np.random.Generator:
         """The numpy Generator at counter, three integers from 0; valid until the next call."""
         self._state["state"]["counter"][1:] = counter

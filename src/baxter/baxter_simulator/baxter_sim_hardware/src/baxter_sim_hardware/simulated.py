@@ -104,6 +104,8 @@ class SimulatedBaxter:
         if "safety" in chosen:
             self._make_safe()
         self.before: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._read_at: np.ndarray | None = None
+        self._read = np.empty(0), np.empty(0)
         # The joints that were driven to a position last, as the arms and as the model number them.
         self._driven = self._driven_index = np.empty(0, np.int64)
         if before is not None:
@@ -202,6 +204,23 @@ class SimulatedBaxter:
         self.head.reset()
         for hand in self.hands.values():
             hand.reset()
+
+    def begin_noise(self, seed: int) -> None:
+        """Go on with other noise of the sensors; nothing without the effect `noise`. seed: integer from 0."""
+        if self._sensors is not None and self.hand_sensors is not None:
+            self.seed, self._read_at = seed, None
+            self._sensors.begin_again(seed)
+            self.hand_sensors.begin_again(seed)
+
+    def readings(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) positions [rad, m] and velocities [rad/s, m/s] of all joints as the robot's sensors have them: the true
+        ones without the effect `noise`."""
+        position, velocity, effort = self.model.read_joints()
+        if self._sensors is None:
+            return position, velocity
+        if position is not self._read_at:  # programs ask for them many times in a tick
+            self._read_at, self._read = position, self._sense(position, velocity, effort)[:2]
+        return self._read
 
     def drive_again(self) -> None:
         """Send head and fingers where they were sent last: after a return to an earlier state of the world."""

@@ -46,6 +46,10 @@ class JointSensors:
             self._gear[0] = 0.0
         self._random = NumberedRandom(seed)
 
+    def begin_again(self, seed: int) -> None:
+        """Go on with other noise. seed: integer, 0 or more."""
+        self._random.begin_again(seed)
+
     def felt(self, position: np.ndarray) -> np.ndarray:
         """(n,) [rad] where the sensors are, without noise, when the links are at position (n,) [rad]."""
         return position + _error(self._gear, position)

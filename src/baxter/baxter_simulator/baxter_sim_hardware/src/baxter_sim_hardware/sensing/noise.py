@@ -42,6 +42,10 @@ class HandSensors:
         self._turned = {side: difference(serial, "%s_accelerometer" % side, rows["serial"], "accelerometer_axes")
                         for side in SIDES}
 
+    def begin_again(self, seed: int) -> None:
+        """Go on with other noise. seed: integer from 0."""
+        self._seed = seed
+
     def range(self, side: str, time_s: float, distance: float) -> float:
         """A hand's range [m] for a surface `distance` [m] away, at time_s [s]."""
         noise, quantum, period = self._range
