@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """LeRobot itself reads, joins, continues, trains on and evaluates a set, and finds the plugins: `checked_by_lerobot.py
 SET SCRATCH [STEP...]`. SET: of at least 3 episodes of `python3 -m demonstrations record`. For a Python 3.12 with
-`lerobot[dataset,training]`, `baxter-lab[gym,lerobot]` of this workspace, and the plugins beside this folder."""
+`lerobot[dataset,training]`, `baxter-lab[gym,lerobot]` of this workspace, and the plugins beside this folder.
+
+With LAB_ROSBRIDGE (ws://localhost:9090) and LAB_PICTURES (http://localhost:8080) in the environment, it also records
+and replays with a robot: a lab that is enabled, in which something moves the arms until this program says "replaying".
+"""
 import dataclasses
 import json
 import os
@@ -135,10 +139,41 @@ def a_policy_is_trained_and_evaluated():
         assert info["overall"]["n_episodes"] == 2, info["overall"]
 
 
+def a_robot_is_recorded_and_replayed():
+    from demonstrations.reading import DataSet, survey
+
+    if not os.environ.get("LAB_ROSBRIDGE"):
+        print("not done, without LAB_ROSBRIDGE: ", end="")
+        return
+    robot = ["--robot.type=baxter", "--robot.id=one", "--robot.address=%s" % os.environ["LAB_ROSBRIDGE"]]
+    dataset = ["--dataset.repo_id=local/shown", "--dataset.root=%s" % (SCRATCH / "shown")]
+    run("lerobot-record", *robot, "--robot.drive=false", "--robot.camera_names=[head]",
+        "--robot.pictures=%s" % os.environ["LAB_PICTURES"], "--teleop.type=baxter", "--teleop.id=one",
+        "--teleop.address=%s" % os.environ["LAB_ROSBRIDGE"], *dataset, "--dataset.num_episodes=2", "--dataset.fps=10",
+        "--dataset.episode_time_s=6", "--dataset.reset_time_s=1", "--dataset.single_task=Wave.",
+        "--dataset.push_to_hub=false", "--play_sounds=false", "--display_data=false")
+    found = survey(SCRATCH / "shown")
+    assert (found.good, found.broken) == ([0, 1], {}), found
+    episode = DataSet(SCRATCH / "shown").episode(1)
+    actions, states = episode.columns["action"], episode.columns["observation.state"]
+    assert np.ptp(states, axis=0).max() > 0.1, "nothing moved"
+    print("replaying", flush=True)
+    run("lerobot-replay", *robot, *dataset, "--dataset.episode=1", "--play_sounds=false")
+    from lerobot.robots import RobotConfig, make_robot_from_config
+
+    baxter = make_robot_from_config(RobotConfig.get_choice_class("baxter")(
+        id="one", address=os.environ["LAB_ROSBRIDGE"], drive=False))
+    baxter.connect()
+    ended = np.array(list(baxter.get_observation().values()))
+    baxter.disconnect()
+    arms = [index for index in range(len(ended)) if index not in (7, 15)]
+    assert np.abs(ended - actions[-1])[arms].max() < 0.05, (ended, actions[-1])
+
+
 if __name__ == "__main__":
     SCRATCH.mkdir(parents=True, exist_ok=True)
     for step in (stand_ins_are_as_lerobot_is, plugins_are_found, set_is_read, sets_are_joined_cut_and_continued,
-                 a_policy_is_trained_and_evaluated):
+                 a_policy_is_trained_and_evaluated, a_robot_is_recorded_and_replayed):
         if sys.argv[3:] and step.__name__ not in sys.argv[3:]:
             continue
         begin = time.monotonic()

@@ -18,7 +18,7 @@ export class Episodes {
   constructor(send, query) {
     this.send = (what) => send({op: "episodes", ...what});
     this.query = query;
-    this.state = {running: false, said: "", folder: "", version: 0, episodes: [], camera: "", rate: 0};
+    this.state = {running: false, recording: false, bad: false, said: "", folder: "", version: 0, episodes: [], camera: "", rate: 0};
     this.acting = false;
     this.tasks = [...TASKS];
     byId("episode-record").onclick = () => this.send(this.state.running ? {do: "stop"}
@@ -59,23 +59,26 @@ export class Episodes {
   }
 
   refresh() {
-    const {running, said, episodes, camera, folder} = this.state;
+    const {running, recording, bad, said, episodes, camera, folder} = this.state;
     byId("episode-record").textContent = text(running ? "episode_stop" : "episode_record");
     byId("episode-record").setAttribute("aria-pressed", running);
     byId("episode-record").disabled = !this.acting;
     for (const mark of MARKS) {
       byId(`episode-${mark}`).textContent = text(`steer_${mark}`);
-      byId(`episode-${mark}`).disabled = !this.acting || !running;
+      byId(`episode-${mark}`).disabled = !this.acting || !recording;
     }
     byId("episode-task").disabled = !this.acting || running;
     byId("episode-camera").disabled = !this.acting || running || episodes.length > 0;
+    byId("episode-camera").title = episodes.length ? text("episode_camera_kept") : "";
     if (episodes.length) byId("episode-camera").value = camera.replace("observation.images.", "");
+    byId("episode-said").classList.toggle("bad", bad);
     byId("episode-said").textContent = said || (running ? text("episode_starts") : "");
     byId("episodes-kept").textContent = text(episodes.length ? "episodes_kept" : "episodes_none", {count: episodes.length, folder});
     byId("episodes-save").hidden = episodes.length === 0;
     for (const button of document.querySelectorAll("#episode-list button")) {
       button.disabled = !this.acting || running;
-      button.textContent = text("delete");
+      button.title = running ? text("episode_delete_later") : "";
+      button.textContent = text(button.dataset.sure ? "episode_sure" : "delete");
     }
   }
 

@@ -105,8 +105,11 @@ def core_of(task: str, control: str = CONTROL, cameras: tuple[str, ...] = (), si
         raise DemonstrationError("there is no task %r; choices are %s" % (task, ", ".join(TASKS)))
     if unknown := set(cameras) - set(CAMERAS):
         raise DemonstrationError("there is no camera %s; choices are %s" % (", ".join(unknown), ", ".join(CAMERAS)))
-    return Core(task, Choices(control, obs_type="pixels_agent_pos" if cameras else "state", cameras=cameras, size=size,
-                              **choices))
+    try:
+        return Core(task, Choices(control, obs_type="pixels_agent_pos" if cameras else "state", cameras=cameras,
+                                  size=size, **choices))
+    except ValueError as error:
+        raise DemonstrationError("there is no such environment: %s" % error) from error
 
 
 def schema_of(core: Core, with_expert: bool = False) -> Schema:

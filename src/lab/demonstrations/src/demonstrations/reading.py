@@ -177,18 +177,35 @@ class DataSet:
         return {camera: self._film(number, camera) for camera in self.schema.cameras}, said
 
     def check(self, number: int) -> None:
-        """Read an episode, and look whether its numbers are finite and its films have enough frames. Raises
-        DemonstrationError."""
-        for key, values in self.episode(number).columns.items():
-            if values.dtype.kind == "f" and not np.isfinite(values).all():
-                raise DemonstrationError("episode %d of %s has numbers in %s that are missing or not finite"
-                                         % (number, self.folder, key))
+        """Read an episode, and look whether its numbers are finite, its times are those of the set's rate, and its
+        films have enough frames. Raises DemonstrationError."""
+        self.check_numbers(number)
+        self._check_times(number)
         for camera in self.schema.cameras:
             row, path = self._row(number), self._film(number, camera)
             end = round(row["videos/%s/to_timestamp" % camera] * self.schema.rate_hz)
             if frame_count(path) < end:
                 raise DemonstrationError("%s has %d frames; episode %d ends at frame %d" % (
                     path, frame_count(path), number, end))
+
+    def check_numbers(self, number: int) -> None:
+        """Read an episode without its films. Raises DemonstrationError where a number is missing or not finite."""
+        for key, values in self.episode(number).columns.items():
+            if values.dtype.kind == "f" and not np.isfinite(values).all():
+                raise DemonstrationError("episode %d of %s has numbers in %s that are missing or not finite"
+                                         % (number, self.folder, key))
+
+    def _check_times(self, number):
+        row = self._row(number)
+        path = self.folder / (layout.DATA % (row["data/chunk_index"], row["data/file_index"]))
+        table = _read_table(path, ["episode_index", "timestamp"])
+        if "timestamp" not in table.column_names:
+            raise DemonstrationError("%s has no column timestamp" % path)
+        times = table["timestamp"].to_numpy()[table["episode_index"].to_numpy() == number]
+        expected = np.arange(len(times)) / self.schema.rate_hz
+        if len(times) and not np.abs(times - expected).max() < 0.5 / self.schema.rate_hz:
+            raise DemonstrationError("%s has times of episode %d to %g s; at the set's rate, %g Hz, they go to %g s" % (
+                path, number, times[-1], self.schema.rate_hz, expected[-1]))
 
 
 def _require_row(path, row):
@@ -242,9 +259,12 @@ def _files_of(data, row):
 
 
 def repair(folder: Path, into: Path) -> Survey:
-    """Copy the whole episodes of a set into a new one; returns what was found. Raises DemonstrationError."""
+    """Copy the whole episodes of a set into a new one; returns what was found. Raises DemonstrationError, also where
+    something is in the new one's folder."""
     from .writing import SetWriter
 
+    if Path(into).exists() and (not Path(into).is_dir() or any(Path(into).iterdir())):
+        raise DemonstrationError("%s is not empty; whole episodes are copied into a new folder" % into)
     found, data = survey(folder), DataSet(folder)
     with SetWriter(into, data.schema) as writer:
         for number in found.good:

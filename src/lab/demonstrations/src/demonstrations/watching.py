@@ -24,6 +24,10 @@ MODEL = "model %s"
 #: Names and units of states and actions, as LeRobot's plugins have them.
 NAMED = tuple(item for side in SIDES for item in (
     *(("%s_%s.pos" % (side, joint), "rad") for joint in JOINTS), ("%s_gripper.pos" % side, "%")))
+#: The task of every set of a robot; its episodes have theirs in words.
+ON_THE_ROBOT = "on the robot"
+#: How the lines begin, or what they have, that tell that a recorder records, and that it has lost an episode.
+RECORDING, LOST = "recording into ", " is dropped: "
 #: The instants of the grid may come this much early [s]: stamps are rounded.
 _EARLY_S = 1e-6
 _POSE = (*(("%s.x", "m"), ("%s.y", "m"), ("%s.z", "m")), *((name, "") for name in ("%s.qx", "%s.qy", "%s.qz", "%s.qw")))
@@ -35,7 +39,7 @@ def schema_of(rate_hz: int, cameras: Mapping[str, tuple[int, int]], models: Sequ
     if models:
         features[ENVIRONMENT] = numbers([(name % model, unit) for model in models for name, unit in _POSE])
     features |= {PICTURES + name: picture(*size) for name, size in cameras.items()}
-    return Schema(rate_hz, features, about={"task": "on the robot", "control": "positions"})
+    return Schema(rate_hz, features, about={"task": ON_THE_ROBOT, "control": "positions"})
 
 
 class WatchingRecorder:
@@ -105,7 +109,7 @@ class WatchingRecorder:
 
     def _lose(self, why: str) -> None:
         if self._writer.length:
-            self._say("an episode of %d frames is dropped: %s" % (self._writer.length, why))
+            self._say("an episode of %d frames%s%s; the next one begins" % (self._writer.length, LOST, why))
         self._writer.drop()
         self._begin()
 
@@ -130,11 +134,12 @@ class WatchingRecorder:
         if what not in MARKS:
             self._say("%r is no mark; marks are %s" % (what, ", ".join(MARKS)))
         elif what == "again" or not self._writer.length:
-            self._say("%d frames are thrown away" % self._writer.length if self._writer.length else
+            self._say("%d frames that are marked neither success nor failure are thrown away"
+                      % self._writer.length if self._writer.length else
                       "there is nothing to keep: %s" % (self._waits or "no frame yet"))
             self._writer.drop()
         else:
             length = self._writer.length
             number = self._writer.keep(self._task, what == "success")
-            self._say("episode %d is kept as a %s: %d frames" % (number, what, length))
+            self._say("episode %d is kept as a %s: %d frames; the next one begins" % (number, what, length))
         self._begin()

@@ -81,7 +81,11 @@ class SetWriter:
         from .reading import read_tasks, statistics_of
 
         self.episodes, self._frames = info["total_episodes"], info["total_frames"]
-        self._tasks = read_tasks(self.folder)
+        try:
+            self._tasks = read_tasks(self.folder)
+        except DemonstrationError as error:
+            raise DemonstrationError("%s; `demonstrations repair` copies its whole episodes into a new set, which can "
+                                     "be continued" % error) from error
         self._statistics = self._known_statistics()
         counts = {int(part["count"][0]) for key, part in self._statistics.items() if key not in self.schema.cameras}
         if counts != {self._frames}:  # a recorder was ended between this file and the one that counts the episodes

@@ -218,6 +218,8 @@ NUMBERS = "data/chunk-000/file-001.parquet"
     (_changed_row(NUMBERS, lambda row: [row[key].insert(1, row[key][0]) for key in row] and
                   row["episode_index"].__setitem__(1, 7)), [0, 2], "other frames among those of episode 1"),
     (lambda folder: (folder / layout.TASKS).unlink(), [0, 1, 2], "tasks.parquet is missing"),
+    (_changed_row(NUMBERS, lambda row: row.update(timestamp=[0.0, 0.2, 0.4])), [0, 2], "they go to"),
+    (_changed_row(NUMBERS, lambda row: row.pop("timestamp")), [0, 2], "no column timestamp"),
     (_changed_row(layout.TASKS, lambda row: row.update(task=[None, "x"])), [0, 1, 2], "no text"),
     (_text(layout.OUTCOMES, '5\n{"episode": 0, "seed": "x", "frames": "many"}\n{"episode": 1, "seed": 1.5}\n'),
      [0, 1, 2], ""),
@@ -232,6 +234,24 @@ def test_what_is_whole_in_a_broken_set_is_kept_and_the_rest_named(tmp_path, brea
     mended = DataSet(tmp_path / "mended")
     assert [len(mended.episode(number)) for number in range(len(good))] == [(5, 3, 7)[number] for number in good]
     assert all(row.frames in (0, 3, 5, 7) for row in listed(folder)[0]) and card(mended)
+
+
+def test_a_set_is_not_repaired_into_one_that_is_there(tmp_path):
+    """Its episodes were appended to themselves."""
+    folder = filled(tmp_path / "set")
+    for into in (folder, folder / layout.INFO):
+        with pytest.raises(DemonstrationError, match="not empty"):
+            repair(folder, into)
+    assert survey(folder).good == [0, 1, 2]
+    (tmp_path / "empty").mkdir()
+    assert repair(folder, tmp_path / "empty").good == [0, 1, 2]
+
+
+def test_a_set_without_its_tasks_is_not_continued_but_repaired(tmp_path):
+    folder = filled(tmp_path / "set")
+    (folder / layout.TASKS).unlink()
+    with pytest.raises(DemonstrationError, match=r"tasks.parquet is missing; .*repair"):
+        SetWriter(folder, SCHEMA)
 
 
 @pytest.mark.parametrize("text", [None, "[]", '{"index": {"count": []}}', '{"index": {"mean": "x"}}'])

@@ -16,6 +16,7 @@ import numpy as np
 
 from demonstrations import editing, layout
 from demonstrations.frames import MARKS, PICTURES, DemonstrationError
+from demonstrations.watching import LOST, RECORDING
 from lab_web.child import HeardChild
 from lab_web.lab import RobotError
 from processes import keeper
@@ -73,6 +74,7 @@ class Episodes:
         self._start, self._mark, self._tasks, self._changed = start, mark, tasks, changed
         self._lock = threading.Lock()
         self._recorder, self._said, self._version = None, "", 0
+        self._is_asked_to_end = self._is_recording = self._is_bad = False
         self._list: dict[str, Any] = {"episodes": [], "camera": "", "rate": 0}
         self._look()
         self._share()
@@ -85,12 +87,13 @@ class Episodes:
             self._begin(*_checked(operation))
         elif do == "stop":
             with self._lock:
-                recorder = self._recorder
+                recorder, self._is_asked_to_end = self._recorder, True
             if recorder is not None:
                 recorder.end()
         elif isinstance(do, str) and do in MARKS:
-            if self._recorder is None:
-                raise RobotError("nothing is recorded now; press the record button first")
+            if not self._is_recording:
+                raise RobotError("nothing is recorded %s" % (
+                    "yet: the recorder starts" if self._recorder else "now; press the record button first"))
             self._mark(do)
         elif do == "delete":
             number, version = operation.get("number"), operation.get("version")
@@ -104,7 +107,7 @@ class Episodes:
     def close(self) -> None:
         """End the recorder; an episode that has no mark yet is thrown away."""
         with self._lock:
-            recorder = self._recorder
+            recorder, self._is_asked_to_end = self._recorder, True
         if recorder is not None:
             recorder.end()
             recorder.join()
@@ -128,7 +131,7 @@ class Episodes:
                 raise RobotError("an episode is being recorded")
             if self._list["episodes"]:
                 camera = self._list["camera"].removeprefix(PICTURES)
-            self._said = ""
+            self._said, self._is_asked_to_end, self._is_recording, self._is_bad = "", False, False, False
             try:
                 self._recorder = self._start(task, camera, self._hear, self._end)
             except OSError as error:
@@ -138,13 +141,15 @@ class Episodes:
     def _hear(self, line: str) -> None:
         if not line:
             return
-        self._said = line
+        self._said, self._is_bad = line, LOST in line
+        self._is_recording = self._is_recording or line.startswith(RECORDING)
         self._look()
         self._share()
 
     def _end(self) -> None:
         with self._lock:
-            self._recorder = None
+            # It ends by itself only when something is wrong, which its last line says.
+            self._recorder, self._is_recording, self._is_bad = None, False, not self._is_asked_to_end
         self._look()
         self._share()
 
@@ -170,13 +175,14 @@ class Episodes:
                 found = {"episodes": [row._asdict() for row in rows], "camera": cameras[0] if cameras else "",
                          "rate": rate}
             except (DemonstrationError, OSError) as error:
-                self._said = str(error)
+                self._said, self._is_bad = str(error), True
         if found != self._list:
             # A browser that has a strip of an earlier list asks again.
             self._list, self._version = found, self._version + 1
 
     def _share(self) -> None:
-        self._changed({"running": self._recorder is not None, "said": self._said, "version": self._version,
+        self._changed({"running": self._recorder is not None, "recording": self._is_recording,
+                       "bad": self._is_bad, "said": self._said, "version": self._version,
                        "folder": str(self.folder), **self._list})
 
 

@@ -26,7 +26,7 @@ def made(tmp_path):
 
     def start(task, camera, said, ended):
         made.started.append((task, camera))
-        made.said = said
+        made.said, made.ended = said, ended
         return SimpleNamespace(end=ended, join=lambda: None)
 
     made.episodes = Episodes(tmp_path / "set", start, made.marks.append, made.tasks, made.states.append)
@@ -59,15 +59,30 @@ def test_a_second_click_deletes_no_other_episode(made):
 def test_a_recording_begins_is_marked_and_ends(made):
     made.episodes.ask(1, {**START, "camera": "head"})
     assert made.started == [("Pick up the block.", "head")] and made.states[-1]["running"]
+    with pytest.raises(RobotError, match="the recorder starts"):  # a mark now would be lost
+        made.episodes.ask(1, {"do": "failure"})
+    made.said("recording into set, which has 0 episodes")
+    assert made.states[-1]["recording"] and not made.states[-1]["bad"]
     made.episodes.ask(1, {"do": "failure"})
     write(made.episodes.folder)
     made.said("episode 1 is kept")
     state = made.states[-1]
     assert made.marks == ["failure"] and state["said"] == "episode 1 is kept" and len(state["episodes"]) == 2
     made.episodes.ask(1, {"do": "stop"})
-    assert not made.states[-1]["running"]
+    assert not made.states[-1]["running"] and not made.states[-1]["bad"]
     delete(made, 0)
     assert len(made.states[-1]["episodes"]) == 1 and made.states[-1]["version"] > state["version"]
+
+
+def test_what_goes_wrong_is_marked_as_such(made):
+    made.episodes.ask(1, START)
+    made.said("recording into set, which has 0 episodes")
+    made.said("an episode of 5 frames is dropped: no news of head for 0.5 s; the next one begins")
+    assert made.states[-1]["bad"] and made.states[-1]["recording"]
+    made.said("episode 0 is kept as a success: 7 frames; the next one begins")
+    assert not made.states[-1]["bad"]
+    made.ended()  # by itself
+    assert made.states[-1]["bad"] and not made.states[-1]["running"] and not made.states[-1]["recording"]
 
 
 def test_the_first_episode_decides_on_the_camera(made, monkeypatch):

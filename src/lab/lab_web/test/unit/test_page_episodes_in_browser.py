@@ -29,7 +29,13 @@ def test_episodes_are_recorded_listed_deleted_and_fetched(lab, browser):
     browser.evaluate("document.getElementById('episode-camera').value = 'head'")
     click_until(browser, "#episode-record", lambda: recorder.asked)
     assert recorder.asked == [("Pick up the block.", "head")]
+    browser.wait("document.getElementById('episode-record').getAttribute('aria-pressed') === 'true'")
+    assert browser.evaluate("document.getElementById('episode-success').disabled")  # the recorder starts
+    recorder.said("an episode of 3 frames is dropped: no news of head")
+    browser.wait("document.getElementById('episode-said').classList.contains('bad')")
+    recorder.said("recording into set, which has 0 episodes")
     browser.wait("!document.getElementById('episode-success').disabled")
+    assert not browser.evaluate("document.getElementById('episode-said').classList.contains('bad')")
     click_until(browser, "#episode-success", lambda: lab.marks)
     assert set(lab.marks) == {"success"}
     write(lab.episodes.folder)
@@ -51,6 +57,8 @@ def test_episodes_are_recorded_listed_deleted_and_fetched(lab, browser):
     assert size.startswith("PK") and int(size[2:]) > 5000
     browser.evaluate("document.querySelector('#episode-list button').click()")
     browser.wait("document.querySelector('#episode-list button').textContent === 'Really delete?'")
+    browser.evaluate("lab.episodes.refresh()")  # as with every news of the robot
+    assert browser.evaluate("document.querySelector('#episode-list button').textContent") == "Really delete?"
     assert browser.evaluate(ROWS + ".length") == 2
     browser.evaluate("document.querySelector('#episode-list button').click()")
     browser.wait(ROWS + ".length === 1 && %s[0].children[0].textContent === '0: Success'" % ROWS)

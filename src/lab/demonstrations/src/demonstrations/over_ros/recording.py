@@ -7,7 +7,7 @@ import contextlib
 import queue
 import sys
 import time
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,13 @@ from std_msgs.msg import String
 from command_line.options import Parser, number
 
 from ..frames import MARKS, MAX_RATE_HZ, DemonstrationError
-from ..watching import WatchingRecorder, schema_of
+from ..watching import RECORDING, WatchingRecorder, schema_of
 from ..writing import SetWriter
 from .messages import CAMERAS, MARKS_TOPIC, Heard, topics
 
-#: Wall time for the first picture of every camera, and between two looks [s]; messages that wait at most.
-_FOUND_WITHIN_S, _POLL_S, _QUEUE = 20.0, 0.1, 4000
+#: Wall time for the first picture of every camera, after which it is said that it is waited for, and between two looks
+#: [s]; messages that wait at most. A busy machine takes half a minute.
+_FOUND_WITHIN_S, _SAID_AFTER_S, _POLL_S, _QUEUE = 90.0, 5.0, 0.1, 4000
 
 #: Messages as they come: (topic, message), or None while none comes.
 Feed = Generator[tuple[str, Any] | None, None, None]
@@ -81,16 +82,21 @@ def of_robot(heard: Mapping[str, Heard]) -> Feed:
             one.unregister()
 
 
-def sizes(feed: Feed, heard: Mapping[str, Heard], cameras: Sequence[str]) -> dict[str, tuple[int, int]]:
-    """{camera: (height, width)} of the first pictures of a feed; what comes before them is passed over. Raises
-    DemonstrationError where one is missing."""
+def sizes(feed: Feed, heard: Mapping[str, Heard], cameras: Sequence[str],
+          say: Callable[[str], None] = print) -> dict[str, tuple[int, int]]:
+    """{camera: (height, width)} of the first pictures of a feed; what comes before them is passed over. say: hears what
+    is waited for. Raises DemonstrationError where one is missing."""
     found: dict[str, tuple[int, int]] = {}
-    end = time.monotonic() + _FOUND_WITHIN_S
+    begin, is_said = time.monotonic(), False
     while set(found) < set(cameras):
-        item = next(feed, ("", None))
-        if item == ("", None) or time.monotonic() > end:
-            raise DemonstrationError("no picture came on %s; is the camera open?" % ", ".join(
-                CAMERAS[name] for name in cameras if name not in found))
+        item, waited_s = next(feed, ("", None)), time.monotonic() - begin
+        missing = ", ".join(CAMERAS[name] for name in cameras if name not in found)
+        if item == ("", None) or waited_s > _FOUND_WITHIN_S:
+            raise DemonstrationError("no picture came on %s in %.0f s; is the camera open, and the machine not too "
+                                     "busy?" % (missing, waited_s))
+        if waited_s > _SAID_AFTER_S and not is_said:
+            is_said = True
+            say("waiting for a picture on %s" % missing)
         for key, value, _ in heard[item[0]].says(item[1]) if item else ():
             if key in cameras:
                 # Films have even sides.
@@ -128,10 +134,10 @@ def run(options: argparse.Namespace) -> None:
         return of_robot(heard) if options.bag is None else of_bag(options.bag, heard)
 
     with contextlib.closing(feed()) as first:
-        size = sizes(first, heard, options.cameras)
+        size = sizes(first, heard, options.cameras, say)
     with SetWriter(options.folder, schema_of(options.rate, size, options.models)) as writer:
         recorder = WatchingRecorder(writer, options.task, say=say)
-        say("recording into %s, which has %d episodes" % (options.folder, writer.episodes))
+        say("%s%s, which has %d episodes" % (RECORDING, options.folder, writer.episodes))
         record(feed(), heard, recorder, size)
         if recorder.length:
             recorder.mark(options.end)
