@@ -57,6 +57,7 @@ SUITES = {
     "web_soak": ("web_soak_bench", "growth of the page's server under 50 clients that come and go, some misbehaving"),
     "batch": ("batch_bench", "an episode of a batch in a worker process beside one in a bare loop"),
     "batch_nodes": ("batch_nodes_bench", "a batch by two Ray nodes of one core each beside one; as root"),
+    "policy": ("policy_bench", "PickPlace by the policy of ./baxter.sh learn over ROS beside its environment"),
     "gym": ("gym_bench", "environments for learning: actions a second; TwoArmLift beside robosuite's"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
     "class": ("class_bench", "6 labs of ./baxter.sh labs, and 16 of which 12 are paused: labs per core and per GB"),

@@ -27,7 +27,7 @@ from .corrections import correct
 from .evaluation import Score, core_for, evaluate
 from .pictures import choose, draw_curve, film
 from .policy import PolicyError, load
-from .training import LossCurve, TrainingSettings, train
+from .training import LossCurve, TrainingSettings, contract_of, train
 
 #: Seeds of demonstrations and of corrections begin here: those of the evaluation are below.
 FIRST_DEMONSTRATION, FIRST_CORRECTION, MAX_CORRECTIONS = 100_000, 10_000_000, 100_000
@@ -53,7 +53,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                              "nobody knows beforehand; %d %%%% must succeed" % round(100 * PASSING))
     parser.add_argument("--out", type=Path, metavar="FOLDER",
                         help="of the results (default: .baxter/learned/TASK; TASK-robot, TASK-randomised for what is "
-                             "learned with --profile robot, --randomised)")
+                             "learned with --profile robot, --randomised; TASK-evaluated for --evaluate and --judge)")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="learn from this LeRobot data set")
     parser.add_argument("--demonstrations", type=number(int, 1, 1_000_000), default=DEMONSTRATIONS, metavar="N",
                         help="of the expert (default %(default)s)")
@@ -79,9 +79,11 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
                              "in each episode")
     parser.add_argument("--no-film", action="store_true", help="do not film good and bad episodes")
     options = parser.parse_args(argv)
-    if options.judge and (options.evaluate or not options.episodes):
-        parser.error("--judge needs some episodes, and no --evaluate")
+    if options.judge and (options.evaluate or options.episodes < EPISODES):
+        parser.error("--judge plays %d episodes or more, and goes without --evaluate" % EPISODES)
     options.evaluate = options.judge or options.evaluate
+    if options.evaluate and (options.data or not options.episodes):
+        parser.error("--evaluate and --judge play some episodes, and learn nothing, so that --data has no effect")
     for path in (options.evaluate, options.data):
         if path is not None and not path.exists():
             parser.error("there is no %s" % path)
@@ -130,14 +132,38 @@ def _told(found: Collected, what: str, task: str) -> None:
          True)
 
 
+def _chosen(options: argparse.Namespace, data: DataSet) -> list[int]:
+    """The episodes that are learned from: of --data all, else as many demonstrations and rounds as are asked for, of
+    those that earlier runs have made."""
+    if options.data is not None:
+        return list(range(len(data)))
+    ends = {FIRST_DEMONSTRATION: FIRST_DEMONSTRATION + options.demonstrations}
+    ends |= {first: first + options.corrections for first in _rounds(options)}
+    return [number for number, seed in enumerate(data.seeds)
+            if seed is None or any(first <= seed < end for first, end in ends.items())]
+
+
+def _rounds(options: argparse.Namespace) -> list[int]:
+    """The first seed of each round of corrections."""
+    return [FIRST_CORRECTION + round_ * MAX_CORRECTIONS for round_ in range(options.rounds)]
+
+
 def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) -> LossCurve:
     """Learn from all that is there, and write the policy."""
     data = DataSet(source)
+    contract = contract_of(data, options.chunk)
+    if options.task != contract.task:
+        raise DemonstrationError("%s has demonstrations of %s, not of %s" % (source, contract.task, options.task))
+    core_for(contract).close()  # what cannot be played is told before minutes of training
+    chosen = _chosen(options, data)
+    if len(chosen) < len(data):
+        _say("learns from %d of the %d episodes in %s" % (len(chosen), len(data), source), True)
     settings = TrainingSettings(chunk=options.chunk, steps=steps, seed=options.seed)
-    made = {"date": datetime.date.today().isoformat(), "demonstrations": len(data), "steps": settings.steps,
+    made = {"date": datetime.date.today().isoformat(), "demonstrations": len(chosen), "steps": settings.steps,
             "seed": settings.seed, "conditions": str(Conditions.of(data.schema.about)), "versions": _versions()}
     policy, curve = train(data, settings, made, lambda step, training, validation: _say(
-        "step %d of %d: loss %.4f, %.4f of episodes that only judge" % (step, settings.steps, training, validation)))
+        "step %d of %d: loss %.4f, %.4f of episodes that only judge" % (step, settings.steps, training, validation)),
+        chosen)
     _say("%d steps in %.0f s: loss %.4f, %.4f of episodes that only judge" % (
         settings.steps, curve.seconds, curve.training[-1], curve.validation[-1]), True)
     policy.save(path)
@@ -151,15 +177,15 @@ def learn(options: argparse.Namespace, folder: Path) -> Path:
     source, path = options.data or folder / SET, folder / POLICY
     if options.data is None:
         _demonstrate(options, source)
-        for round_ in range(options.rounds):
-            first = FIRST_CORRECTION + round_ * MAX_CORRECTIONS
-            if not _tried(source, first, first + MAX_CORRECTIONS):
-                _train(options, source, folder / STUDENT, max(options.steps // 2, 1))
-                seeds = range(first, first + options.corrections)
+        for first in _rounds(options):
+            if (have := _tried(source, first, first + MAX_CORRECTIONS)) < options.corrections:
+                if not have or not (folder / STUDENT).exists():
+                    _train(options, source, folder / STUDENT, max(options.steps // 2, 1))
+                seeds = range(first + have, first + options.corrections)
                 _told(correct(folder / STUDENT, source, seeds, options.workers, _say, _conditions(options)),
                       "corrections", options.task)
-    curve, task = _train(options, source, path, options.steps), load(path).contract.task
-    draw_curve(curve, "%s: %d demonstrations" % (task, len(DataSet(source))), folder / CURVE)
+    curve, contract = _train(options, source, path, options.steps), load(path).contract
+    draw_curve(curve, "%s: %d demonstrations" % (contract.task, contract.made["demonstrations"]), folder / CURVE)
     print("policy in %s, learning curve in %s" % (path, folder / CURVE))
     return path
 
@@ -175,10 +201,11 @@ def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
     print("%s: %s" % (load(path).contract.task, score))
     for seed, error in score.errors.items():
         print("seed %d did not run: %s" % (seed, error))
+    (folder / FILM).unlink(missing_ok=True)  # of another score
     write_json(folder / SCORE, {"successes": score.successes, "count": score.count, "episodes": score.results})
     if chosen := ([] if options.no_film else choose(score)):
         policy = load(path)
-        core = core_for(policy.contract)
+        core = core_for(policy.contract, **_conditions(options).choices)
         try:
             film(core, policy, chosen, folder / FILM)
         finally:
@@ -190,14 +217,17 @@ def measure(options: argparse.Namespace, path: Path, folder: Path) -> Score:
 def run(options: argparse.Namespace) -> int:
     """The exit status. Raises DemonstrationError, PolicyError, JobError, OSError."""
     root = Path(os.environ.get("LAB_ROOT", Path.cwd()))
-    name = options.task or (load(options.evaluate).contract.task if options.evaluate else "")
-    if options.evaluate is None:
-        name += "-robot" * (options.profile == "robot") + "-randomised" * options.randomised
+    name = options.task
+    if options.evaluate:
+        contract = load(options.evaluate).contract
+        if options.task:
+            contract.require(task=options.task)
+        name = contract.task
+    name += "-robot" * (options.profile == "robot") + "-randomised" * options.randomised
+    name += "-evaluated" * bool(options.evaluate)
     folder = options.out or root / ".baxter" / "learned" / name
     folder.mkdir(parents=True, exist_ok=True)
     path = options.evaluate or learn(options, folder)
-    if options.judge and options.task:
-        load(path).contract.require(task=options.task)
     score = measure(options, path, folder) if options.episodes else None
     return judged(score) if options.judge and score else 0
 

@@ -181,10 +181,12 @@ class Acting(Protocol):
 
 def load(path: Path) -> Acting:
     """A policy from its file, npz or ONNX. Raises PolicyError."""
-    if Path(path).suffix == ".onnx":
+    if Path(path).suffix.lower() == ".onnx":
         from .onnx_reading import load as load_onnx
 
         return load_onnx(path)
+    if Path(path).is_file() and not zipfile.is_zipfile(path):
+        raise PolicyError("%s is no policy file: it is no npz, nor is it named .onnx" % path)
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from demonstrations.frames import ACTION, ENVIRONMENT, EXPERT_ACTION, STATE, DemonstrationError
 from demonstrations.reading import DataSet
+from demonstrations.watching import ON_THE_ROBOT
 
 from .inputs import Inputs
 from .network import Adam, Network
@@ -60,6 +61,7 @@ class Examples:
         """Of some episodes of a set; the expert's own actions where it has them."""
         parts = []
         for number in numbers:
+            data.check_numbers(number)
             columns = data.episode(number).columns
             actions = columns.get(EXPERT_ACTION, columns[ACTION])
             index = np.arange(len(actions))[:, None] + np.arange(chunk)
@@ -71,28 +73,36 @@ class Examples:
 def contract_of(data: DataSet, chunk: int, made: dict[str, Any] | None = None) -> Contract:
     """The contract of a policy that learns from a set. Raises DemonstrationError where the set lacks something."""
     schema = data.schema
+    if schema.about.get("task") == ON_THE_ROBOT:
+        raise DemonstrationError("%s was recorded on the robot, not in an environment of gym_baxter, where what is "
+                                 "learned could be measured; lerobot-train takes such sets" % data.folder)
     for key in (STATE, ENVIRONMENT, ACTION):
         if key not in schema.features or schema.features[key].names is None:
             raise DemonstrationError("%s has no feature %s with names" % (data.folder, key))
     for key in ("task", "control"):
-        if key not in schema.about:
-            raise DemonstrationError("%s does not say its %s; it was not recorded in an environment of gym_baxter"
-                                     % (data.folder, key))
+        if not isinstance(schema.about.get(key), str):
+            raise DemonstrationError("%s says as its %s %r; it was not recorded in an environment of gym_baxter"
+                                     % (data.folder, key, schema.about.get(key)))
     seen = [schema.features[key] for key in (STATE, ENVIRONMENT)]
+    names = [name for feature in seen for name in feature.names or ()]
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
+        raise DemonstrationError("%s has the names %s more than once in %s and %s" % (
+            data.folder, ", ".join(repeated), STATE, ENVIRONMENT))
     return Contract(
         schema.about["task"], schema.about["control"], schema.rate_hz,
-        tuple(name for feature in seen for name in feature.names or ()),
+        tuple(names),
         tuple(unit for feature in seen for unit in feature.units or ("",) * feature.shape[0]),
         schema.features[ACTION].names or (), chunk, bool(schema.about.get("robosuite_order")), made=made or {})
 
 
 def train(data: DataSet, settings: TrainingSettings = TrainingSettings(), made: dict[str, Any] | None = None,  # noqa: B008 (frozen)
-          progress: Callable[[int, float, float], None] = lambda step, training, validation: None
-          ) -> tuple[Policy, LossCurve]:
-    """Learn from all successful episodes of a set. progress: called now and then with the step and both losses. The
-    same set and settings give the same policy on one machine. Raises DemonstrationError."""
+          progress: Callable[[int, float, float], None] = lambda step, training, validation: None,
+          chosen: Iterable[int] | None = None) -> tuple[Policy, LossCurve]:
+    """Learn from all successful episodes of a set, or from those that are `chosen`, too. progress: called now and then
+    with the step and both losses. The same set and settings give the same policy on one machine. Raises
+    DemonstrationError."""
     random = np.random.default_rng(settings.seed)
-    numbers = [number for number in range(len(data)) if data.episode(number).success]
+    numbers = [number for number in (range(len(data)) if chosen is None else chosen) if data.episode(number).success]
     if not numbers:
         raise DemonstrationError("%s has no successful episode to learn from" % data.folder)
     random.shuffle(numbers)

@@ -13,6 +13,8 @@ from demonstrations.writing import SetWriter
 from robot_learning import command
 from robot_learning.evaluation import Score
 
+MADE = SimpleNamespace(task="Reach", made={"demonstrations": 5})
+
 
 class Idle:
     """A student that stays where it is; counts what it was asked."""
@@ -63,8 +65,9 @@ def test_what_an_earlier_run_did_is_not_done_again(tmp_path, monkeypatch):
 
     monkeypatch.setattr(command, "collect", collected)
     monkeypatch.setattr(command, "correct", corrected)
-    monkeypatch.setattr(command, "_train", lambda options, source, path, steps: done.append(("training", steps)))
-    monkeypatch.setattr(command, "load", lambda path: SimpleNamespace(contract=SimpleNamespace(task="Reach")))
+    monkeypatch.setattr(command, "_train", lambda options, source, path, steps: done.append(
+        ("training", steps)) or path.touch())
+    monkeypatch.setattr(command, "load", lambda path: SimpleNamespace(contract=MADE))
     monkeypatch.setattr(command, "draw_curve", lambda *_: None)
     options = command.parse(["Reach", "--demonstrations", "5", "--rounds", "1", "--corrections", "3", "--steps", "10"])
     command.learn(options, tmp_path)
@@ -72,7 +75,8 @@ def test_what_an_earlier_run_did_is_not_done_again(tmp_path, monkeypatch):
     done.clear()
     options.rounds = 2
     command.learn(options, tmp_path)
-    assert done == [("demonstrations", 1), ("training", 5), ("corrections", 3), ("training", 10)]
+    # The seed that failed last has left nothing. A round goes on with its own student.
+    assert done == [("demonstrations", 1), ("corrections", 1), ("training", 5), ("corrections", 3), ("training", 10)]
     options.profile = "robot"
     with pytest.raises(DemonstrationError, match="with profile sim, not with profile robot; choose another --out"):
         command.learn(options, tmp_path)
@@ -90,7 +94,7 @@ def test_what_is_measured_is_what_was_shown(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "correct", lambda *arguments: seen.append(arguments[-1]) or Collected(1, 0, 1))
     monkeypatch.setattr(command, "_train", lambda *_: None)
     monkeypatch.setattr(command, "DataSet", lambda path: [])
-    monkeypatch.setattr(command, "load", lambda path: SimpleNamespace(contract=SimpleNamespace(task="Reach")))
+    monkeypatch.setattr(command, "load", lambda path: SimpleNamespace(contract=MADE))
     monkeypatch.setattr(command, "draw_curve", lambda *_: None)
 
     def evaluated(path, seeds, workers, progress, profile, randomised):

@@ -5,12 +5,14 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from demonstrations.environment import Conditions
 from demonstrations.frames import ACTION, ENVIRONMENT, STATE, DemonstrationError, Episode, Schema, numbers
 from demonstrations.reading import DataSet
 from demonstrations.writing import SetWriter
@@ -156,6 +158,8 @@ def test_observations_that_are_not_finite_are_refused(learned):
 def test_sets_without_a_task_or_without_successes_are_refused(tmp_path):
     with pytest.raises(DemonstrationError, match="task"):
         contract_of(small_set(tmp_path / "a", about=()), 2)
+    with pytest.raises(DemonstrationError, match="on the robot, not in an environment"):
+        contract_of(small_set(tmp_path / "c", about=(("task", "on the robot"), ("control", "positions"))), 2)
     with pytest.raises(DemonstrationError, match="no successful episode"):
         train(small_set(tmp_path / "b", success=False), QUICK)
 
@@ -236,7 +240,7 @@ def test_a_score_counts_episodes_that_did_not_run_as_failures():
     assert choose(score) == [0, 2, 1]
 
 
-@pytest.mark.parametrize(("good", "status", "text"), [(8, 0, "passed: 80 of 100 points"), (7, 3, "not passed: 70")])
+@pytest.mark.parametrize(("good", "status", "text"), [(80, 0, "passed: 80 of 100 points"), (79, 3, "not passed: 79")])
 def test_the_judge_plays_hidden_seeds(tmp_path, monkeypatch, capsys, learned, good, status, text):
     played = []
 
@@ -246,13 +250,94 @@ def test_the_judge_plays_hidden_seeds(tmp_path, monkeypatch, capsys, learned, go
 
     monkeypatch.setattr(command, "evaluate", evaluated)
     learned[0].save(tmp_path / "policy.npz")
-    words = ["Reach", "--judge", str(tmp_path / "policy.npz"), "--out", str(tmp_path), "--episodes", "10", "--no-film"]
+    words = ["Reach", "--judge", str(tmp_path / "policy.npz"), "--out", str(tmp_path), "--no-film"]
     assert [command.main(words) for _ in range(2)] == [status, status] and text in capsys.readouterr().out
-    assert played[0] != played[1] and len(played[0]) == 10
+    assert played[0] != played[1] and len(played[0]) == 100
     assert min(min(played)) > command.FIRST_CORRECTION + 100 * command.MAX_CORRECTIONS  # of no demonstration
     assert command.main(["PickPlace", *words[1:]]) == 1 and "'Reach'" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        command.parse([*words, "--evaluate", "p"])
+    for more in (["--evaluate", "p"], ["--episodes", "1"], ["--data", str(tmp_path)]):
+        with pytest.raises(SystemExit):
+            command.parse([*words, *more])
+
+
+def test_what_is_measured_leaves_what_was_learned_alone(tmp_path, monkeypatch, learned):
+    """Its score and film took the place of the learned policy's own, and another task's policy passed for it."""
+    monkeypatch.setattr(command, "evaluate", lambda *_, **__: Score({0: {"success": True, "steps": 1}}, {}))
+    monkeypatch.setenv("LAB_ROOT", str(tmp_path))
+    learned[0].save(tmp_path / "policy.npz")
+    words = ["--evaluate", str(tmp_path / "policy.npz"), "--no-film"]
+    assert command.main(words) == 0 and command.main([*words, "--profile", "robot"]) == 0
+    assert sorted(path.name for path in (tmp_path / ".baxter/learned").iterdir()) == [
+        "Reach-evaluated", "Reach-robot-evaluated"]
+    assert command.main(["PickPlace", *words]) == 1
+
+
+def test_a_film_shows_the_conditions_that_were_measured(tmp_path, monkeypatch, learned):
+    seen = []
+
+    class Filmed:
+        def close(self):
+            seen.append("closed")
+
+    monkeypatch.setattr(command, "evaluate", lambda *_, **__: Score({0: {"success": True, "steps": 1}}, {}))
+    monkeypatch.setattr(command, "core_for", lambda contract, **choices: seen.append(choices) or Filmed())
+    monkeypatch.setattr(command, "film", lambda *_: None)
+    learned[0].save(tmp_path / "policy.npz")
+    words = ["--evaluate", str(tmp_path / "policy.npz"), "--profile", "robot", "--randomised", "--out", str(tmp_path)]
+    assert command.main(words) == 0
+    assert seen == [Conditions("robot", {"mass": 0.5, "friction": 0.5}).choices, "closed"]
+
+
+def test_as_much_is_learned_from_as_is_asked_for(tmp_path, monkeypatch):
+    """Of a folder with more demonstrations, and rounds of corrections, all were taken without a word."""
+    first, round_ = command.FIRST_DEMONSTRATION, command.FIRST_CORRECTION
+    data = SimpleNamespace(seeds=[first, first + 1, first + 7, round_, round_ + command.MAX_CORRECTIONS, None],
+                           __len__=lambda self: 6)
+    for words, wanted in ((["--demonstrations", "2"], [0, 1, 5]), (["--demonstrations", "8"], [0, 1, 2, 5]),
+                          (["--rounds", "1"], [0, 1, 2, 3, 5])):
+        assert command._chosen(command.parse(["Reach", *words]), data) == wanted
+
+
+def test_a_set_of_another_task_is_not_learned_from(tmp_path, capsys):
+    small_set(tmp_path / "set")
+    out = tmp_path / "out"
+    words = ["--data", str(tmp_path / "set"), "--out", str(out), "--steps", "5", "--episodes", "0"]
+    assert command.main(["PickPlace", *words]) == 1 and "of Reach, not of PickPlace" in capsys.readouterr().err
+    # It is none of the environment either, which is told before it is learned from.
+    assert command.main(["Reach", *words]) == 1 and "number 0 of the observation" in capsys.readouterr().err
+    assert not (out / command.POLICY).exists()
+
+
+def with_names(data, names):
+    schema = data.schema
+    state = dataclasses.replace(schema.features[STATE], names=names)
+    data.schema = dataclasses.replace(schema, features={**schema.features, STATE: state})
+    return data
+
+
+def test_sets_that_no_policy_can_learn_from_are_refused_before_it_learns(tmp_path):
+    with pytest.raises(DemonstrationError, match=r"names goal.x more than once"):
+        contract_of(with_names(small_set(tmp_path / "twice"), ("goal.x", "left_hand.y", "left_hand.z")), 2)
+    with pytest.raises(DemonstrationError, match=r"task \['Reach'\]"):
+        contract_of(small_set(tmp_path / "no text", about=(("task", ["Reach"]), ("control", "osc_pose"))), 2)
+    data = small_set(tmp_path / "nan")
+    sound = data.episode
+
+    def broken(number):
+        episode = sound(number)
+        episode.columns[STATE] = np.full_like(episode.columns[STATE], np.nan)
+        return episode
+
+    data.episode = broken
+    with pytest.raises(DemonstrationError, match="not finite"):
+        train(data, QUICK)
+
+
+@pytest.mark.parametrize("name", ["score.json", "policy.npz", "picture.png"])
+def test_what_is_no_npz_is_said_to_be_none(tmp_path, name):
+    (tmp_path / name).write_bytes(b"\x89PNG" * 100)
+    with pytest.raises(PolicyError, match="no npz"):
+        load(tmp_path / name)
 
 
 def test_a_curve_becomes_a_picture(learned, tmp_path):

@@ -31,9 +31,9 @@ from .scene import RosLab
 _DESCRIPTION = """Run a policy file on /robot. Subscribes: ~hold (std_msgs/Bool): the dead-man's switch; the robot moves
 only while true comes again and again. Publishes: ~state (std_msgs/String): waiting, acting, success, failure, stopped,
 with the reason; /steering/mark: success or failure at an episode's end. Parameters: ~policy (the file), ~episode_seed
-(the arms go to the start, the things of the task are put in the simulator; -1: all stay), ~hold_s, ~seen_s,
-~speed_rad_s, ~off_rad (limits), ~lock_step (advance a paused simulator instead of waiting for the clock),
-~without_switch (only with ~lock_step)."""
+(the arms go to the start, the things of the task are put in the simulator; -1: all stay), ~episodes (how many, with
+this seed and those after it), ~hold_s, ~seen_s, ~speed_rad_s, ~off_rad (limits), ~lock_step (advance a paused simulator
+instead of waiting for the clock), ~without_switch (only with ~lock_step). Ends with 0 if all episodes succeeded."""
 #: Set-points between two actions, as in the environments [Hz].
 _STREAM_HZ = 100
 #: Wall time that is waited for messages, and between two looks [s].
@@ -125,6 +125,18 @@ class PolicyNode:
         self._end(FAILED)
         return False
 
+    def episodes(self, seeds: Sequence[int]) -> list[int]:
+        """One episode after the other; returns the seeds of those that succeeded, and says how many."""
+        good = []
+        for number, seed in enumerate(seeds, 1):
+            if self.episode(seed):
+                good.append(seed)
+            if rospy.is_shutdown():
+                break
+            rospy.loginfo("policy: %d of %d succeeded (seed %d: %s)", len(good), number, seed,
+                          SUCCEEDED if seed in good else FAILED)
+        return good
+
     def _begin(self, runner):
         """Where the arms are is where they go on from."""
         for control in self._controls:
@@ -191,7 +203,11 @@ def main() -> None:
         policy = load(Path(rospy.get_param("~policy", "policy.npz")).expanduser())
         node = PolicyNode(policy, limits, bool(rospy.get_param("~lock_step", False)),
                           bool(rospy.get_param("~without_switch", False)))
-        seed = int(rospy.get_param("~episode_seed", -1))
-        sys.exit(0 if node.episode(None if seed < 0 else seed) else 1)
+        seed, count = int(rospy.get_param("~episode_seed", -1)), int(rospy.get_param("~episodes", 1))
+        if count < 1 or (count > 1 and seed < 0):
+            raise ValueError("~episodes is %d; it must be 1 or more, and more than 1 need ~episode_seed" % count)
+        if seed < 0:
+            sys.exit(0 if node.episode(None) else 1)
+        sys.exit(0 if len(node.episodes(range(seed, seed + count))) == count else 1)
     except (PolicyError, DemonstrationError, GazeboInterfaceError, ValueError, KeyError) as error:
         sys.exit("policy: %s" % error)
