@@ -30,7 +30,7 @@ def measure(report, quick, number):
 
 
 def played(policy, seeds):
-    """What the node says that plays these seeds in a new lab."""
+    """The lines of the node, which plays these seeds in a new lab."""
     with Lab(gui="false", enable="true", pose="neutral") as lab:
         subprocess.run(["rosservice", "call", "/gazebo/pause_physics"], check=True, env=lab.environment,
                        stdout=subprocess.DEVNULL)

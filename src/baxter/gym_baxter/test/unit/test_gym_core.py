@@ -223,7 +223,7 @@ def held(core, seed, count=4):
 
 
 def test_the_physical_robots_sensors_have_noise_of_each_episode(noisy):
-    """What was observed was the truth, though the profile has noise."""
+    """The profile has it; observations were the truth."""
     one, again, other = held(noisy, 1), held(noisy, 1), held(noisy, 2)
     np.testing.assert_array_equal(one, again)
     assert 1e-4 < np.abs(np.diff(one, axis=0)).max() < 0.01  # [rad]

@@ -160,7 +160,7 @@ class RestOfTheWay:
         self._search = None
 
     def _searched(self, search: _Search, onward: Onward, scene: Scene, begin: float) -> str | NewWay | None:
-        """What comes of a search, in the scene as it is now; None while it lasts."""
+        """The outcome of a search in the scene as it is now; None while it lasts."""
         if not search.ended():
             if search.running.now() < search.latest:
                 return None

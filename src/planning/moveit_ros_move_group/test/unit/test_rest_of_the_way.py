@@ -45,7 +45,7 @@ def look(model, scene, timed, scenes, *more):
 
 
 def outcome(watch):
-    """What looking leads to, after a search."""
+    """The end of a search: another way, or a stop."""
     return wait_until(watch.hit, "another way or a stop", 10.0, 0.001)
 
 
