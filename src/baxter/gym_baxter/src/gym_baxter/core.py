@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -206,11 +205,11 @@ def _require(choices: Choices) -> None:
             raise ValueError("%s is %r; it must be a %s.%s(...)" % (
                 name, getattr(choices, name), kind.__module__.partition(".")[0], kind.__name__))
     choices.randomised.require()
-    for name, kind in (("size", numbers.Integral), ("control_freq", numbers.Real), ("physics_step_s", numbers.Real)):
+    whole, real = (int, np.integer), (int, float, np.integer, np.floating)
+    for name, kinds in (("size", whole), ("control_freq", real), ("physics_step_s", real)):
         value = getattr(choices, name)
-        if isinstance(value, bool) or not isinstance(value, kind) or not 0 < value < math.inf:
-            raise ValueError("%s is %r; it must be a %snumber above 0" % (
-                name, value, "whole " * (kind is numbers.Integral)))
+        if isinstance(value, bool) or not isinstance(value, kinds) or not 0 < value < math.inf:
+            raise ValueError("%s is %r; it must be a %snumber above 0" % (name, value, "whole " * (kinds is whole)))
     if not isinstance(choices.robosuite_order, (bool, np.bool_)):
         raise ValueError("robosuite_order is %r; it must be True or False" % (choices.robosuite_order,))
 

@@ -4,7 +4,6 @@ cameras that sit a little differently. The robot's own lag and noise are `baxter
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -35,7 +34,7 @@ class Randomised(NamedTuple):
     def require(self) -> None:
         """Raises ValueError for a number below 0, infinite, or NaN."""
         for name, value in self._asdict().items():
-            if not (isinstance(value, numbers.Real) and math.isfinite(value) and value >= 0.0):
+            if not (isinstance(value, (int, float, np.integer, np.floating)) and math.isfinite(value) and value >= 0.0):
                 raise ValueError("randomised.%s is %r; it must be a number from 0" % (name, value))
 
 
