@@ -145,12 +145,14 @@ def a_robot_is_recorded_and_replayed():
     if not os.environ.get("LAB_ROSBRIDGE"):
         print("not done, without LAB_ROSBRIDGE: ", end="")
         return
-    robot = ["--robot.type=baxter", "--robot.id=one", "--robot.address=%s" % os.environ["LAB_ROSBRIDGE"]]
+    # A busy machine is silent for seconds.
+    robot = ["--robot.type=baxter", "--robot.id=one", "--robot.seen_s=30",
+             "--robot.address=%s" % os.environ["LAB_ROSBRIDGE"]]
     dataset = ["--dataset.repo_id=local/shown", "--dataset.root=%s" % (SCRATCH / "shown")]
     run("lerobot-record", *robot, "--robot.drive=false", "--robot.camera_names=[head]",
         "--robot.pictures=%s" % os.environ["LAB_PICTURES"], "--teleop.type=baxter", "--teleop.id=one",
-        "--teleop.address=%s" % os.environ["LAB_ROSBRIDGE"], *dataset, "--dataset.num_episodes=2", "--dataset.fps=10",
-        "--dataset.episode_time_s=6", "--dataset.reset_time_s=1", "--dataset.single_task=Wave.",
+        "--teleop.seen_s=30", "--teleop.address=%s" % os.environ["LAB_ROSBRIDGE"], *dataset,
+        "--dataset.num_episodes=2", "--dataset.fps=10", "--dataset.episode_time_s=6", "--dataset.reset_time_s=1", "--dataset.single_task=Wave.",
         "--dataset.push_to_hub=false", "--play_sounds=false", "--display_data=false")
     found = survey(SCRATCH / "shown")
     assert (found.good, found.broken) == ([0, 1], {}), found

@@ -117,10 +117,10 @@ def test_an_attempt_is_used_up_by_another_way_and_not_by_none(monkeypatch):
     monkeypatch.setattr(action._planner, "redirected", redirected)
     onward = action._onward(good_requests(SIX)["move_group"].request, left, MoveGroupResult())
     with pytest.raises(PlanningError, match="a wall"):
-        onward(None, None)
+        onward.search(None, None, lambda: False)
     assert left.any() and left.take()
     with pytest.raises(PlanningError, match="used up"):
-        onward(None, None)
+        onward.search(None, None, lambda: False)
     assert len(asked) == 1
 
 

@@ -16,8 +16,9 @@ from .rosbridge import RosbridgeClient
 #: {camera: topic of its images}
 CAMERAS = {"head": "/cameras/head_camera/image", "left_hand": "/cameras/left_hand_camera/image",
            "right_hand": "/cameras/right_hand_camera/image"}
-#: Waits for the first messages, and for the robot to be enabled [s].
-_FOUND_WITHIN_S = 5.0
+#: Waits for the first messages, and for the robot to be enabled; for each camera's first picture, which a busy machine
+#: takes half a minute for [s].
+_FOUND_WITHIN_S, _FIRST_PICTURE_S = 5.0, 90.0
 #: A pause between actions counts as so much time at most [s]: a set-point never jumps.
 _LONGEST_S = 0.2
 
@@ -86,7 +87,7 @@ class Baxter(OverRosbridge, Robot):
             self.cameras[camera] = CameraStream(self.config.pictures, CAMERAS[camera], self.config.camera_height,
                                                 self.config.camera_width)
         try:
-            self._pictures(_FOUND_WITHIN_S)
+            self._pictures(_FIRST_PICTURE_S)
         except ConnectionError:
             self.disconnect()
             raise
