@@ -36,7 +36,7 @@ def _is_complete(folder: Path, requirements: Path) -> bool:
 
 
 def _install(folder: Path, module: str, requirements: Path) -> None:
-    print("batch: %s is installed from PyPI into %s" % (module, folder), file=sys.stderr)
+    print("%s is installed from PyPI into %s: it is needed for the first time" % (module, folder), file=sys.stderr)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".%s-" % module, dir=folder.parent) as unfinished:
