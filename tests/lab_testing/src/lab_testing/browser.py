@@ -27,7 +27,7 @@ _OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-
             "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--remote-allow-origins=*", "--no-first-run",
             "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--disable-sync",
             "--hide-scrollbars", "--lang=en-US", "about:blank")
-_START_S, _ANSWER_S = 60.0, 60.0
+_START_S, _ANSWER_S = 60.0, 150.0
 # What Chromium answers to a command for a page that is replaced meanwhile.
 _LEFT = "Inspected target navigated"
 # What the browser itself does with a key goes by its number and text.

@@ -20,7 +20,7 @@ from baxter_sysid.recording import ArmRecording
 from lab_testing.waiting import stretched, wait_for_message, wait_for_time, wait_until
 
 SIDE = "left"
-LIMIT_S = 150.0
+LIMIT_S = 300.0
 
 
 class LiveTest(unittest.TestCase):
