@@ -153,7 +153,8 @@ def a_robot_is_recorded_and_replayed():
         "--robot.pictures=%s" % os.environ["LAB_PICTURES"], "--teleop.type=baxter", "--teleop.id=one",
         "--teleop.seen_s=30", "--teleop.address=%s" % os.environ["LAB_ROSBRIDGE"], *dataset,
         "--dataset.num_episodes=2", "--dataset.fps=10", "--dataset.episode_time_s=6",
-        "--dataset.reset_time_s=1", "--dataset.single_task=Wave.", "--dataset.push_to_hub=false", "--play_sounds=false", "--display_data=false")
+        "--dataset.reset_time_s=1", "--dataset.single_task=Wave.", "--dataset.push_to_hub=false",
+        "--play_sounds=false", "--display_data=false")
     found = survey(SCRATCH / "shown")
     assert (found.good, found.broken) == ([0, 1], {}), found
     episode = DataSet(SCRATCH / "shown").episode(1)
