@@ -216,8 +216,8 @@ class Lab:
         """Return to a saved state: the same calls then give the same numbers, bit for bit. Raises LabError for the
         state of another lab, and where objects have been added or removed since."""
         if not isinstance(state, SavedState) or not state.is_of(self):
-            raise LabError("a lab returns to states of its own save(); found %s" % (
-                "one of another lab" if isinstance(state, SavedState) else repr(state)))
+            found = "one of another lab" if isinstance(state, SavedState) else repr(state)
+            raise LabError("a lab returns to states of its own save(); found " + found)
         if not state.restore():
             raise LabError("objects were added or removed since the state was saved; it fits the world no more")
 

@@ -184,7 +184,8 @@ class Core:
         """Return to a state of this environment; returns the observation. Equal actions then give equal numbers, bit
         for bit. Raises LabError for what this environment has not saved."""
         if not isinstance(state, CoreState):
-            raise LabError("an environment returns to states of its own save(); found %r" % (state,))
+            text = "an environment returns to states of its own save(); found %r" % (state,)
+            raise LabError(text)  # as in `controls.checked`
         self.lab.restore(state.lab)
         if self._is_randomised:
             self._randomiser.put(state.drawn)

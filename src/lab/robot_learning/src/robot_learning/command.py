@@ -149,7 +149,7 @@ def _rounds(options: argparse.Namespace) -> list[int]:
 
 
 def _train(options: argparse.Namespace, source: Path, path: Path, steps: int) -> LossCurve:
-    """Learn from all that is there, and write the policy."""
+    """Learn from the chosen episodes that are there, and write the policy."""
     data = DataSet(source)
     contract = contract_of(data, options.chunk)
     if options.task != contract.task:
