@@ -121,7 +121,7 @@ class RestOfTheWay:
             begin = self._begin = self._began() or begin
             before = self._blocked_from
             if not self._is_blocked(scene, now - begin):
-                self._end_search()
+                self.end_search()
                 return None
             if self._onward is None:
                 return self._stop(scene, begin)
@@ -150,11 +150,12 @@ class RestOfTheWay:
         return Running(self._timed, lambda: rospy.get_time() - begin, self._blocked_from)
 
     def _begin_search(self, onward: Onward, scene: Scene, begin: float) -> None:
-        self._end_search()
+        self.end_search()
         running = self._running(begin)
         self._search = _Search(onward, scene, running, last_stop(self._exact, scene, self._group, running))
 
-    def _end_search(self) -> None:
+    def end_search(self) -> None:
+        """Give up a search that is under way, as when its motion has ended."""
         if self._search is not None:
             self._search.give_up()
         self._search = None
@@ -176,13 +177,13 @@ class RestOfTheWay:
                 self._exact, scene, self._group, found.timed.sampled(found.timed.spaced(_APART))[0]) is not None:
             self._begin_search(onward, scene, begin)
             return None
-        self._end_search()
+        self.end_search()
         onward.follows(found, search.seconds)
         return self._new_way(scene, found.timed, begins)
 
     def _stop(self, scene: Scene, begin: float, why: str = "") -> str | NewWay:
         """The way to rest, or the sentence why the joints have to stop at once. Joints that stop go nowhere else."""
-        self._end_search()
+        self.end_search()
         self._onward = None
         reason = "%s; %s" % (self._reason, why) if why else self._reason
         stop = stopped(self._exact, scene, self._group, self._running(begin))

@@ -178,6 +178,14 @@ def test_a_search_that_does_not_end_does_not_hold_up_the_stop(model, scene, turn
     assert ExactChecker(model, None).free(blocked, state, "arm")
 
 
+def test_a_search_is_given_up_with_its_motion(model, scene, turning, clock, endless):
+    watch = look(model, scene, turning, [None, with_needle(scene, np.pi / 4)], Onward(endless))
+    watch.hit()
+    assert watch.hit() is None and not endless.stops[0]()
+    watch.end_search()
+    assert endless.stops[0]() and not watch.searching
+
+
 def test_what_changes_during_a_search_is_seen(model, scene, turning, clock, endless):
     far = with_needle(scene, np.pi / 4)
     near = with_needle(scene, 0.4 + np.pi / 4)

@@ -162,8 +162,11 @@ class MoveAction:
             watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options),
                                  self._onward(request, left, result) if options.replan else None,
                                  executor.began)
-            outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested,
-                                       self._telling(watch))
+            try:
+                outcome = executor.execute(result.planned_trajectory, self._server.is_preempt_requested,
+                                           self._telling(watch))
+            finally:
+                watch.end_search()
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
             again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
