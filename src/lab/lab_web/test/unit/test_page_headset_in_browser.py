@@ -79,6 +79,7 @@ def test_a_turn_of_the_controller_turns_the_hand(worn, browser):
     servo = worn.servos["left"]
 
     def turns():
+        browser.evaluate("device.controllers.left.quaternion.set(0, 0, 0, 1)")
         if not grip(browser, "left"):
             return False
         browser.evaluate("device.controllers.left.quaternion.set(0, Math.sin(0.02), 0, Math.cos(0.02))")
@@ -87,7 +88,6 @@ def test_a_turn_of_the_controller_turns_the_hand(worn, browser):
             return wait_until(lambda: servo.moves and servo.sent[-1][0][3:] == pytest.approx([0, 0, 0.4], abs=0.03),
                               timeout_s=3.0)
         return False
-    browser.evaluate("device.controllers.left.quaternion.set(0, 0, 0, 1)")
     wait_until(turns, lambda: "a hand that turns after %s" % servo.sent[-1:], 90.0)
 
 
