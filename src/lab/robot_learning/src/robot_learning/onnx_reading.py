@@ -23,8 +23,14 @@ class OnnxPolicy:
         self._input = session.get_inputs()[0].name
 
     def chunks(self, observations: np.ndarray) -> np.ndarray:
-        """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1."""
-        found = self._session.run(None, {self._input: np.asarray(observations, np.float32)})[0]
+        """(frames, chunk, action) of (frames, observation): the next actions, -1 to 1. Raises PolicyError."""
+        try:
+            found = self._session.run(None, {self._input: np.asarray(observations, np.float32)})[0]
+        except Exception as error:  # onnxruntime's errors have no base of their own
+            raise PolicyError("onnxruntime cannot run the policy: %s" % error) from error
+        wanted = (len(observations), self.contract.chunk, len(self.contract.action))
+        if np.shape(found) != wanted:
+            raise PolicyError("the policy says %s numbers; its contract needs %s" % (np.shape(found), wanted))
         return np.clip(found, -1.0, 1.0)
 
 
@@ -57,7 +63,12 @@ def load(path: Path) -> OnnxPolicy:
         raise PolicyError("the contract of %s is not as it must be: %s %s" % (
             path, type(error).__name__, error)) from error
     _require_shapes(path, contract, session)
-    return OnnxPolicy(contract, session)
+    policy = OnnxPolicy(contract, session)
+    try:
+        policy.chunks(np.zeros((1, len(contract.observation))))
+    except PolicyError as error:
+        raise PolicyError("%s: %s" % (path, error)) from error
+    return policy
 
 
 def _require_shapes(path, contract, session):
