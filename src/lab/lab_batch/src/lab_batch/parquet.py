@@ -30,7 +30,7 @@ def columns_of(outcomes: list[Outcome]) -> dict[str, list[Any]]:
 
 def ensure_installed(root: Path) -> None:
     """Make pyarrow importable; install it below root/.baxter on first use. Raises JobError."""
-    on_first_use.ensure_installed(root, "pyarrow", REQUIREMENTS)
+    on_first_use.ensure_installed(root, "pyarrow", REQUIREMENTS, "batches without --parquet need nothing")
 
 
 def write(path: Path, header: dict[str, Any], outcomes: list[Outcome]) -> None:

@@ -38,7 +38,7 @@ END_S = 10.0
 
 def ensure_installed(root: Path) -> None:
     """Make Ray importable here and in its workers; install it below root/.baxter on first use. Raises JobError."""
-    on_first_use.ensure_installed(root, "ray", REQUIREMENTS)
+    on_first_use.ensure_installed(root, "ray", REQUIREMENTS, "batches with --engine processes need nothing")
 
 
 def has_token() -> bool:
