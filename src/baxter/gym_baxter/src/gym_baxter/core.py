@@ -13,6 +13,7 @@ from baxter_model import SIDES, poses
 from urdf_model.transforms import quaternion_from_matrix
 
 from .controls import ArmControl, action_size, checked
+from .looking import outside_picture
 from .randomised import Randomised, Randomiser
 from .tasks import TASKS, robosuite_start
 
@@ -171,6 +172,11 @@ class Core:
             parts += [arm.angles, arm.velocities, pose[:3, 3], quaternion_from_matrix(pose),
                       (arm.gripper.position / 100.0,)]
         return np.concatenate(parts)
+
+    def look(self, width: int, height: int) -> np.ndarray:
+        """A picture for people, from outside, (height, width, 3) uint8, with a ball where the task's goal is."""
+        goal = getattr(self.task, "goal", None)
+        return outside_picture(self.lab, width, height, goal, getattr(self.task, "WITHIN_M", 0.0))
 
     # -- states
 

@@ -12,8 +12,7 @@ from gymnasium.utils import EzPickle  # pyright: ignore[reportMissingImports]
 from .core import Choices, Core, CoreState
 from .tasks import TASKS
 
-#: Where a picture for people is taken from, and what it looks at [m].
-_EYE, _TARGET = (2.2, 1.3, 0.7), (0.55, 0.0, 0.0)
+#: Size of a picture for people [pixels].
 _PICTURE = (480, 360)
 #: No number of a state is greater [rad, rad/s, m]: tables are within reach, and nothing here flies.
 _FAR = 100.0
@@ -70,11 +69,12 @@ class BaxterEnv(gymnasium.Env, EzPickle):
         return self._core.save()
 
     def render(self) -> np.ndarray | None:
-        """A picture from outside, (360, 480, 3) uint8, with render_mode rgb_array."""
+        """A picture from outside, (360, 480, 3) uint8, with render_mode rgb_array. A goal is a green ball there; the
+        robot's cameras do not see it."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs gymnasium.make(..., render_mode=\"rgb_array\")")
             return None
-        return self._core.lab.cameras.look(_EYE, _TARGET, *_PICTURE).pixels
+        return self._core.look(*_PICTURE)
 
     def close(self) -> None:
         """End the world. A second call does nothing."""

@@ -18,8 +18,8 @@ from .training import LossCurve
 
 _SIZE, _LEFT, _TOP, _RIGHT, _BOTTOM = (720, 420), 70, 40, 20, 50
 _TRAINING, _VALIDATION, _GRID, _TEXT = (31, 119, 180), (214, 39, 40), (225, 225, 225), (40, 40, 40)
-#: Of a film: where it is looked from and to [m], size of one episode's picture, those side by side, pictures a second.
-_EYE, _TARGET, _TILE, _COLUMNS, _FILM_HZ = (2.2, 1.3, 0.7), (0.55, 0.0, 0.0), (180, 240), 3, 10
+#: Of a film: size of one episode's picture, those side by side, pictures a second.
+_TILE, _COLUMNS, _FILM_HZ = (180, 240), 3, 10
 _GOOD, _BAD = (44, 160, 44), (214, 39, 40)
 #: The last picture stays so long [s].
 _LAST_S = 1.0
@@ -94,7 +94,7 @@ def _filmed(core, policy, seed, every):
     def take(_):
         nonlocal count
         if count % every == 0:
-            frames.append(core.lab.cameras.look(_EYE, _TARGET, _TILE[1], _TILE[0]).pixels.copy())
+            frames.append(core.look(_TILE[1], _TILE[0]).copy())
         count += 1
 
     result = play(core, policy, seed, take)
