@@ -432,8 +432,7 @@ def test_each_worker_begins_its_collection_with_other_files(tmp_path):
     assert firsts == ["test_a", "test_d"]
 
 
-@pytest.mark.parametrize("waiting", [0, 1, 3])
-@pytest.mark.parametrize("files", [1, 4])
+@pytest.mark.parametrize(("files", "waiting"), [(1, 0), (1, 3), (4, 1)])
 def test_workers_beside_the_cores_import_no_python_file_and_run_what_waits(tmp_path, fake_rostest, files, waiting):
     for name in "abcd"[:files]:
         (tmp_path / f"test_{name}.py").write_text(COLLECTED)

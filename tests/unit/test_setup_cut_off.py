@@ -172,7 +172,12 @@ def kill_session(leader):
                 os.kill(int(folder.name), signal.SIGKILL)
 
 
-@pytest.mark.parametrize("step", COMMANDS)
+def steps(*often):
+    """All steps; what is tested of others than ``often`` takes long in all."""
+    return [pytest.param(step, marks=[] if step in often else [pytest.mark.long]) for step in COMMANDS]
+
+
+@pytest.mark.parametrize("step", steps("apt", "pip", "build"))
 def test_killed_and_run_again(workspace, step):
     root, fakes = workspace
     (fakes / "hang").write_text(COMMANDS[step])
@@ -189,7 +194,7 @@ def test_killed_and_run_again(workspace, step):
     assert_whole(root)  # also that no step counts as cut off any more
 
 
-@pytest.mark.parametrize("step", COMMANDS)
+@pytest.mark.parametrize("step", steps("venv", "meshes", "kernels"))
 def test_a_failure_names_step_cause_command_and_log(workspace, step):
     root, fakes = workspace
     (fakes / "fail").write_text(COMMANDS[step])

@@ -379,6 +379,8 @@ def test_a_goal_for_two_links_of_one_arm_is_sampled(reacher):
         found = next(iter(sampler(scene.model, "arm", goal, scene, exact, number)), None)
         assert found is not None, number
         assert goal.broken(scene.model, scene.state.with_q(found), scene) is None
+        if number > 1:
+            continue  # that there is none takes all tries
         far = goal.merged(ConstraintSet(positions=[
             PositionTarget("l2", [(Sphere(0.05), rigid(np.eye(3), elbow[:3, 3] + 1.0))])]))
         samples = sampler(scene.model, "arm", far, scene, exact, number)
