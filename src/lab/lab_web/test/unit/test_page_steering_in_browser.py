@@ -47,6 +47,21 @@ def hold_a_key(lab, browser, name="r"):
     wait_until(moves, "a hand that moves", 60.0, interval_s=0.5)
 
 
+def test_on_a_telephone_the_robot_is_in_sight_above_the_buttons(steered, browser):
+    browser.resize(390, 844)
+    try:
+        for selector in ("#steer-motions .hold:first-child", "#steer-motions .hold:last-child"):
+            browser.evaluate("document.querySelector('%s').scrollIntoView({block: 'center'})" % selector)
+            header, world, button = (browser.evaluate(
+                "(({top, bottom}) => [top, bottom])(document.querySelector('%s').getBoundingClientRect())" % one)
+                for one in ("header", "#view", selector))
+            assert header[0] == 0 and header[1] <= world[0] + 1 < world[1] - 200, (header, world)
+            assert world[1] <= button[0] < button[1] <= 844, (world, button)
+        assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+    finally:
+        browser.resize(1000, 800)
+
+
 def test_a_button_moves_the_hand_while_it_is_held(steered, browser):
     left = steered.servos["left"]
     mouse(browser, UP, "mousePressed")
