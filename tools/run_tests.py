@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import re
 import signal
 import sys
 import uuid
@@ -76,7 +77,8 @@ def parser() -> argparse.ArgumentParser:
 
 def separate_values(words: list[str]) -> list[str]:
     """`--busy NAME` means the default share and a test's name, and `--changed --long` the last commit."""
-    return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" else word for word in words]
+    return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" and not re.fullmatch(r"\d+(\.\d+)?", after) else word
+            for word, after in zip(words, [*words[1:], ""], strict=True)]
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:

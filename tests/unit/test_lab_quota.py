@@ -103,6 +103,8 @@ def test_its_names_are_tests_that_exist():
     (["--busy"], ["--busy=40"]),
     (["--busy=20", "a.test"], ["--busy=20", "a.test"]),
     (["--busy", "a.test"], ["--busy=40", "a.test"]),
+    (["--busy", "20", "a.test"], ["--busy", "20", "a.test"]),
+    (["a.test", "--busy"], ["a.test", "--busy=40"]),
 ])
 def test_a_name_after_it_is_no_share(words, expected):
     assert run_tests.separate_values(words) == expected
