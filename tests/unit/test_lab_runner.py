@@ -379,6 +379,14 @@ def test_orders_are_the_longest_first_or_shuffled_by_a_seed(tmp_path):
     assert sorted(order("--shuffle=1")) == order()
 
 
+def test_ros_tests_that_never_ran_do_not_come_last(tmp_path):
+    (tmp_path / "test_quick.py").write_text("def test_1(): pass\n")
+    (tmp_path / "rostest").mkdir()
+    (tmp_path / "rostest/new.test").write_text("<launch/>")
+    order = re.findall(r"^\S+::\w+", run_pytest(tmp_path, "--collect-only").stdout, re.MULTILINE)
+    assert order == ["rostest/new.test::rostest", "test_quick.py::test_1"]
+
+
 EXAMPLES = """import time
 from hypothesis import given, settings, strategies
 @given(strategies.integers())

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 LOCALE_FOLDER = Path(__file__).resolve().parents[2] / ".baxter" / "locale"
 # What files took in earlier runs, and what a fresh clone begins with: file below the root -> seconds.
 DURATIONS, FIRST_DURATIONS = "durations.json", Path(__file__).with_name("durations.json")
+# Of a .test file that never ran [s]: one that begins last may end long after all others.
+NEW_ROSTEST_S = 120.0
 # Files that take less are ordered by name [s].
 MIN_DURATION_S = 2.0
 # Temporary files that are named.
@@ -185,7 +187,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         # Workers collect the files in different orders; within a file the sort keeps the order.
         of_unit.sort(key=lambda item: file_of(item.nodeid))
     files = {unit: {file_of(item.nodeid) for item in of_unit} for unit, of_unit in units.items()}
-    order = sorted(units, key=lambda unit: (-sum(durations.get(file, 0.0) for file in files[unit]), unit))
+    order = sorted(units, key=lambda unit: (-sum(
+        durations.get(file, NEW_ROSTEST_S if file.endswith(".test") else 0.0) for file in files[unit]), unit))
     if config.option.shuffle is not None:
         source = random.Random(config.option.shuffle)
         source.shuffle(order)
