@@ -24,7 +24,8 @@ def test_a_ball_is_a_disc_of_its_size_where_it_is(depth):
     seen = drawn((0.0, 0.2, 0.1), depth)
     rows, columns = np.nonzero(seen)
     # y of `base` is to the right of this camera, z up.
-    assert (columns.mean(), rows.mean()) == pytest.approx((100.0 + FOCUS * 0.2 / 2.0, 75.0 - FOCUS * 0.1 / 2.0), abs=1.0)
+    middle = 100.0 + FOCUS * 0.2 / 2.0, 75.0 - FOCUS * 0.1 / 2.0
+    assert (columns.mean(), rows.mean()) == pytest.approx(middle, abs=1.0)
     assert seen.sum() == pytest.approx(np.pi * (FOCUS * 0.1 / 2.0) ** 2, rel=0.03)
 
 

@@ -58,29 +58,29 @@ def test_a_servo_of_a_prepared_robot_makes_nothing_at_its_start(robot, groups):
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
 
-@pytest.mark.parametrize("srdf, parameters, reason", [
-    ("<robot name='crank'/>", "{}", "has no group with joints that move"),
-    ("<robot name='crank'><group name='arm'><joint name='turn'/></group></robot>", "[1]", "expected the servo's param"),
-    ("<robot name='crank'><group name='arm'><joint name='turn'/></group></robot>", "mesh_cuts: a.b", "mesh_cuts is 'a.b'"),
-    ("<robot name='crank'><group name='arm'><joint name='turn'/></group></robot>", "mesh_cuts: [", "expected"),
-])
-def test_what_cannot_be_prepared_is_told(tmp_path, capsys, srdf, parameters, reason):
-    (tmp_path / "crank.urdf").write_text("""<robot name="crank"><link name="base"/><link name="arm"/>
+GROUP = "<group name='arm'><joint name='turn'/></group>"
+
+
+def crank(folder, group, parameters):
+    """Three files of a small robot without meshes."""
+    (folder / "crank.urdf").write_text("""<robot name="crank"><link name="base"/><link name="arm"><collision>
+<geometry><sphere radius="0.1"/></geometry></collision></link>
 <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
-    (tmp_path / "crank.srdf").write_text(srdf)
-    (tmp_path / "crank.yaml").write_text(parameters)
-    names = [str(tmp_path / ("crank" + end)) for end in (".urdf", ".srdf", ".yaml")]
-    assert preparing.prepare_servo(names) == 1
+    (folder / "crank.srdf").write_text("<robot name='crank'>%s</robot>" % group)
+    (folder / "crank.yaml").write_text(parameters)
+    return [str(folder / ("crank" + end)) for end in (".urdf", ".srdf", ".yaml")]
+
+
+@pytest.mark.parametrize("group, parameters, reason", [
+    ("", "{}", "has no group with joints that move"), (GROUP, "[1]", "expected the servo's parameters"),
+    (GROUP, "mesh_cuts: a.b", "mesh_cuts is 'a.b'"), (GROUP, "mesh_cuts: [", "expected"),
+])
+def test_what_cannot_be_prepared_is_told(tmp_path, capsys, group, parameters, reason):
+    assert preparing.prepare_servo(crank(tmp_path, group, parameters)) == 1
     error = capsys.readouterr().err
     assert error.startswith("prepare_servo: ") and reason in error
 
 
 def test_a_robot_without_meshes_is_prepared(tmp_path):
-    (tmp_path / "crank.urdf").write_text("""<robot name="crank"><link name="base"/><link name="arm"><collision>
-<geometry><sphere radius="0.1"/></geometry></collision></link>
-<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""")
-    (tmp_path / "crank.srdf").write_text("<robot name='crank'><group name='a'><joint name='turn'/></group></robot>")
-    (tmp_path / "crank.yaml").write_text("move_group_name: a\n")
-    assert preparing.prepare_servo([str(tmp_path / ("crank" + end)) for end in (".urdf", ".srdf", ".yaml")]) == 0
+    assert preparing.prepare_servo(crank(tmp_path, GROUP, "move_group_name: arm")) == 0
