@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is made of a robot's shape beforehand is all that its servos ask for; what cannot be prepared is told."""
+"""A robot that is prepared beforehand has all that its servos ask for; others are refused with the reason."""
 import subprocess
 import sys
 from pathlib import Path
