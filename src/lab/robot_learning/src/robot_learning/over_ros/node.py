@@ -196,8 +196,8 @@ def main() -> None:
     """The program."""
     argparse.ArgumentParser(description=_DESCRIPTION).parse_args(rospy.myargv()[1:])
     limit_ports()
-    rospy.init_node("policy")
     try:
+        rospy.init_node("policy")
         limits = DrivingLimits(**{name: float(rospy.get_param("~" + name, default))
                                   for name, default in vars(DrivingLimits()).items()})
         policy = load(Path(rospy.get_param("~policy", "policy.npz")).expanduser())
@@ -209,5 +209,6 @@ def main() -> None:
         if seed < 0:
             sys.exit(0 if node.episode(None) else 1)
         sys.exit(0 if len(node.episodes(range(seed, seed + count))) == count else 1)
-    except (PolicyError, DemonstrationError, GazeboInterfaceError, ValueError, KeyError) as error:
+    except (PolicyError, DemonstrationError, GazeboInterfaceError, ValueError, KeyError,
+            rospy.ROSInitException) as error:
         sys.exit("policy: %s" % error)
