@@ -196,6 +196,18 @@ class GazeboBodies(unittest.TestCase):
         publisher.publish(state)
         wait_until(lambda: abs(self.position("box::body")[0] + 7) < 1e-3, "the box at x = -7")
 
+    def test_what_is_fixed_to_a_link_turns_about_it(self):
+        self.spawn_box("""<link name="arm"><pose>0.4 0 0.1 0 0 0</pose><inertial><mass>1.0</mass></inertial></link>
+          <joint name="weld" type="fixed"><parent>body</parent><child>arm</child></joint>""")
+        state = LinkState(link_name="box::arm", pose=Pose(Point(7, 1, 2), Quaternion(0, 0, 0, 1)))
+        state.twist = Twist(Vector3(0.5, 0, 0), Vector3(0, 0, 2.0))
+        self.accepted(self.set_link_state(state))
+        self.close(self.position("box::body"), (6.6, 1, 2))
+        for link, speed in (("box::body", (0.5, -0.8, 0)), ("box::arm", (0.5, 0, 0))):
+            twist = self.get_link_state(link, "").link_state.twist
+            self.close((twist.linear.x, twist.linear.y, twist.linear.z), speed)
+            self.close((twist.angular.x, twist.angular.y, twist.angular.z), (0, 0, 2.0))
+
     def test_link_properties_can_be_read_and_set(self):
         self.spawn_box()
         got = self.get_link_properties("box::body")
