@@ -138,8 +138,4 @@ class SavedState:
         for two bodies; where several parts of one lie on the other there are more. So what follows a return would
         depend on what was before.
         """
-        for model, *_ in self._models.values():
-            if model.joint_names or not model.static:
-                for name, link in model.merged.links.items():
-                    if link.collisions:
-                        model.renew_contacts(name)
+        self._lab.world.renew_contacts()

@@ -168,6 +168,28 @@ class World:
         for slipping in itertools.chain(*self._slipping.values()):
             slipping.step_changed(time_step_s)
 
+    def renew_contacts(self, model: Body | None = None, links: Iterable[str] = ()) -> None:
+        """Forget the contacts of ``links`` of a model, by default those of all that moves; the next step detects them
+        again.
+
+        Bullet has the two bodies of a contact in the order in which it came to know of them, and the forces depend on
+        it: with a box before the fingers, 82 of 100 grasps ended well, with the fingers before the box 95. So free
+        things without joints always come last, whatever was spawned or renewed.
+        """
+        if model is None:
+            for one in self.models.values():
+                if one.joint_names:
+                    _renew(one)
+        else:
+            for link in links:
+                model.renew_contacts(link)
+        self._renew_things()
+
+    def _renew_things(self) -> None:
+        for model in self.models.values():
+            if not (model.joint_names or model.static):
+                _renew(model)
+
     def wake_all(self) -> None:
         """Wake all sleeping bodies: Bullet does not notice changes from outside."""
         for model in self.models.values():
@@ -239,6 +261,8 @@ class World:
                 self._warn("model '%s': the spring of joint '%s' has a stiffness of %g; %g is used, which is stable at "
                            "a step of %g s" % (name, joint, *stiffness, self.time_step_s))
         self._models_changed()
+        if model.joint_names or model.static:
+            self._renew_things()
         return model
 
     def _part_rough_pairs(self, model: Model, pairs: Iterable[tuple[str, str]]) -> None:
@@ -470,3 +494,9 @@ class World:
         except KeyError:
             known = ", ".join(self.models) or "none"
             raise BulletSimError("there is no model '%s'; models: %s" % (name, known)) from None
+
+
+def _renew(model: Body) -> None:
+    for name, link in model.merged.links.items():
+        if link.collisions:
+            model.renew_contacts(name)

@@ -28,14 +28,14 @@ LOOK_TICKS = 5  # how often fingers at rest are looked at: whether somebody move
 class FingersHand:
     """The electric gripper of one side: two finger joints that move as one, as on a common pinion.
 
-    model: of bullet_sim; openings: {finger joint: where it is open [m]}; dt: length of a tick [s]; calibrated: whether
-    it is, at the start.
+    world, model: of bullet_sim; openings: {finger joint: where it is open [m]}; dt: length of a tick [s]; calibrated:
+    whether it is, at the start.
     Attribute `gripper`: its core.
     """
 
-    def __init__(self, model: Model, side: str, openings: Mapping[str, float], dt: float,
+    def __init__(self, world: World, model: Model, side: str, openings: Mapping[str, float], dt: float,
                  calibrated: bool = True) -> None:
-        self._model = model
+        self._world, self._model = world, model
         self._index = model.index(openings)
         self._openings = np.array(list(openings.values()))
         self._weights = [(index, 1.0 / (opening * len(openings)))
@@ -79,8 +79,7 @@ class FingersHand:
         if self.gripper.hooked:
             # After two edges were parallel, Bullet may keep a contact with a wrong normal, which keeps the fingers from
             # opening.
-            for link in self._links:
-                self._model.renew_contacts(link)
+            self._world.renew_contacts(self._model, self._links)
         self._driven = drive
         self.drive_again()
 
@@ -206,5 +205,5 @@ def hand_of(world: World, model: Model, side: str, dt: float,
     gripper is, at the start."""
     openings, cup = openings_of(model.robot, side), cup_of(model.robot, side)
     if openings:
-        return FingersHand(model, side, openings, dt, calibrated)
+        return FingersHand(world, model, side, openings, dt, calibrated)
     return CupHand(world, model, cup, dt) if cup else NoHand()
