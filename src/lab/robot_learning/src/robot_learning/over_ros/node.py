@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import rospy
 from bullet_sim_msgs.srv import AdvanceTicks
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool, String, UInt16
 
 from baxter_lab import Mode
 from baxter_model import SIDES, poses
@@ -38,8 +38,10 @@ instead of waiting for the clock), ~without_switch (only with ~lock_step). Ends 
 _STREAM_HZ = 100
 #: Wall time that is waited for messages, and between two looks [s].
 _FOUND_WITHIN_S, _POLL_S = 20.0, 0.005
-#: Of the simulator in lock-step: its rate, wall time for an answer, and how old joint states then are at most [s].
-_TICKS_HZ, _ADVANCE_S, _PERIOD_S = 500, 10.0, 0.021
+#: Of the simulator in lock-step: its rate, and wall time for an answer [s].
+_TICKS_HZ, _ADVANCE_S = 500, 10.0
+#: Joint states come at each tick then, else at the robot's usual rate [Hz]; and wall time in which that begins [s].
+_USUAL_HZ, _TRY_S = 100, 0.2
 #: At the start an arm is so near [rad], within so much time [s]; commands are repeated as often [s].
 _START_RAD, _START_S, _REPEAT_S = 0.02, 20.0, 0.1
 
@@ -71,6 +73,8 @@ class PolicyNode:
         self._wait(lambda: self._age_s() < limits.seen_s or lock_step, "joint states, grippers and models of the robot")
         self._controls = [ArmControl(self.lab.robot.arms[side], contract.control) for side in self.sides]
         self._told = ""
+        if lock_step:
+            self._see_every_tick()
 
     def _on_hold(self, message: Bool) -> None:
         self._held = time.monotonic() if message.data else float("-inf")
@@ -81,6 +85,26 @@ class PolicyNode:
             if rospy.is_shutdown() or time.monotonic() > end:
                 raise PolicyError("not there within %g s: %s" % (_FOUND_WITHIN_S, what))
             time.sleep(_POLL_S)
+
+    def _see_every_tick(self) -> None:
+        """Have joint states come at each tick, as an environment sees them, until the node ends: ten milliseconds more
+        lost one episode in seven."""
+        rate = rospy.Publisher("/robot/joint_state_publish_rate", UInt16, queue_size=1)
+        self._wait(rate.get_num_connections, "a subscriber of %s" % rate.name)
+        rospy.on_shutdown(lambda: rate.publish(_USUAL_HZ))
+        rate.publish(_TICKS_HZ)
+
+        def is_seen() -> bool:
+            now = self._advance(1)
+            end = time.monotonic() + _TRY_S
+            while time.monotonic() < end and not self._sees(now):
+                time.sleep(_POLL_S)
+            return self._sees(now)
+        self._wait(is_seen, "joint states at each tick")
+
+    def _sees(self, now: float) -> bool:
+        """Whether the joint states of the tick at `now` [s] are there."""
+        return self.lab.robot.stamp > now - 0.5 / _TICKS_HZ
 
     def _age_s(self) -> float:
         return max(self.lab.robot.age_s, float("inf") if self.lab.seen is None else rospy.get_time() - self.lab.seen)
@@ -142,6 +166,12 @@ class PolicyNode:
         for control in self._controls:
             control.reset()
         runner.begin()
+        self._look()
+
+    def _look(self):
+        """See the things as they are now; by the clock, they come by themselves."""
+        if self._lock_step:
+            self.lab.look()
 
     def _go_to_start(self):
         """Both arms to the task's start, while nothing speaks against it. Raises PolicyError."""
@@ -179,17 +209,22 @@ class PolicyNode:
             for control, begin in zip(self._controls, begins, strict=True):
                 control.send((point + 1) / points, begin)
             self._pass(1.0 / _STREAM_HZ, ["/robot/limb/%s/joint_command" % side for side in SIDES])
+        self._look()
 
     def _pass(self, seconds: float, topics: Sequence[str] = ()) -> None:
         """Let simulated time pass; in lock-step, after messages on `topics`, and until the joint states are there."""
         if not self._lock_step:
             rospy.sleep(seconds)
             return
-        answer = call("/gazebo/advance", AdvanceTicks, round(seconds * _TICKS_HZ), list(topics), _ADVANCE_S)
+        now = self._advance(round(seconds * _TICKS_HZ), topics)
+        self._wait(lambda: self._sees(now), "joint states of %.3f s" % now)
+
+    def _advance(self, ticks: int, topics: Sequence[str] = ()) -> float:
+        """Let the simulator make ticks, after messages on `topics`; returns the time [s]."""
+        answer = call("/gazebo/advance", AdvanceTicks, ticks, list(topics), _ADVANCE_S)
         if not answer.success:
             raise GazeboInterfaceError(answer.status_message)
-        now = answer.sim_time.to_sec()
-        self._wait(lambda: self.lab.robot.stamp > now - _PERIOD_S, "joint states of %.3f s" % now)
+        return answer.sim_time.to_sec()
 
 
 def main() -> None:

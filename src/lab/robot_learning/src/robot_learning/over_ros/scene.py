@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import rospy
 from gazebo_msgs.msg import ModelState, ModelStates
-from gazebo_msgs.srv import GetWorldProperties, SetModelState, SpawnModel
+from gazebo_msgs.srv import GetModelState, GetWorldProperties, SetModelState, SpawnModel
 from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 
@@ -75,7 +75,7 @@ class RosLab:
     GazeboInterfaceError."""
 
     def __init__(self, robot: RosRobot):
-        self.robot, self._poses = robot, {}
+        self.robot, self._poses, self._names, self._asks = robot, {}, [], False
         self.seen: float | None = None
         try:
             self._there = set(call(_GAZEBO + "/get_world_properties", GetWorldProperties).model_names)
@@ -87,8 +87,19 @@ class RosLab:
                                       tcp_nodelay=True)
 
     def _on_states(self, message: ModelStates) -> None:
-        self._poses = dict(zip(message.name, message.pose, strict=True))
+        if not self._asks:
+            self._poses = dict(zip(message.name, message.pose, strict=True))
         self.seen = rospy.get_time()
+
+    def look(self) -> None:
+        """Ask the simulator where the things are now: what comes on the topic is older. From then on only this counts.
+        Raises GazeboInterfaceError."""
+        self._asks = True
+        for name in self._names:
+            answer = call(_GAZEBO + "/get_model_state", GetModelState, name, "world")
+            if not answer.success:
+                raise GazeboInterfaceError("model '%s' is not seen: %s" % (name, answer.status_message))
+            self._poses[name] = answer.pose
 
     def pose_of(self, name: str) -> Pose:
         """Raises GazeboInterfaceError where nothing of that name is seen."""
@@ -110,6 +121,7 @@ class RosLab:
                           "world")
             if not answer.success:
                 raise GazeboInterfaceError("model '%s' cannot be spawned: %s" % (name, answer.status_message))
+        self._names.append(name)
         return RosThing(name, self)
 
 
