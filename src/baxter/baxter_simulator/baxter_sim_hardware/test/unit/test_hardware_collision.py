@@ -213,6 +213,19 @@ def test_a_squeezed_cuff_lets_the_arm_float_and_a_released_one_holds_it(lab, sid
     lab.run(0.1)
 
 
+def test_a_squeezed_cuff_of_a_disabled_robot_does_nothing(lab):
+    lab.enable(False)
+    squeeze(lab, "left")
+    lab.run(0.1)
+    start = lab.position
+
+    def push(lab):
+        lab.model.apply_wrench("left_gripper", (0.0, 8.0, 0.0), position=lab.model.link_pose("left_gripper").position)
+
+    lab.run(0.5, before=push)
+    assert np.abs(lab.position - start).max() < 1e-3
+
+
 def test_a_suppressed_cuff_does_nothing(lab):
     squeeze(lab, "left")
     start = lab.position

@@ -244,3 +244,12 @@ def test_who_waits_for_it_is_told_of_each_time_that_the_joints_are_put_elsewhere
         assert lab.last("sim/resets").data != before
     before = lab.last("sim/resets").data
     assert make_lab().last("sim/resets").data != before  # another robot in its place
+
+
+def test_an_arm_that_has_collided_takes_commands_after_a_reset_of_the_time(make_lab):
+    lab = make_lab(parameters={"enable": True})
+    lab.run(1.0)
+    lab.plugin._baxter.halt("left", 2.0)
+    assert lab.plugin._baxter.halted("left")
+    reset_simulation(lab)
+    assert lab.world.time_s < 1.0 and not lab.plugin._baxter.halted("left")

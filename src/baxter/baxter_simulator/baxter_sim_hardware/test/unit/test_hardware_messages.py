@@ -7,7 +7,8 @@ from baxter_core_msgs.msg import EndEffectorCommand
 from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware.message_delay import Late, MessageDelay
 
-RAW = 4
+TORQUE, RAW = 3, 4
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 TICK_S = 0.002
 ROWS = {"least": {"message": 0.005}, "most": {"message": 0.008}}
 
@@ -120,3 +121,11 @@ def test_grippers_start_uncalibrated_and_do_not_move_until_they_are(make_lab):
     lab.plugin.reset()
     lab.run(0.05)
     assert lab.last("end_effector/left_gripper/state").calibrated == 1
+
+
+def test_reference_states_have_each_joints_torque_beside_its_name(make_lab):
+    lab, torque = make_lab(parameters={"enable": True}), 0.05 * np.arange(1, 15)
+    lab.run(0.05, before=lambda lab: lab.command(TORQUE, torque))
+    message = lab.last("ref_joint_states")
+    told = dict(zip(message.name, message.effort, strict=True))
+    assert [told[name] for name in NAMES] == pytest.approx(torque)
