@@ -116,6 +116,7 @@ class World:
         self._watch = StateWatch(self, error)
         self._touched: list[Body] = []  # models that were touched since the last step, perhaps asleep
         self._placed: list[Body] = []  # free models that were put somewhere since the last step
+        self._things_are_last = True  # free models without joints, for Bullet; not so after others were spawned
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
             numSolverIterations=self.solver_iterations,
@@ -186,6 +187,7 @@ class World:
         self._renew_things()
 
     def _renew_things(self) -> None:
+        self._things_are_last = True
         for model in self.models.values():
             if not (model.joint_names or model.static):
                 _renew(model)
@@ -261,8 +263,7 @@ class World:
                 self._warn("model '%s': the spring of joint '%s' has a stiffness of %g; %g is used, which is stable at "
                            "a step of %g s" % (name, joint, *stiffness, self.time_step_s))
         self._models_changed()
-        if model.joint_names or model.static:
-            self._renew_things()
+        self._things_are_last = self._things_are_last and not (model.joint_names or model.static)
         return model
 
     def _part_rough_pairs(self, model: Model, pairs: Iterable[tuple[str, str]]) -> None:
@@ -375,6 +376,8 @@ class World:
     def step(self) -> None:
         """Advance the world by one tick."""
         self._put_contact_ahead()
+        if not self._things_are_last:
+            self._renew_things()
         if self._placed:
             placed, self._placed = self._placed, []
             for model in placed:
@@ -415,6 +418,7 @@ class World:
         for model, motion in motions.items():
             parts, _ = build(self._client, model.blueprint, model.frame_of(motion), self._shapes, lambda text: None)
             model.take_parts(parts, motion)
+        self._things_are_last = False
         self.wake_all()
 
     def reset_models(self) -> None:
