@@ -130,8 +130,8 @@ FLOOR = """<robot name="floor"><link name="world"><collision><origin xyz="0 0 -0
 
 
 def pressed(order, change=lambda world, press: None):
-    """The place of a box after a finger has pressed on its edge and gone on, and the pairs that Bullet saw touch, in its
-    order; with what was spawned in that order, and changed before."""
+    """The place of a box after a finger has pressed on its edge and gone on, and the pairs that touch, in the order in
+    which Bullet has them; with what was spawned in that order, and changed before."""
     world = World()
     try:
         texts = {"floor": (FLOOR, 0.0), "press": (PRESS, 0.1), "box": (BOX, 0.02)}
