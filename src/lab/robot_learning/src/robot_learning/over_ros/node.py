@@ -87,8 +87,8 @@ class PolicyNode:
             time.sleep(_POLL_S)
 
     def _see_every_tick(self) -> None:
-        """Have joint states come at each tick, as an environment sees them, until the node ends: ten milliseconds more
-        lost one episode in seven."""
+        """Have joint states come at each tick, until the node ends: at the usual rate they are up to 10 ms old, and in
+        an environment they are of the present tick."""
         rate = rospy.Publisher("/robot/joint_state_publish_rate", UInt16, queue_size=1)
         self._wait(rate.get_num_connections, "a subscriber of %s" % rate.name)
         rospy.on_shutdown(lambda: rate.publish(_USUAL_HZ))
