@@ -14,6 +14,7 @@ import re
 import signal
 import sys
 import uuid
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -78,7 +79,7 @@ def parser() -> argparse.ArgumentParser:
 def separate_values(words: list[str]) -> list[str]:
     """`--busy NAME` means the default share and a test's name, and `--changed --long` the last commit."""
     return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" and not re.fullmatch(r"\d+(\.\d+)?", after) else word
-            for word, after in zip(words, [*words[1:], ""], strict=True)]
+            for word, after in zip_longest(words, words[1:], fillvalue="")]
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:

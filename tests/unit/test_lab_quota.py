@@ -100,6 +100,7 @@ def test_its_names_are_tests_that_exist():
 
 
 @pytest.mark.parametrize(("words", "expected"), [
+    ([], []),
     (["--busy"], ["--busy=40"]),
     (["--busy=20", "a.test"], ["--busy=20", "a.test"]),
     (["--busy", "a.test"], ["--busy=40", "a.test"]),
