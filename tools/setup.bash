@@ -25,13 +25,14 @@ GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv overlay pip meshes build urdf kernels pictures)
 # Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
-# Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
-# and run one after the other, the groups beside each other. The collision spheres are cached beside the compiled code.
+# What their servos need besides.
 SERVO=$LAB_ROOT/src/planning/moveit_servo/config
 PREPARE_SERVOS="rosrun moveit_servo prepare_servo $(printf '%q ' "${PLANNED_FOR[0]}" \
     "$LAB_ROOT/src/baxter/baxter_moveit_config/config/baxter.srdf.xacro" "$SERVO/baxter.yaml") && \
     rosrun moveit_servo prepare_servo $(printf '%q ' "${PLANNED_FOR[1]}" \
     "$LAB_ROOT/src/probot/probot_anno_moveit_config/config/probot_anno.srdf" "$SERVO/probot.yaml")"
+# Python packages with compiled inner loops: `python3 -m NAME` fills their cache. Those in one group have code in common
+# and run one after the other, the groups beside each other. The collision spheres are cached beside the compiled code.
 COMPILED=("python3 -m arm_kinematics && python3 -m baxter_sim_hardware && python3 -m baxter_sysid"
     "python3 -m motion_planning && python3 -m moveit_servo && rosrun motion_planning prepare_robots $(printf '%q ' "${PLANNED_FOR[@]}") && $PREPARE_SERVOS")
 # Robots whose meshes are made ready for pictures.

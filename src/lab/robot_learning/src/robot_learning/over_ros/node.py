@@ -33,7 +33,8 @@ only while true comes again and again. Publishes: ~state (std_msgs/String): wait
 with the reason; /steering/mark: success or failure at an episode's end. Parameters: ~policy (the file), ~episode_seed
 (the arms go to the start, the things of the task are put in the simulator; -1: all stay), ~episodes (how many, with
 this seed and those after it), ~hold_s, ~seen_s, ~speed_rad_s, ~off_rad (limits), ~lock_step (advance a paused simulator
-instead of waiting for the clock), ~without_switch (only with ~lock_step). Ends with 0 if all episodes succeeded."""
+instead of waiting for the clock; joint states then come at each tick, and at 100 Hz when the node ends),
+~without_switch (only with ~lock_step). Ends with 0 if all episodes succeeded."""
 #: Set-points between two actions, as in the environments [Hz].
 _STREAM_HZ = 100
 #: Wall time that is waited for messages, and between two looks [s].

@@ -81,7 +81,7 @@ class RosLab:
             self._there = set(call(_GAZEBO + "/get_world_properties", GetWorldProperties).model_names)
         except GazeboInterfaceError as error:
             self._there = None
-            rospy.logwarn("policy: nothing is put up, since there is no simulator (%s); the things must be on "
+            rospy.logwarn("nothing is put up, since there is no simulator (%s); the things must be on "
                           "/gazebo/model_states", error)
         self._kept = rospy.Subscriber(_GAZEBO + "/model_states", ModelStates, self._on_states, queue_size=1,
                                       tcp_nodelay=True)
