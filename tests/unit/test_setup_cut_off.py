@@ -166,10 +166,26 @@ def assert_whole(root):
 
 def kill_session(leader):
     """Kill a process and all that it has started, as a machine that is switched off does."""
+    def are_gone():
+        found = session(leader)
+        for pid in found:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        return not found
+
+    # More than once: what a process starts while the others are looked at and killed is not among them.
+    wait_until(are_gone, "the end of a killed set-up", LIMIT_S)
+
+
+def session(leader):
+    """Living processes of a session."""
+    found = []
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            if int((folder / "stat").read_text().rpartition(")")[2].split()[3]) == leader:
-                os.kill(int(folder.name), signal.SIGKILL)
+            state, _, _, its_session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
+            if int(its_session) == leader and state not in "ZX":
+                found.append(int(folder.name))
+    return found
 
 
 def steps(*often):
