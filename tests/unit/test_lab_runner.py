@@ -44,7 +44,7 @@ def workspace(tmp_path):
         "src/copy/alpha/test/unit/test_copy.py": "",
         "tests/package.xml": MANIFEST % ("workspace_tests", "<exec_depend>gamma</exec_depend>"),
         "tests/unit/test_lint.py": "pytestmark = pytest.mark.tree",
-        "tests/unit/test_whole.py": "",
+        "tests/unit/test_whole.py": "TEXT = 'pytestmark = pytest.mark.tree'",
         "tests/rostest/whole.test": "<!-- beside others --><launch/>",
     }
     for name, text in files.items():

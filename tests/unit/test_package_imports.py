@@ -15,6 +15,8 @@ from xml.etree import ElementTree
 import pytest
 from workspace_tree import ROOT, is_in_tests, is_python, own_files, packages
 
+pytestmark = pytest.mark.tree
+
 PACKAGES = {**packages(), "lab_testing": Path("tests/lab_testing"), "workspace_tests": Path("tests")}
 #: Modules whose Debian package has another name: the name in a manifest.
 RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-opencv", "lxml": "python3-lxml",

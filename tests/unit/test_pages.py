@@ -10,6 +10,8 @@ import pytest
 import pages
 from lab_tests import page_blocks
 
+pytestmark = pytest.mark.tree
+
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 #: Only against hanging: the machine may be busy.

@@ -15,6 +15,8 @@ try:
 except ImportError:  # Python 3.10
     from pip._vendor import tomli as tomllib
 
+pytestmark = pytest.mark.tree
+
 FRONT_DOORS = ("baxter_lab", "gym_baxter", "demonstrations", "robot_learning")
 #: The parts of these packages that know ROS stay behind.
 LEFT_OUT = {"baxter_sim_hardware.topics", "demonstrations.over_ros", "robot_learning.over_ros"}

@@ -8,6 +8,8 @@ import re
 import pytest
 from workspace_tree import ROOT
 
+pytestmark = pytest.mark.tree
+
 PAGE = ROOT / "docs" / "architecture.md"
 WALKS = ("The way of a joint command", "The way of an IK request")
 ROW = re.compile(r"\| (\d+) \| \[[^]]+\]\(\.\./([^)]+)\), `([\w.]+)` \| (\d+|start) \| .+ \|")

@@ -59,7 +59,7 @@ def runs_in_real_time(path: Path) -> bool:
 
 def looks_at_the_whole_tree(path: Path) -> bool:
     """Whether a test file says that it reads files of all packages."""
-    return "pytest.mark.tree" in path.read_text(encoding="utf-8")
+    return re.search(r"^pytestmark = .*\bpytest\.mark\.tree\b", path.read_text(encoding="utf-8"), re.M) is not None
 
 
 @dataclass

@@ -17,8 +17,6 @@ from motion_planning.spheres.world_tables import forest, pyramid, solids_of, tre
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import pose_matrix as pose
 
-pytestmark = pytest.mark.tree
-
 TOLERANCE = 0.01
 # CPU time of 300 balls of 100 spheres, as a robot's tables have [s]; a loop in Python takes 0.05 or more.
 MAX_BALLS_S = 0.02
