@@ -5,6 +5,7 @@
 The world is paused and advanced in beats of 10 ms, so that each interruption comes at the same place of the motion.
 Private parameters: ~motions, ~interruptions: names, separated by spaces; default: all.
 """
+import contextlib
 import re
 import sys
 
@@ -101,6 +102,19 @@ class InterruptionsTest(subtests.TestCase):
         cls.bench = Bench()
         cls.motions = all_motions(cls.bench)
 
+    def test_motions_end_with_an_interruption_and_nothing_moves_afterwards(self):
+        interruptions = chosen("interruptions", INTERRUPTIONS)
+        for name in chosen("motions", self.motions):
+            motion = self.motions[name]
+            # Programs of a motion are started once for all its interruptions.
+            with self.subTest(motion=name), contextlib.closing(motion):
+                motion.prepare()
+                for each in interruptions:
+                    kind = INTERRUPTIONS[each]
+                    if isinstance(motion, kind.only) and not isinstance(motion, kind.without):
+                        with self.subTest(motion=name, interruption=each):
+                            self.interrupt(name, each)
+
     def interrupt(self, name, interruption_name):
         """One motion, interrupted once."""
         bench, motion, interruption = self.bench, self.motions[name], INTERRUPTIONS[interruption_name]
@@ -181,24 +195,6 @@ def chosen(parameter, table):
     return names
 
 
-def add_tests():
-    """Add a test for each motion, which runs all its interruptions; its programs are started once."""
-    interruptions = chosen("interruptions", INTERRUPTIONS)
-    for name in chosen("motions", all_motions.names):
-        def test(self, name=name):
-            motion = self.motions[name]
-            motion.prepare()
-            self.addCleanup(motion.close)
-            for each in interruptions:
-                kind = INTERRUPTIONS[each]
-                if isinstance(motion, kind.only) and not isinstance(motion, kind.without):
-                    with self.subTest(motion=name, interruption=each):
-                        self.interrupt(name, each)
-
-        setattr(InterruptionsTest, "test_" + name, test)
-
-
 if __name__ == "__main__":
     rospy.init_node("interruptions")
-    add_tests()
     rostest.rosrun("workspace_tests", rospy.get_name().strip("/"), InterruptionsTest, sys.argv)

@@ -283,7 +283,3 @@ def all_motions(bench):
         "sdk_move": ProgramMotion(bench, right, "move_to_joint_positions", "python3", "-c", move),
         "tuck": ProgramMotion(bench, left, "tuck_arms.py", "rosrun", "baxter_tools", "tuck_arms.py", "-t"),
     }
-
-
-all_motions.names = ("stream_1", "stream_2", "stream_3", "stream_4", "action_position", "action_velocity",
-                     "action_position_w_id", "streamer", "gripper", "head", "sdk_move", "tuck")
