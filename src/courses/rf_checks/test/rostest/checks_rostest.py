@@ -13,6 +13,7 @@ from pathlib import Path
 
 import rostest
 
+from lab_testing import subtests
 from lab_testing.skipping import skip
 from processes import isolation
 
@@ -77,7 +78,7 @@ ADVERSARIES = {
 }
 
 
-class Judged(unittest.TestCase):
+class Judged(subtests.TestCase):
     """Base of all suites: one judge."""
 
     @classmethod
@@ -101,6 +102,30 @@ class Judged(unittest.TestCase):
             print("%s\n%s\n" % (path.name, report.text(result)), flush=True)
             return result
         raise AssertionError("%s is meant for no exercise" % path)
+
+    def check_solutions(self, exercises):
+        for exercise in exercises:
+            with self.subTest(solution=exercise.name):
+                result = self.check("exercises/solutions", exercise.name)
+                self.assertAlmostEqual(result.points, 100.0, delta=0.01)
+                self.assertIsNone(result.fault)
+
+    def check_skeletons(self, exercises):
+        for exercise in exercises:
+            with self.subTest(skeleton=exercise.name):
+                result = self.check("exercises/skeletons", exercise.name)
+                self.assertLess(result.points, 50.0)
+                self.assertIsNotNone(result.fault, "no hint")
+
+    def check_faults(self, programs):
+        """Programs: name -> (key of its fault, words...), as WRONG."""
+        for name, (key, *words) in programs.items():
+            with self.subTest(program=name):
+                result = self.check("test/wrong", name)
+                self.assertIsNotNone(result.fault, report.text(result))
+                self.assertEqual(result.fault.key, key, report.text(result))
+                self.assertTrue(any(word in result.fault.sentence for word in words), result.fault.sentence)
+                self.assertLess(result.points, 50.0)
 
 
 def graded(result):
@@ -189,20 +214,50 @@ class Repeated(Loaded):
         self.compare([("test/wrong", name) for name in WRONG], {"again": contextlib.nullcontext}, times=4)
 
 
+# A lab with move_group or a servo is restarted for each program, and time waits for a servo at each of its steps.
+def is_slow(exercise):
+    return exercise.lab == "steering"
+
+
+def has_slow_skeleton(exercise):
+    return exercise.lab in ("moveit", "steering")
+
+
 class Exercises(Judged):
     """Solutions and skeletons."""
+
+    def test_solutions_get_all_points(self):
+        self.check_solutions(exercise for exercise in EXERCISES if not is_slow(exercise))
+
+    def test_skeletons_get_a_hint(self):
+        self.check_skeletons(exercise for exercise in EXERCISES if not has_slow_skeleton(exercise))
 
 
 class Wrong(Judged):
     """Ten ways to be wrong."""
 
+    def test_faults_are_named(self):
+        self.check_faults(WRONG)
+
 
 class Planning(Judged):
     """Programs for the exercise on planning that are wrong, its skeleton, and the exercise on steering."""
 
+    def test_solutions_get_all_points(self):
+        self.check_solutions(exercise for exercise in EXERCISES if is_slow(exercise))
+
+    def test_skeletons_get_a_hint(self):
+        self.check_skeletons(exercise for exercise in EXERCISES if has_slow_skeleton(exercise))
+
+    def test_faults_are_named(self):
+        self.check_faults(PLANNING)
+
 
 class Adversaries(Judged):
     """Programs against the judge."""
+
+    def test_faults_are_named(self):
+        self.check_faults(ADVERSARIES)
 
     def test_what_a_run_plants_is_gone_in_the_next(self):
         result = self.check("test/wrong", "plants_files")
@@ -249,45 +304,6 @@ class Handout(unittest.TestCase):
             # There is no solution to compare with.
             self.assertEqual(found["notes"], [])
 
-
-def add(suite, name, test):
-    setattr(suite, "test_" + name, test)
-
-
-def solution(name):
-    def test(self):
-        result = self.check("exercises/solutions", name)
-        self.assertAlmostEqual(result.points, 100.0, delta=0.01)
-        self.assertIsNone(result.fault)
-    return test
-
-
-def skeleton(name):
-    def test(self):
-        result = self.check("exercises/skeletons", name)
-        self.assertLess(result.points, 50.0)
-        self.assertIsNotNone(result.fault, "no hint for the skeleton of %s" % name)
-    return test
-
-
-def fault(name, key, *words):
-    def test(self):
-        result = self.check("test/wrong", name)
-        self.assertIsNotNone(result.fault, report.text(result))
-        self.assertEqual(result.fault.key, key, report.text(result))
-        self.assertTrue(any(word in result.fault.sentence for word in words), result.fault.sentence)
-        self.assertLess(result.points, 50.0)
-    return test
-
-
-for exercise in EXERCISES:
-    # A lab with move_group or a servo is restarted for each program, and time waits for a servo at each of its steps.
-    add(Planning if exercise.lab == "steering" else Exercises, exercise.name + "_solution", solution(exercise.name))
-    add(Planning if exercise.lab in ("moveit", "steering") else Exercises, exercise.name + "_skeleton",
-        skeleton(exercise.name))
-for suite, programs in ((Wrong, WRONG), (Planning, PLANNING), (Adversaries, ADVERSARIES)):
-    for program, (key, *words) in programs.items():
-        add(suite, program, fault(program, key, *words))
 
 SUITES = {"exercises": Exercises, "wrong": Wrong, "planning": Planning, "adversaries": Adversaries, "slow": Slow,
           "busy": Busy, "repeated": Repeated, "handout": Handout}

@@ -28,6 +28,9 @@ NEUTRAL = {name: angle for side in SIDES
            for name, angle in zip(joints(side), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True)}
 BATCH = 40  # topics listened to at a time
 LISTENING = [row for row in interface.TOPICS if not row.is_published]
+# Beginning of the names of their tests, and the rows whose effect another row's test sees.
+EFFECT = "test_effect_of_"
+SEEN_WITH_OTHERS = {"suppress_hand_overwrench_safety": "suppress_contact_safety"}
 
 
 def resolved(name):
@@ -74,7 +77,7 @@ class Table:
 
 
 class RobotInterfaceTest(unittest.TestCase):
-    """One method for each row that the robot listens to, by its key: effect_KEY."""
+    """One method for each row that the robot listens to, by its key: test_effect_of_KEY."""
 
     @classmethod
     def setUpClass(cls):
@@ -116,23 +119,23 @@ class RobotInterfaceTest(unittest.TestCase):
 
     # -- state
 
-    def effect_set_super_enable(self):
+    def test_effect_of_set_super_enable(self):
         self.robot.restart()
         self.table.publish("set_super_enable", (False,))
         self.see("state", None, lambda state: not state.enabled, "disabled")
 
-    def effect_set_super_stop(self):
+    def test_effect_of_set_super_stop(self):
         self.robot.restart()
         self.table.publish("set_super_stop", ())
         for key, part in (("state", None), ("assembly_state", "torso"), ("limb_state", "left")):
             self.see(key, part, lambda state: state.stopped, "%s stopped" % key)
 
-    def effect_set_super_reset(self):
-        self.effect_set_super_stop()
+    def test_effect_of_set_super_reset(self):
+        self.test_effect_of_set_super_stop()
         self.table.publish("set_super_reset", ())
         self.see("state", None, lambda state: not state.stopped, "reset")
 
-    def effect_joint_state_publish_rate(self):
+    def test_effect_of_joint_state_publish_rate(self):
         self.table.publish("joint_state_publish_rate", (100,))
         wait_until(lambda: abs((self.robot.history[-1].header.stamp - self.robot.history[-2].header.stamp).to_sec()
                                - 0.01) < 1e-6, "joint states 10 ms apart")
@@ -140,41 +143,41 @@ class RobotInterfaceTest(unittest.TestCase):
 
     # -- limbs
 
-    def effect_joint_command(self):
+    def test_effect_of_joint_command(self):
         self.neutral()
         for side in SIDES:
             self.table.publish("joint_command", JointCommand(POSITION, [0.9], [side + "_w1"]), side)
         wait_until(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9")
 
-    def effect_joint_position_controller(self):
+    def test_effect_of_joint_position_controller(self):
         self.neutral()
         for side in SIDES:
             self.table.publish("joint_position_controller", (0.9,), (side, "w1"))
         wait_until(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9")
 
-    def effect_joint_velocity_controller(self):
+    def test_effect_of_joint_velocity_controller(self):
         self.neutral()
         self.table.until(lambda: max(self.robot.positions[side + "_w1"] for side in SIDES) < 1.0, "both w1 turn",
                          *(("joint_velocity_controller", (-0.4,), (side, "w1")) for side in SIDES))
 
-    def effect_joint_effort_controller(self):
+    def test_effect_of_joint_effort_controller(self):
         self.neutral()
         self.table.until(lambda: min(self.robot.positions[side + "_w2"] for side in SIDES) > 0.2, "both w2 turn",
                          *(("joint_effort_controller", (1.0,), (side, "w2")) for side in SIDES))
 
-    def effect_head_position_controller(self):
+    def test_effect_of_head_position_controller(self):
         self.robot.restart()
         self.table.publish("head_position_controller", (0.4,))
         self.see("head_state", None, lambda state: abs(state.pan - 0.4) < 0.01, "head at 0.4")
 
-    def effect_joint_command_timeout(self):
+    def test_effect_of_joint_command_timeout(self):
         """One velocity command lasts until its time-out."""
         self.neutral()
         self.set_both("joint_command_timeout", "command time-out [s]", 1.5)
         self.robot.command(VELOCITY, {side + "_w1": -0.4 for side in SIDES})
         wait_until(lambda: max(self.robot.positions[side + "_w1"] for side in SIDES) < 0.9, "0.36 rad further")
 
-    def effect_set_speed_ratio(self):
+    def test_effect_of_set_speed_ratio(self):
         self.neutral()
         self.set_both("set_speed_ratio", "speed ratio", 0.0)
         here = self.robot.positions
@@ -184,7 +187,7 @@ class RobotInterfaceTest(unittest.TestCase):
         self.set_both("set_speed_ratio", "speed ratio", 1.0)
         wait_until(lambda: self.robot.error({side + "_w1": 0.5 for side in SIDES}) < 2e-3, "w1 at 0.5")
 
-    def effect_inverse_dynamics_command(self):
+    def test_effect_of_inverse_dynamics_command(self):
         """Raw set-points with a velocity are led by that velocity; invalid ones are refused."""
         for side in SIDES:
             self.table.publish("inverse_dynamics_command", ([], [0.1] * 6, [], [], rospy.Duration()), side)
@@ -203,7 +206,7 @@ class RobotInterfaceTest(unittest.TestCase):
 
         wait_until(send, "set-points led by their velocity")
 
-    def effect_command_twist_stamped(self):
+    def test_effect_of_command_twist_stamped(self):
         self.neutral()
         for side in SIDES:
             start = self.table.newest("endpoint_state", side).pose.position.z
@@ -216,7 +219,7 @@ class RobotInterfaceTest(unittest.TestCase):
             message.twist.linear.z = 0.1
             self.table.until(lifted, "%s tip 3 cm higher" % side, ("command_twist_stamped", message, side))
 
-    def effect_command_velocity_tozero(self):
+    def test_effect_of_command_velocity_tozero(self):
         self.neutral()
         self.set_both("set_speed_ratio", "speed ratio", 0.1)
         goal = {side + "_w1": 0.0 for side in SIDES}
@@ -237,7 +240,7 @@ class RobotInterfaceTest(unittest.TestCase):
         for side in SIDES:
             self.see("collision_avoidance_state", side, lambda state: state.other_arm, "%s arm is touched" % side)
 
-    def effect_suppress_collision_avoidance(self):
+    def test_effect_of_suppress_collision_avoidance(self):
         self.crossed()
         kind = collision.AVOIDANCE
         self.table.until(lambda: all(not self.table.newest("collision_avoidance_state", side).collision_object
@@ -251,14 +254,12 @@ class RobotInterfaceTest(unittest.TestCase):
         self.table.until(lambda: all(self.table.newest("collision_detection_state", side).collision_state == wanted
                                      for side in SIDES), "collision detected: %s" % wanted, *sends)
 
-    def effect_suppress_contact_safety(self):
+    def test_effect_of_suppress_contact_safety(self):
         self.crossed()
         self.press_hard()
         self.press_hard(collision.CONTACT, collision.OVERWRENCH)
 
-    effect_suppress_hand_overwrench_safety = effect_suppress_contact_safety
-
-    def effect_suppress_body_avoidance(self):
+    def test_effect_of_suppress_body_avoidance(self):
         self.neutral()
         for side, sign in (("left", -1.0), ("right", 1.0)):
             self.robot.command(POSITION, {side + "_s0": sign * 1.7, side + "_s1": -0.3, side + "_e1": 2.6})
@@ -268,7 +269,7 @@ class RobotInterfaceTest(unittest.TestCase):
                 (collision.BODY_AVOIDANCE, (), side))
             self.robot.move({name: angle for name, angle in NEUTRAL.items() if name.startswith(side)})
 
-    def effect_suppress_cuff_interaction(self):
+    def test_effect_of_suppress_cuff_interaction(self):
         self.neutral()
         for side in SIDES:
             self.assertTrue(self.press(side + "_lower_cuff", "press", 0).success)
@@ -285,7 +286,7 @@ class RobotInterfaceTest(unittest.TestCase):
             self.table.until(moved, "commands obeyed again", (collision.CUFF, (), side))
             self.assertTrue(self.press(side + "_lower_cuff", "release", 0).success)
 
-    def effect_suppress_gravity_compensation(self):
+    def test_effect_of_suppress_gravity_compensation(self):
         self.neutral()
 
         def fallen():
@@ -297,28 +298,28 @@ class RobotInterfaceTest(unittest.TestCase):
 
     # -- head, panel
 
-    def effect_command_head_pan(self):
+    def test_effect_of_command_head_pan(self):
         self.robot.restart()
         self.table.publish("command_head_pan", HeadPanCommand(0.5, 1.0, 1))
         self.see("head_state", None, lambda state: abs(state.pan - 0.5) < 0.02, "head at 0.5 rad")
 
-    def effect_command_head_nod(self):
+    def test_effect_of_command_head_nod(self):
         self.robot.restart()
         self.table.until(lambda: self.table.newest("head_state").isNodding, "nodding", ("command_head_nod", (True,)))
 
-    def effect_digital_io_command(self):
+    def test_effect_of_digital_io_command(self):
         self.table.publish("digital_io_command", ("left_inner_light", True))
         self.see("digital_io", "left_inner_light", lambda state: state.state == 1, "light on")
         self.see("navigator", "left", lambda state: state.lights[0], "the navigator's light on")
 
-    def effect_analog_io_command(self):
+    def test_effect_of_analog_io_command(self):
         self.table.publish("analog_io_command", ("torso_fan", 42))
         self.see("analog_io", "torso_fan", lambda state: state.value == 42.0, "fan at 42")
         self.see("analog_io_uint32", "torso_fan", lambda state: state.data == 42, "fan at 42")
 
     # -- grippers
 
-    def effect_gripper_command(self):
+    def test_effect_of_gripper_command(self):
         self.robot.restart()
         for sequence, side in enumerate(SIDES, 7):
             state = self.table.newest("gripper_state", side)
@@ -327,45 +328,45 @@ class RobotInterfaceTest(unittest.TestCase):
         self.see("gripper_state", "left", lambda state: (state.command_sender, state.command_sequence) == (
             "interface_test", 7), "the gripper's echo")
 
-    def effect_gripper_set_properties(self):
+    def test_effect_of_gripper_set_properties(self):
         kind = roslib.message.get_message_class("baxter_core_msgs/EndEffectorProperties")
         wanted = kind(id=131073, ui_type=kind.PASSIVE_GRIPPER, product="interface test")
         self.table.until(lambda: self.table.newest("gripper_properties", "right").product == "interface test",
                          "the tool's properties", ("gripper_set_properties", wanted, "right"))
 
-    def effect_gripper_set_state(self):
-        self.effect_gripper_set_properties()
+    def test_effect_of_gripper_set_state(self):
+        self.test_effect_of_gripper_set_properties()
         kind = roslib.message.get_message_class("baxter_core_msgs/EndEffectorState")
         self.table.until(lambda: self.table.newest("gripper_state", "right").position == 33.0,
                          "the tool's state", ("gripper_set_state", kind(id=131073, position=33.0), "right"))
 
     # -- senses
 
-    def effect_set_sonars_enabled(self):
+    def test_effect_of_set_sonars_enabled(self):
         for mask in (0, 4095):
             self.table.publish("set_sonars_enabled", (mask,))
             self.see("sonars_enabled", None, lambda echo, mask=mask: echo.data == mask, "sonars %d" % mask)
 
-    def effect_set_lights(self):
+    def test_effect_of_set_lights(self):
         self.table.until(lambda: self.table.newest("sonar_lights").data == 0x8AAA, "the lights asked for",
                          ("set_lights", (0x8AAA,)))
 
-    def effect_set_green_level(self):
+    def test_effect_of_set_green_level(self):
         self.table.publish("set_green_level", (60.0,))
         self.see("sonar_green_level", None, lambda level: level.data == 60.0, "green at 60")
 
-    def effect_set_red_level(self):
+    def test_effect_of_set_red_level(self):
         self.table.publish("set_red_level", (20.0,))
         self.see("sonar_red_level", None, lambda level: level.data == 20.0, "red at 20")
 
     # -- screen, description, maintenance
 
-    def effect_xdisplay(self):
+    def test_effect_of_xdisplay(self):
         picture = Image(width=2, height=1, encoding="8UC3", step=6, data=bytes(range(1, 7)))
         self.table.publish("xdisplay", picture)
         self.see("screen", None, lambda image: image.data[:9] == bytes([3, 2, 1, 6, 5, 4, 0, 0, 0]), "two pixels")
 
-    def effect_urdf_fragment(self):
+    def test_effect_of_urdf_fragment(self):
         fragment = URDFConfiguration(rospy.Time(7), "left_hand", "left_gripper_base",
                                      '<robot name="tool"><link name="tool"/></robot>')
         self.table.publish("urdf_fragment", fragment)
@@ -386,18 +387,18 @@ class RobotInterfaceTest(unittest.TestCase):
             self.table.publish("procedure_enable_" + name, kind(isEnabled=False, uid="sdk"), side)
             wait_until(lambda status=status: not status().isEnabled, "ended")
 
-    def effect_procedure_enable_Tare(self):
+    def test_effect_of_procedure_enable_Tare(self):
         self.procedure("Tare")
 
-    def effect_procedure_enable_CalibrateArm(self):
+    def test_effect_of_procedure_enable_CalibrateArm(self):
         self.procedure("CalibrateArm")
 
-    def effect_updater_start(self):
+    def test_effect_of_updater_start(self):
         self.table.publish("updater_start", ("no such update",))
         self.see("updater_status", None, lambda status: status.status == 1, "invalid")
 
-    def effect_updater_stop(self):
-        self.effect_updater_start()
+    def test_effect_of_updater_stop(self):
+        self.test_effect_of_updater_start()
         self.table.publish("updater_stop", ())
         self.see("updater_status", None, lambda status: status.status == 0, "idle")
 
@@ -421,13 +422,9 @@ class RobotInterfaceTest(unittest.TestCase):
                 self.assertEqual(header.get("latching") == "1", row.rate == interface.LATCHED, name)
 
     def test_every_listening_row_has_an_effect_here(self):
-        self.assertEqual({name[len("effect_"):] for name in dir(self) if name.startswith("effect_")},
-                         {row.key for row in LISTENING})
+        tested = {name.removeprefix(EFFECT) for name in dir(self) if name.startswith(EFFECT)}
+        self.assertEqual(tested | set(SEEN_WITH_OTHERS), {row.key for row in LISTENING})
 
-
-# Rows that share an effect are seen together.
-for _effect in {getattr(RobotInterfaceTest, "effect_" + row.key, None) for row in LISTENING} - {None}:
-    setattr(RobotInterfaceTest, _effect.__name__.replace("effect_", "test_"), _effect)
 
 if __name__ == "__main__":
     import rostest
