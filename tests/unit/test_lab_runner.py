@@ -327,6 +327,15 @@ def test_a_run_counts_everything(tmp_path, fake_rostest, words):
     assert done.returncode == 1 and "test_one.py::test_skipped_without_a_reason: skipped without" in done.stdout
 
 
+@pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_tests_are_listed_without_a_run(tmp_path, words):
+    (tmp_path / "test_one.py").write_text(
+        "import atexit, shutil, tempfile\natexit.register(shutil.rmtree, tempfile.mkdtemp())\ndef test_one(): pass")
+    done = run_pytest(tmp_path, "--collect-only", "-q", *words)
+    assert (done.returncode, done.stderr, "test_one.py: 1" in done.stdout) == (0, "", True), done.stdout
+    assert done.stdout.splitlines()[-1] == "0 passed, 0 failed, 0 skipped, 0 long not run"
+
+
 def test_long_tests_of_both_kinds_are_listed_by_their_mark(tmp_path):
     (tmp_path / "test_one.py").write_text(UNIT % True)
     (tmp_path / "rostest").mkdir()

@@ -8,6 +8,7 @@ others.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import fcntl
 import functools
@@ -69,8 +70,8 @@ def pytest_configure(config: pytest.Config) -> None:
     is_worker = hasattr(config, "workerinput")
     if not is_worker:
         config.pluginmanager.register(RunController(config), "lab controller")
-    # A few files run in this process itself.
-    if is_worker or not config.option.numprocesses:
+    # A few files run in this process itself, and a mere list of tests has no workers either.
+    if is_worker or not config.option.numprocesses or config.option.collectonly:
         worker = RunWorker(config)
         config.pluginmanager.register(worker, "lab worker")
         config.stash[WORKER] = worker
@@ -355,6 +356,8 @@ class RunController:
         # No failure: notebooks keep their files there on purpose, and programs that were killed cannot remove theirs.
         if left := sorted(path.name for path in self._temporary.iterdir()):
             print(f"tests left {len(left)} temporary files, now removed: {', '.join(left[:MAX_NAMED])}")
+        # What libraries would remove at the end of this process, such as genpy's code of messages, is in there.
+        atexit.unregister(shutil.rmtree)
         shutil.rmtree(self._temporary, ignore_errors=True)
         print(summary(self._total), flush=True)
 
