@@ -306,12 +306,15 @@ def test_leaves_a_thread():
 ENVIRONMENT = {"PYTHONPATH": f"{ROOT / 'tools'}:{os.environ.get('PYTHONPATH', '')}"}
 
 
-def run_pytest(folder, *words):
+ROUNDS = "import sys, pytest; sys.exit(max(int(pytest.main(sys.argv[2:])) for _ in range(int(sys.argv[1]))))"
+
+
+def run_pytest(folder, *words, rounds=1):
     """The output of a run of the files in a folder."""
     files = sorted(str(path) for pattern in ("test_*.py", "*.test") for path in folder.rglob(pattern))
-    return subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.plugin", "-c", ROOT / "pytest.ini",
-                           "--rootdir", folder, *words, *files], capture_output=True, text=True, cwd=folder,
-                          env={**os.environ, **ENVIRONMENT, "LC_ALL": "C.UTF-8"})
+    return subprocess.run([sys.executable, "-c", ROUNDS, str(rounds), "-q", "-p", "lab_tests.plugin",
+                           "-c", ROOT / "pytest.ini", "--rootdir", folder, *words, *files], capture_output=True,
+                          text=True, cwd=folder, env={**os.environ, **ENVIRONMENT, "LC_ALL": "C.UTF-8"})
 
 
 @pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
@@ -334,6 +337,13 @@ def test_tests_are_listed_without_a_run(tmp_path, words):
     done = run_pytest(tmp_path, "--collect-only", "-q", *words)
     assert (done.returncode, done.stderr, "test_one.py: 1" in done.stdout) == (0, "", True), done.stdout
     assert done.stdout.splitlines()[-1] == "0 passed, 0 failed, 0 skipped, 0 long not run"
+
+
+@pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_rounds_follow_each_other(tmp_path, words):
+    (tmp_path / "test_one.py").write_text("import tempfile\ndef test_one(): tempfile.TemporaryFile().close()")
+    done = run_pytest(tmp_path, *words, rounds=2)
+    assert (done.returncode, done.stdout.count("1 passed, 0 failed, 0 skipped")) == (0, 2), done.stdout + done.stderr
 
 
 def test_long_tests_of_both_kinds_are_listed_by_their_mark(tmp_path):

@@ -286,6 +286,7 @@ class RunController:
         self._took: dict[str, list[float]] = {}
         # A folder of its own for temporary files, which is removed at the end. pytest's own folders stay for the user.
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
+        self._own_places = os.environ.get("TMPDIR"), tempfile.tempdir
         self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
         os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
 
@@ -341,6 +342,9 @@ class RunController:
         ordinary = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
         if session.exitstatus not in ordinary and not self._total.failed:
             self._fail(f"pytest ended with exit code {int(session.exitstatus)}")
+        if self._total.passed and session.exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED:
+            # xdist takes the number of the worker that came last; one beside the cores may have nothing to do.
+            session.exitstatus = pytest.ExitCode.OK
         if self._total.failed or not (self._total.passed or self._config.option.collectonly):
             session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
         took = {file: round(both[0], 1) for file, both in self._took.items() if both[0] >= MIN_DURATION_S}
@@ -359,6 +363,12 @@ class RunController:
         # What libraries would remove at the end of this process, such as genpy's code of messages, is in there.
         atexit.unregister(shutil.rmtree)
         shutil.rmtree(self._temporary, ignore_errors=True)
+        # Another round may follow in this process.
+        variable, tempfile.tempdir = self._own_places
+        if variable is None:
+            os.environ.pop("TMPDIR")
+        else:
+            os.environ["TMPDIR"] = variable
         print(summary(self._total), flush=True)
 
 
