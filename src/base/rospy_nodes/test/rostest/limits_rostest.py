@@ -7,6 +7,7 @@ import re
 import socket
 import struct
 import threading
+import time
 import unittest
 from pathlib import Path
 from xmlrpc.client import ServerProxy
@@ -149,6 +150,16 @@ class RospyLimits(unittest.TestCase):
                     answer += portion
             self.assertIn(b"a message of %d bytes is announced, at most %d" % (announced, LIMIT_BYTES), answer)
         self.check_alive()
+
+    def test_a_request_may_come_some_time_after_its_connection(self):
+        client = self.handshake(service="/serve")
+        begin = time.monotonic()
+        wait_until(lambda: time.monotonic() > begin + 0.5, "half a second without a request", DEADLINE_S)
+        client.sendall(struct.pack("<I?", 1, True))
+        stream = client.makefile("rb")
+        stream.read(*struct.unpack("<I", stream.read(4)))
+        self.assertEqual(stream.read(1), b"\1")
+        self.assertIn(b"served", stream.read())
 
     def test_a_request_that_cannot_be_read_is_answered_with_an_error_and_the_connection_closed(self):
         level = rosgraph.names.ns_join(NODE, "set_logger_level")
