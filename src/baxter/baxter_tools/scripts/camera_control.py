@@ -14,8 +14,6 @@ from baxter_interface.camera_settings import MODES
 from baxter_interface.programs import run
 from baxter_interface.services import call_service
 
-RESET_TIMEOUT_S = 10.0
-
 
 def resolution(text: str) -> tuple[int, int]:
     try:
@@ -55,7 +53,7 @@ def do(arguments: argparse.Namespace) -> None:
     if arguments.list:
         print_cameras()
     elif arguments.enumerate:
-        call_service("/cameras/reset", Empty, timeout_s=RESET_TIMEOUT_S)
+        call_service("/cameras/reset", Empty)
     elif arguments.close:
         CameraController(arguments.close).close()
     else:

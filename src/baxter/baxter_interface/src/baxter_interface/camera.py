@@ -12,9 +12,8 @@ from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera
 
 from . import startup
 from .camera_settings import AUTO, CONTROLS, MODES, CameraSettings
-from .services import call_service, wait_for_service
+from .services import ANSWER_S, THERE_S, call_service, wait_for_service
 
-LIST_TIMEOUT_S = 10.0
 # So many of a physical robot's three cameras have power at a time; a simulated one may power them all.
 MAX_POWERED = 2
 # Mounted upside down behind the screen.
@@ -25,7 +24,7 @@ class UnknownCamera(AttributeError, ValueError):
     """A camera that the robot does not have, or that has no power."""
 
 
-def list_cameras(timeout_s: float = LIST_TIMEOUT_S) -> list[str]:
+def list_cameras(timeout_s: float = ANSWER_S) -> list[str]:
     """List the names of the cameras that have power. Raises ServiceUnavailable (an OSError and a ROSException)."""
     startup.wait_for_start([])
     return list(call_service("/cameras/list", ListCameras, timeout_s=timeout_s).cameras)
@@ -53,7 +52,7 @@ class CameraController:
             raise UnknownCamera("there is no camera %r: those with power are %s%s"
                                 % (name, ", ".join(map(repr, names)) or "none", more))
         for service in ("/cameras/open", "/cameras/close"):
-            wait_for_service(service, LIST_TIMEOUT_S)
+            wait_for_service(service, THERE_S)
         self._settings = CameraSettings()
 
     @property

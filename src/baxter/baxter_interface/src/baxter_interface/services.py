@@ -12,6 +12,10 @@ import rospy
 from . import startup
 from .waiting import others_than
 
+# Longest wait for a service that is not there, and for its answer [s, wall]. The answer takes that long where the robot
+# has a small part of a busy machine; rospy's own call would wait without an end.
+THERE_S, ANSWER_S = 10.0, 30.0
+
 
 class ServiceUnavailable(OSError, rospy.ROSException):
     """A service does not exist, or does not answer in time.
@@ -40,12 +44,13 @@ def _services() -> list[str]:
         return []
 
 
-def call_service(name: str, kind: type, *arguments: Any, timeout_s: float = 5.0) -> Any:
-    """Call the service `name` of type `kind`, waiting for it and then for its answer, `timeout_s` [s, wall] each.
+def call_service(name: str, kind: type, *arguments: Any, timeout_s: float = ANSWER_S) -> Any:
+    """Call the service `name` of type `kind`, and wait for its answer, `timeout_s` [s, wall] at most; before that for
+    the service, THERE_S at most.
 
     Raises ServiceUnavailable, OSError with errno EIO if the service refused the call.
     """
-    wait_for_service(name, timeout_s)
+    wait_for_service(name, min(timeout_s, THERE_S))
     answers, failures = [], []
 
     def call() -> None:
