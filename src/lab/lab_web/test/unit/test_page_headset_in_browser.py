@@ -6,8 +6,19 @@ import pytest
 
 from lab_testing import web_clients
 from lab_testing.waiting import wait_until
+from lab_web.steering import FRESH_S
 
 GRIP = "device.controllers.%s.updateButtonValue('%s', %d)"
+# The longest time between two of some frames [ms].
+LONGEST_FRAME_MS = """new Promise((done) => {
+  const times = [];
+  const next = () => {
+    times.push(performance.now());
+    if (times.length < 20) lab.headset.session.requestAnimationFrame(next);
+    else done(Math.max(...times.slice(1).map((time, number) => time - times[number])));
+  };
+  next();
+})"""
 
 
 @pytest.fixture
@@ -29,6 +40,18 @@ def worn(lab, browser):
     yield lab
     browser.evaluate("lab.headset.session?.end()")
     browser.wait("lab.headset.session === null && !lab.view.renderer.xr.isPresenting")
+
+
+def wait_until_led(browser, condition, what):
+    """Wait for something that a led hand does; skip where who wears the headset could not lead one either, because a
+    hand stops at each frame that takes too long."""
+    try:
+        wait_until(condition, what, 90.0)
+    except AssertionError:
+        longest_s = 1e-3 * browser.evaluate(LONGEST_FRAME_MS)
+        if longest_s < FRESH_S:
+            raise
+        pytest.skip("a headset's pictures take up to %.1f s here; a hand needs one every %g s" % (longest_s, FRESH_S))
 
 
 def press(browser, side, button, is_down=True):
@@ -56,7 +79,7 @@ def lead(lab, browser, side, by, twist):
         with contextlib.suppress(AssertionError):
             return wait_until(lambda: sent and sent[-1] == (pytest.approx(twist, abs=0.03), False), timeout_s=3.0)
         return False
-    wait_until(follows, lambda: "%s after %s" % (twist, sent[-1:]), 90.0)
+    wait_until_led(browser, follows, lambda: "%s after %s" % (twist, sent[-1:]))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -88,7 +111,7 @@ def test_a_turn_of_the_controller_turns_the_hand(worn, browser):
             return wait_until(lambda: servo.moves and servo.sent[-1][0][3:] == pytest.approx([0, 0, 0.4], abs=0.03),
                               timeout_s=3.0)
         return False
-    wait_until(turns, lambda: "a hand that turns after %s" % servo.sent[-1:], 90.0)
+    wait_until_led(browser, turns, lambda: "a hand that turns after %s" % servo.sent[-1:])
 
 
 def test_a_grip_that_is_taken_from_outside_must_be_gripped_again(worn, browser):
