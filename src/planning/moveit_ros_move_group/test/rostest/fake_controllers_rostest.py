@@ -168,7 +168,9 @@ class FakeControllersTest(unittest.TestCase):
         state, result, text = self.ended()
         self.assertEqual((state, result.error_code.val), (GoalStatus.SUCCEEDED, CODES.SUCCESS), text)
         np.testing.assert_allclose(self.positions(), RIGHT, atol=2e-3)
-        self.assertEqual([state for state in self.feedback if state != "IDLE"], ["PLANNING", "MONITOR"] * 2)
+        states = [state for state in self.feedback if state != "IDLE"]
+        # Once more where planning beside the motion took too long: then the arm stops first.
+        self.assertIn(states, [["PLANNING", "MONITOR"] * rounds for rounds in (2, 3)])
 
     def test_something_new_beside_the_way_changes_nothing(self):
         self.go(LEFT)
