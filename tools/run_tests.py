@@ -20,7 +20,15 @@ from pathlib import Path
 import pytest
 
 from lab_tests import processes
-from lab_tests.discovery import WORKERS_BESIDE_CORES, Selection, SelectionError, changed_files, select, take_inventory
+from lab_tests.discovery import (
+    WORKERS_BESIDE_CORES,
+    Selection,
+    SelectionError,
+    changed_files,
+    names_and_options,
+    select,
+    take_inventory,
+)
 from lab_tests.quota import ProcessorQuota, QuotaError
 from lab_tests.results import Tally, summary
 
@@ -62,6 +70,12 @@ A NAME is a package, a test file (test_x.py, x.test), a test (test_x.py::test_on
 """
 
 
+def count(text: str) -> int:
+    if not re.fullmatch(r"0*[1-9]\d*", text):
+        raise argparse.ArgumentTypeError(f"expected a number from 1 on, got {text!r}")
+    return int(text)
+
+
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(prog="./baxter.sh test", usage=USAGE, epilog=EXAMPLES, allow_abbrev=False,
                                    description="Run tests and count them.",
@@ -71,14 +85,14 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--long", action="store_true", help="also the tests that take minutes")
     made.add_argument("--busy", metavar="PERCENT", type=float, nargs="?", const=BUSY_PERCENT,
                       help="on that share of one core, by default 40; without names: the main flows")
-    made.add_argument("--repeat", metavar="N", type=int, default=1, help="run all of it N times")
+    made.add_argument("--repeat", metavar="N", type=count, default=1, help="run all of it N times")
     made.add_argument("--shuffle", metavar="SEED", type=int, help="in random order; each round in another one")
     return made
 
 
 def separate_values(words: list[str]) -> list[str]:
     """`--busy NAME` means the default share and a test's name, and `--changed --long` the last commit."""
-    return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" and not re.fullmatch(r"\d+(\.\d+)?", after) else word
+    return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" and not re.fullmatch(r"-?\d+(\.\d+)?", after) else word
             for word, after in zip_longest(words, words[1:], fillvalue="")]
 
 
@@ -88,9 +102,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     made = parser()
     options, options.rest = made.parse_known_args(separate_values(arguments))
     os.chdir(ROOT)
-    if options.busy is not None and not options.rest and options.changed is None:
-        options.rest = list(MAIN_FLOWS)
     try:
+        if options.busy is not None and not names_and_options(options.rest)[0] and options.changed is None:
+            options.rest += MAIN_FLOWS
         options.selection = select(take_inventory(ROOT), options.rest, ROOT) if options.changed is None else None
     except SelectionError as error:
         made.exit(2, f"{error}\n")
@@ -108,26 +122,50 @@ def pytest_words(selection: Selection, long: bool, stretch: float, workers: int)
 
 
 def run(selection: Selection, options: argparse.Namespace) -> int:
-    """All rounds; the exit code. Raises ValueError, QuotaError."""
-    share = contextlib.nullcontext() if options.busy is None else ProcessorQuota(options.busy)
+    """All rounds; the exit code. Raises QuotaError."""
+    try:
+        share = contextlib.nullcontext() if options.busy is None else ProcessorQuota(options.busy)
+    except ValueError as error:
+        print(f"--busy: {error}", file=sys.stderr)
+        return 2
     stretch = STRETCH if options.busy is None else STRETCH * max(1.0, WHOLE_MACHINE_PERCENT / options.busy)
     workers = 1 if options.busy is not None else len(os.sched_getaffinity(0)) + WORKERS_BESIDE_CORES
     words = pytest_words(selection, options.long, stretch, workers)
     with share:
         print(f"Testing {selection.title}{'' if options.busy is None else f', on {options.busy:g} % of one core'}",
               flush=True)
-        worst = 0
+        worst, counted = 0, Tally()
         for number in range(options.repeat):
             order = [] if options.shuffle is None else [f"--shuffle={options.shuffle + number}"]
             if options.repeat > 1:
                 print(" ".join([f"Round {number + 1} of {options.repeat}", *order]), flush=True)
-            worst = max(worst, int(pytest.main([*order, *words])))
+            code = int(pytest.main([*order, *words]))
+            worst = max(worst, code)
+            counted = add_finished(counted)
+            if code == pytest.ExitCode.INTERRUPTED:
+                break
+        if options.repeat > 1:
+            print(f"All rounds\n{summary(counted)}", flush=True)
         return worst
+
+
+def add_finished(counted: Tally) -> Tally:
+    """The counts with those of the runs that have ended since the last call; the tests left out are the same ones."""
+    from lab_tests.plugin import FINISHED  # pytest has imported it, and would warn if it had been imported before
+
+    while FINISHED:
+        counted.add(one := FINISHED.pop())
+        counted.long = one.long
+    return counted
 
 
 def main(arguments: list[str]) -> int:
     # In a script's background job Ctrl-C is ignored, also by every child; but tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # A terminal that is closed and a run that is cancelled end it as Ctrl-C does: else its processes would go on.
+    for sign in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(sign) == signal.SIG_DFL:
+            signal.signal(sign, signal.default_int_handler)
     # Some machines of continuous integration set it. A run starts a thousand Python programs, which would all compile
     # the same modules.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -150,9 +188,6 @@ def main(arguments: list[str]) -> int:
     os.environ[processes.RUN_MARKER] = uuid.uuid4().hex
     try:
         return run(selection, options)
-    except ValueError as error:
-        print(f"--busy: {error}", file=sys.stderr)
-        return 2
     except QuotaError as error:
         print(f"--busy: skipped. A share of a core needs root, or control groups that users may make: {error}")
         print(summary(Tally()))

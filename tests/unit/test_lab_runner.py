@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 import run_tests
+from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
-from lab_tests import comma_locale, processes, rostests
+from lab_tests import comma_locale, processes, rostests, shared_labs
 from lab_tests.discovery import SelectionError, changed_files, is_long, mostly_waits, select, take_inventory
 from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 
@@ -103,20 +104,42 @@ def test_changed_packages_bring_those_that_depend_on_them(workspace):
     assert chosen(workspace, changed=[workspace / "src/beta/setup.py"]) == ["test_beta.py", "test_gamma.py", *lint]
     assert chosen(workspace, changed=[workspace / "tools/x.py"])[:3] == ["whole.test", "test_lint.py", "test_whole.py"]
     assert chosen(workspace, changed=[]) == []
+    assert chosen(workspace, "alpha", changed=[]) == chosen(workspace, "alpha")
+    assert chosen(workspace, "beta", changed=[workspace / "src/gamma/x.py"])[:2] == ["test_beta.py", "test_gamma.py"]
+
+
+def test_an_option_without_its_value_is_refused(workspace):
+    with pytest.raises(SelectionError, match="-k needs a value"):
+        chosen(workspace, "alpha", "-k")
+
+
+def test_a_test_is_looked_for_where_several_files_have_its_files_name(workspace):
+    for package, name in (("src/beta", "one"), ("src/gamma", "two")):
+        (workspace / package / "test/unit/test_same.py").write_text(f"def test_{name}(): pass")
+    targets = select(take_inventory(workspace), ["test_same.py::test_two[a::b]"], workspace, None).targets
+    assert targets == [f"{workspace}/src/gamma/test/unit/test_same.py::test_two[a::b]"]
+
+
+def test_a_test_file_that_is_no_text_has_no_marks(workspace):
+    path = workspace / "src/group/alpha/test/rostest/alpha.test"
+    path.write_bytes(b"<launch><!-- f\xfcr --><!-- shared lab -->")
+    assert not is_long(path) and shared_labs.lab_of(path) is None
 
 
 def test_changed_files_are_those_that_differ_from_a_commit_and_new_ones(tmp_path):
     def git(*words):
         subprocess.run(["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=b", *words], check=True,
                        capture_output=True)
-    for name in ("same", "edited"):
-        (tmp_path / name).write_text("1")
+    for name in ("same", "edited", "moved"):
+        (tmp_path / name).write_text("1" + name)
     git("init", "-q")
     git("add", ".")
     git("commit", "-qm", "one")
     (tmp_path / "edited").write_text("2")
-    (tmp_path / "new").write_text("1")
-    assert changed_files(tmp_path, "HEAD") == [tmp_path / "edited", tmp_path / "new"]
+    (tmp_path / "new \u00c4").write_text("1")
+    git("mv", "moved", "elsewhere")
+    expected = [tmp_path / name for name in ("edited", "elsewhere", "moved", "new \u00c4")]
+    assert changed_files(tmp_path, "HEAD") == expected
     with pytest.raises(SelectionError, match="nowhere"):
         changed_files(tmp_path, "nowhere")
 
@@ -306,6 +329,15 @@ def test_leaves_a_thread():
 ENVIRONMENT = {"PYTHONPATH": f"{ROOT / 'tools'}:{os.environ.get('PYTHONPATH', '')}"}
 
 
+# run_tests.py for the files of a folder.
+CANCELLED = """import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import run_tests
+from lab_tests.discovery import Selection
+run_tests.select = lambda *words: Selection([str(path) for path in Path(sys.argv[2]).glob("test_*.py")], ["-s"])
+sys.exit(run_tests.main([]))
+"""
 ROUNDS = "import sys, pytest; sys.exit(max(int(pytest.main(sys.argv[2:])) for _ in range(int(sys.argv[1]))))"
 
 
@@ -344,6 +376,49 @@ def test_rounds_follow_each_other(tmp_path, words):
     (tmp_path / "test_one.py").write_text("import tempfile\ndef test_one(): tempfile.TemporaryFile().close()")
     done = run_pytest(tmp_path, *words, rounds=2)
     assert (done.returncode, done.stdout.count("1 passed, 0 failed, 0 skipped")) == (0, 2), done.stdout + done.stderr
+
+
+def test_a_worker_that_dies_fails_its_test_and_the_others_run(tmp_path):
+    for name, what in {"dies": "import os; os.kill(os.getpid(), 9)", "exits": "import os; os._exit(0)", "one": "pass",
+                       "two": "pass", "three": "pass"}.items():
+        (tmp_path / f"test_{name}.py").write_text(
+            f"def test_before(): pass\ndef test_it(): {what}\ndef test_after(): pass\n")
+    done = run_pytest(tmp_path, "-n4", "--dist=loadscope")
+    assert (done.stdout.splitlines()[-1], done.returncode) == ("13 passed, 2 failed, 0 skipped, 0 long not run", 1)
+    assert "test_dies.py::test_it" in done.stdout and "test_exits.py::test_it" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize("words", [[], ["-n4", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_a_module_that_is_skipped_and_what_is_expected_to_fail_are_named(tmp_path, words):
+    (tmp_path / "test_one.py").write_text("import pytest\npytest.skip('no camera', allow_module_level=True)")
+    (tmp_path / "test_two.py").write_text(
+        "import pytest\n@pytest.mark.xfail(reason='not yet')\ndef test_one(): assert 0\ndef test_two(): pass")
+    done = run_pytest(tmp_path, *words)
+    last = done.stdout.splitlines()
+    assert (last[-1], done.returncode) == ("1 passed, 0 failed, 2 skipped, 0 long not run", 0), done.stdout
+    assert "skipped: no camera" in last and "skipped: expected to fail: not yet" in last
+
+
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGHUP])
+def test_a_run_that_is_cancelled_leaves_nothing(tmp_path, sign):
+    (tmp_path / "test_one.py").write_text("""import subprocess, sys
+def test_one():
+    child = subprocess.Popen(["sleep", "1000"], start_new_session=True)
+    print("child", child.pid, file=sys.__stdout__, flush=True)
+    child.wait()
+""")
+    run = subprocess.Popen([sys.executable, "-c", CANCELLED, str(ROOT / "tools"), str(tmp_path)], text=True,
+                           stdout=subprocess.PIPE, env={**os.environ, **ENVIRONMENT, "TMPDIR": str(tmp_path)})
+    try:
+        child = next(int(line.split()[-1]) for line in run.stdout if "child" in line)
+        run.send_signal(sign)
+        rest = run.stdout.read()
+        assert run.wait(60.0) != 0 and re.fullmatch(r"0 passed, [01] failed, .*", rest.splitlines()[-1]), rest
+        wait_until(lambda: not is_alive(child), "the end of what a test has started", 30.0)
+        assert not list(tmp_path.glob("lab_tests_*"))
+    finally:
+        run.kill()
+        run.wait()
 
 
 def test_long_tests_of_both_kinds_are_listed_by_their_mark(tmp_path):
@@ -505,13 +580,35 @@ def test_a_run_that_is_ended_leaves_no_process(tmp_path, fake_rostest):
         processes.kill_all(mark, processes.RUN_MARKER)
 
 
-def test_a_round_that_fails_can_be_repeated_by_its_seed(monkeypatch, capsys):
+@pytest.mark.parametrize(("codes", "rounds"), [((1, 0), 2), ((2, 0), 1)], ids=["fails", "interrupted"])
+def test_a_round_that_fails_can_be_repeated_by_its_seed_and_all_count(monkeypatch, capsys, codes, rounds):
+    from lab_tests.plugin import FINISHED
     ran = []
-    monkeypatch.setattr(run_tests.pytest, "main", lambda words: ran.append(words) or len(ran) - 1)
+
+    def one_round(words):
+        ran.append(words)
+        FINISHED.append(Tally(passed=3, failed=1, details=[f"test_{len(ran)}"], long=["test_soak"]))
+        return codes[len(ran) - 1]
+
+    monkeypatch.setattr(run_tests.pytest, "main", one_round)
     options = run_tests.parser().parse_args(["--repeat=2", "--shuffle=7"])
-    assert run_tests.run(run_tests.Selection([], []), options) == 1
-    assert [words[0] for words in ran] == ["--shuffle=7", "--shuffle=8"]
-    assert capsys.readouterr().out.splitlines()[1:] == ["Round 1 of 2 --shuffle=7", "Round 2 of 2 --shuffle=8"]
+    assert run_tests.run(run_tests.Selection([], []), options) == codes[0]
+    assert [words[0] for words in ran] == ["--shuffle=7", "--shuffle=8"][:rounds]
+    said = capsys.readouterr().out.splitlines()
+    assert said[1:1 + rounds] == ["Round 1 of 2 --shuffle=7", "Round 2 of 2 --shuffle=8"][:rounds]
+    assert said[-1] == f"{3 * rounds} passed, {rounds} failed, 0 skipped, 1 long not run"
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "1.5", "x"])
+def test_rounds_are_one_or_more(number, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        run_tests.parse([f"--repeat={number}"])
+    assert "expected a number from 1 on" in capsys.readouterr().err
+
+
+def test_without_names_a_busy_run_has_the_main_flows_whatever_pytests_options_are():
+    assert run_tests.parse(["--busy", "--durations=3", "-k", "a"]).rest[-len(run_tests.MAIN_FLOWS):] == [
+        *run_tests.MAIN_FLOWS]
 
 
 def test_help_names_every_option(capsys):

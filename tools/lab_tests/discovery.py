@@ -29,7 +29,8 @@ class SelectionError(Exception):
 
 @functools.cache
 def _has_mark(path: Path, mark: str) -> bool:
-    return path.suffix == ".test" and f"<!-- {mark} -->" in path.read_text(encoding="utf-8")
+    # A file that is no text fails by its name when it runs.
+    return path.suffix == ".test" and f"<!-- {mark} -->" in path.read_text(encoding="utf-8", errors="replace")
 
 
 def is_long(path: Path) -> bool:
@@ -126,16 +127,19 @@ def select(inventory: Inventory, arguments: list[str], root: Path, changed: list
     """The :class:`Selection` of a command line; raises SelectionError for an unknown name.
 
     Names are packages, test files (with or without folder and suffix), pytest node ids, or a linter. Everything that
-    starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that depend on them.
+    starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that depend on them,
+    run besides those that were named.
     """
-    names, pytest_arguments = _split(arguments)
+    names, pytest_arguments = names_and_options(arguments)
     title = ", ".join(names) if changed is None else "what has changed"
     if changed is not None:
-        packages = touched(inventory, changed, root)
-        if not packages:
+        if not changed and not names:
             return Selection([], pytest_arguments, "nothing: no file has changed")
-        names += sorted(packages) + [f"{root}/{name}" for name in LINTERS.values()]
-        if WHOLE_TREE not in packages:
+        title = ", ".join([title, *names])
+        packages = touched(inventory, changed, root)
+        if changed:
+            names += sorted(packages) + [f"{root}/{name}" for name in LINTERS.values()]
+        if changed and WHOLE_TREE not in packages:
             names += [str(path) for path in inventory.files.get(WHOLE_TREE, []) if looks_at_the_whole_tree(path)]
     if not names:
         return Selection([str(path) for path in inventory.all_files()], pytest_arguments)
@@ -147,11 +151,12 @@ def select(inventory: Inventory, arguments: list[str], root: Path, changed: list
 def changed_files(root: Path, since: str) -> list[Path]:
     """Files that differ from a commit, and new ones. Raises SelectionError where git does not know the commit."""
     found = []
-    for words in (["diff", "--name-only", since, "--"], ["ls-files", "--others", "--exclude-standard"]):
+    for words in (["diff", "--name-only", "--no-renames", "-z", since, "--"],
+                  ["ls-files", "--others", "--exclude-standard", "-z"]):
         done = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True)
         if done.returncode:
             raise SelectionError(f"--changed: git says: {done.stderr.strip()}")
-        found += [root / line for line in done.stdout.splitlines()]
+        found += [root / name for name in done.stdout.split("\0") if name]
     return found
 
 
@@ -170,12 +175,15 @@ def touched(inventory: Inventory, changed: list[Path], root: Path) -> set[str]:
     return found & set(inventory.files)
 
 
-def _split(arguments):
+def names_and_options(arguments: list[str]) -> tuple[list[str], list[str]]:
+    """(names of tests, pytest's options with their values). Raises SelectionError for an option without its value."""
     names, pytest_arguments = [], []
     rest = iter(arguments)
     for argument in rest:
         if argument in _OPTIONS_WITH_VALUE:
-            pytest_arguments += [argument, *([value] if (value := next(rest, None)) is not None else [])]
+            if (value := next(rest, None)) is None:
+                raise SelectionError(f"{argument} needs a value")
+            pytest_arguments += [argument, value]
         elif argument.startswith("-"):
             pytest_arguments.append(argument)
         else:
@@ -195,6 +203,10 @@ def _named(inventory: Inventory, name: str, root: Path) -> list[str]:
             f"'{name}' is not a package, a test file or a pytest option. "
             f"Packages: {', '.join(sorted(inventory.folders))}"
         )
+    if test_id and len(found) > 1:
+        # Files of several packages may have one name.
+        function = test_id.partition("[")[0].rpartition("::")[2]
+        found = [path for path in found if function in path.read_text(encoding="utf-8")] or found
     # A .test file that is called by its own name runs even if it is long, as one test does that is called so.
     return [f"{path}::rostest" if path.suffix == ".test" else f"{path}{separator}{test_id}" for path in found]
 

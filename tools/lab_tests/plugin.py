@@ -47,6 +47,8 @@ MIN_DURATION_S = 2.0
 MAX_NAMED = 20
 # Examples of a test by Hypothesis that names no number: everywhere, and with --long.
 QUICK_EXAMPLES, DEEP_EXAMPLES = 50, 500
+#: What the runs of this process have counted.
+FINISHED: list[Tally] = []
 #: The RunWorker of a process that collects and runs tests.
 WORKER: pytest.StashKey[RunWorker] = pytest.StashKey()
 
@@ -144,6 +146,21 @@ class RostestFailure(Exception):
     """Tests of a .test file failed; the text has their names and messages, and the end of the output."""
 
 
+@contextlib.contextmanager
+def one_run(folder: Path) -> Iterator[None]:
+    """Wait until no other run of this workspace uses the folder of a .test file."""
+    with folder.with_name(f".{folder.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def reason_of(report: pytest.TestReport | pytest.CollectReport) -> str:
+    """Why something was skipped; "" without a reason."""
+    # (file, line, "Skipped: reason"); without a reason only "Skipped".
+    reason = report.longrepr[2] if isinstance(report.longrepr, (tuple, list)) else ""
+    return str(reason).removeprefix("Skipped").removeprefix(": ")
+
+
 def file_of(nodeid: str) -> str:
     return nodeid.partition("::")[0]
 
@@ -164,8 +181,9 @@ def read_durations(folder: Path) -> dict[str, float]:
     """File below the root -> seconds that it took last time."""
     found: dict[str, float] = {}
     for path in (FIRST_DURATIONS, folder / DURATIONS):
-        with contextlib.suppress(OSError, ValueError):
-            found.update(json.loads(path.read_text(encoding="utf-8")))
+        with contextlib.suppress(OSError, ValueError, TypeError):
+            read = json.loads(path.read_text(encoding="utf-8"))
+            found.update({file: float(seconds) for file, seconds in read.items()} if isinstance(read, dict) else {})
     return found
 
 
@@ -180,7 +198,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in set(left_out)]
         if not config.stash[WORKER].is_extra:
             _tell(config, "long", [item.nodeid for item in left_out])
-    durations = read_durations(work_folder(config))
+    # All workers must have the same order; another run may write new durations meanwhile.
+    durations = getattr(config, "workerinput", {}).get("durations") or read_durations(work_folder(config))
     units: dict[str, list] = {}
     for item in items:
         units.setdefault(unit_of(config.rootpath, item.nodeid), []).append(item)
@@ -223,18 +242,21 @@ class RunWorker:
         locale.setlocale(locale.LC_ALL, "")
         self._machine = open(work_folder(config) / "machine.lock", "w")
         self._shared: dict[Path, Tally] = {}
+        self._skipped_modules: list[tuple[str, str]] = []
 
     def run_rostest(self, item: Rostest) -> Tally:
         """Run a .test file, with all those of this run that share its lab when it is the first of them."""
         config, stretch = self._config, self._config.option.stretch
         if lab_of(item.path) is None:
             folder = work_folder(config) / f"{package_of(item.path, config.rootpath)}-{item.path.stem}"
-            return rostests.run(item.path, folder, self.environment, stretch=stretch)
+            with one_run(folder):
+                return rostests.run(item.path, folder, self.environment, stretch=stretch)
         if item.path not in self._shared:
             unit = unit_of(config.rootpath, item.nodeid)
             paths = [one.path for one in item.session.items if unit_of(config.rootpath, one.nodeid) == unit]
             folder = work_folder(config) / unit.replace(" ", "-")
-            self._shared.update(rostests.run_shared(paths, folder, self.environment, stretch))
+            with one_run(folder):
+                self._shared.update(rostests.run_shared(paths, folder, self.environment, stretch))
         return self._shared.pop(item.path)
 
     def _choose_files(self, number: int, cores: int):
@@ -245,6 +267,14 @@ class RunWorker:
             arguments[:] = [one for one in arguments if mostly_waits(self._config.rootpath / file_of(one))]
         begin = len(arguments) * (number % cores) // cores
         arguments[:] = arguments[begin:] + arguments[:begin]
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.skipped:
+            self._skipped_modules.append((report.nodeid, reason_of(report)))
+
+    def pytest_collection_finish(self) -> None:
+        if self._skipped_modules:
+            _tell(self._config, "modules", self._skipped_modules)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
@@ -283,12 +313,17 @@ class RunController:
     def __init__(self, config: pytest.Config) -> None:
         self._config, self._folder = config, work_folder(config)
         self._total = Tally()
+        self._durations = read_durations(self._folder)
         self._took: dict[str, list[float]] = {}
         # A folder of its own for temporary files, which is removed at the end. pytest's own folders stay for the user.
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())
         self._own_places = os.environ.get("TMPDIR"), tempfile.tempdir
         self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
         os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: WorkerController) -> None:
+        node.workerinput["durations"] = self._durations
 
     def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Producer | None) -> FileScheduling:
         return FileScheduling(config, log)
@@ -308,13 +343,14 @@ class RunController:
                 terminal.write_line(f"{report.outcome.upper()} {report.nodeid} ({report.duration:.0f} s)")
         if report.failed:
             self._total.failed += max(1, properties.get("failed", 1) if report.when == "call" else 1)
+            self._total.passed += properties.get("passed", 0) if report.when == "call" else 0
             self._total.details.append(f"{report.nodeid}\n{report.longreprtext}")
         elif report.when == "call" and report.passed:
             self._total.passed += properties.get("passed", 1)
         elif report.skipped and "skips" not in properties:
-            # (file, line, "Skipped: reason"); without a reason only "Skipped".
-            reason = report.longrepr[2] if isinstance(report.longrepr, (tuple, list)) else ""
-            self._total.skips.append((report.nodeid, reason.removeprefix("Skipped").removeprefix(": ")))
+            expected = getattr(report, "wasxfail", None)
+            reason = reason_of(report) if expected is None else f"expected to fail: {expected}"
+            self._total.skips.append((report.nodeid, reason))
         if report.when == "call":
             self._total.skips += [tuple(skip) for skip in properties.get("skips", [])]
 
@@ -329,6 +365,8 @@ class RunController:
     def take(self, told: dict) -> None:
         """The last report of a worker."""
         self._total.long = told.get("long", self._total.long)
+        # Several workers may have collected it.
+        self._total.skips += [skip for skip in map(tuple, told.get("modules", [])) if skip not in self._total.skips]
         if names := told.get("left_threads"):
             self._fail(f"after the last test, threads of a process still compute; there are: {names}")
 
@@ -349,7 +387,9 @@ class RunController:
             session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
         took = {file: round(both[0], 1) for file, both in self._took.items() if both[0] >= MIN_DURATION_S}
         text = json.dumps({**read_durations(self._folder), **took}, indent=0, sort_keys=True)
-        (self._folder / DURATIONS).write_text(text, encoding="utf-8")
+        new = self._folder / f"{DURATIONS}.{os.getpid()}"
+        new.write_text(text, encoding="utf-8")
+        new.replace(self._folder / DURATIONS)
         with (self._folder / "took.csv").open("w", encoding="utf-8") as stream:
             stream.write("seconds,processor_seconds,file\n")
             for file, both in sorted(self._took.items(), key=lambda row: -row[1][1]):
@@ -370,6 +410,7 @@ class RunController:
         else:
             os.environ["TMPDIR"] = variable
         print(summary(self._total), flush=True)
+        FINISHED.append(self._total)
 
 
 class FileScheduling(LoadScopeScheduling):
@@ -392,6 +433,22 @@ class FileScheduling(LoadScopeScheduling):
             return super()._check_nodes_have_same_collection()
         finally:
             self.registered_collections = dict(collected)
+
+    def remove_node(self, node):
+        """As xdist's, which would give back the test in which a worker died, so that it kills the next one, and tests
+        that are done, for which the next one waits forever."""
+        workload = self.assigned_work.pop(node)
+        pending = [(unit, test) for unit, tests in workload.items() for test, is_done in tests.items() if not is_done]
+        for unit, test in pending[1:]:
+            self.workqueue.setdefault(unit, {})[test] = False
+        for other in self.nodes:
+            self._reschedule(other)
+        return pending[0][1] if pending else None
+
+    def _reschedule(self, node):
+        # One that replaces a dead worker gets tests once it has collected them.
+        if node in self.registered_collections:
+            super()._reschedule(node)
 
     def _assign_work_unit(self, node):
         firsts = {unit: next(iter(tests)) for unit, tests in self.workqueue.items()}

@@ -24,7 +24,10 @@ def lab_of(path: Path) -> str | None:
     """The launch file without its tests, as text that is the same for the same lab; None where no lab is shared."""
     if not shares_its_lab(path):
         return None
-    root = ElementTree.parse(path).getroot()
+    try:
+        root = ElementTree.parse(path).getroot()
+    except ElementTree.ParseError:
+        return None  # rostest says what is wrong
     for test in root.findall("test"):
         root.remove(test)
     text = ElementTree.canonicalize(ElementTree.tostring(root, encoding="unicode"), strip_text=True)
@@ -40,7 +43,8 @@ def write(paths: list[Path], folder: Path) -> tuple[Path, list[Path]]:
     for test in launch.findall("test"):
         launch.remove(test)
     plan, limit_s = [], START_S
-    results = [folder / path.stem for path in paths]
+    # Two packages may have files of one name.
+    results = [folder / f"{number}_{path.stem}" for number, path in enumerate(paths)]
     for path, result in zip(paths, results, strict=True):
         tests = ElementTree.parse(path).getroot().findall("test")
         limit_s += PUT_BACK_S + sum(_limit_s(test) for test in tests)
@@ -63,6 +67,8 @@ def _limit_s(test: ElementTree.Element) -> float:
 
 def _planned(path: Path, test: ElementTree.Element) -> dict:
     others = sorted({part.tag for part in test if isinstance(part.tag, str)} - set(_PARAMETERS))
+    if missing := [name for name in ("test-name", "pkg", "type") if not test.get(name)]:
+        raise ValueError(f"{path}: a <test> without {' or '.join(missing)}")
     if others or test.get("ns") or test.get("retry"):
         found = ", ".join(others) or "ns or retry"
         raise ValueError(f"{path.name}: the test of a shared lab may have parameters; found: {found}")
