@@ -439,11 +439,13 @@ class FileScheduling(LoadScopeScheduling):
         that are done, for which the next one waits forever."""
         workload = self.assigned_work.pop(node)
         pending = [(unit, test) for unit, tests in workload.items() for test, is_done in tests.items() if not is_done]
+        if not pending:
+            return None
         for unit, test in pending[1:]:
             self.workqueue.setdefault(unit, {})[test] = False
         for other in self.nodes:
             self._reschedule(other)
-        return pending[0][1] if pending else None
+        return pending[0][1]
 
     def _reschedule(self, node):
         # One that replaces a dead worker gets tests once it has collected them.
