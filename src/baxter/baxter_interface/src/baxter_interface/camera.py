@@ -12,7 +12,7 @@ from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera
 
 from . import startup
 from .camera_settings import AUTO, CONTROLS, MODES, CameraSettings
-from .services import ANSWER_S, THERE_S, call_service, wait_for_service
+from .services import THERE_S, call_service, wait_for_service
 
 # So many of a physical robot's three cameras have power at a time; a simulated one may power them all.
 MAX_POWERED = 2
@@ -24,7 +24,7 @@ class UnknownCamera(AttributeError, ValueError):
     """A camera that the robot does not have, or that has no power."""
 
 
-def list_cameras(timeout_s: float = ANSWER_S) -> list[str]:
+def list_cameras(timeout_s: float | None = None) -> list[str]:
     """List the names of the cameras that have power. Raises ServiceUnavailable (an OSError and a ROSException)."""
     startup.wait_for_start([])
     return list(call_service("/cameras/list", ListCameras, timeout_s=timeout_s).cameras)

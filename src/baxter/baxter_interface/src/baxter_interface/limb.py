@@ -36,7 +36,7 @@ from .joint_checks import (
 )
 from .joint_motion import Move, is_far
 from .resets import PUT_ELSEWHERE, Resets
-from .services import ANSWER_S, call_service
+from .services import call_service
 
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
@@ -254,14 +254,14 @@ class Limb:
             ticker.sleep()
         raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
 
-    def ik(self, pose: Any, seed: Mapping[str, float] | None = None, timeout: float = ANSWER_S) -> Any:
+    def ik(self, pose: Any, seed: Mapping[str, float] | None = None, timeout: float | None = None) -> Any:
         """Ask the robot for joint angles that put the end-point at `pose`; the arm does not move.
 
         Parameters:
             pose: what endpoint_pose() returns, geometry_msgs Pose or PoseStamped, or (position, orientation) as
                 sequences x y z [m] and x y z w; in the frame `base` unless stamped with another.
             seed: dict of joint name to rad as the start of the search, for some or all joints (default: the present
-            angles). timeout: longest wait for the answer [s, wall]; for the service it is 10 s at most.
+            angles). timeout: longest wait for the service, and again for its answer [s, wall]; by default 10 and 30.
         Returns a dict of joint name to rad, as move_to_joint_positions takes it.
         Raises NoIKSolution (a ValueError); OSError with errno ETIMEDOUT if there is no service; ValueError, KeyError or
         TypeError for an invalid pose or seed.

@@ -44,13 +44,14 @@ def _services() -> list[str]:
         return []
 
 
-def call_service(name: str, kind: type, *arguments: Any, timeout_s: float = ANSWER_S) -> Any:
-    """Call the service `name` of type `kind`, and wait for its answer, `timeout_s` [s, wall] at most; before that for
-    the service, THERE_S at most.
+def call_service(name: str, kind: type, *arguments: Any, timeout_s: float | None = None) -> Any:
+    """Call the service `name` of type `kind`, waiting for it and then for its answer, `timeout_s` [s, wall] each; by
+    default THERE_S and ANSWER_S.
 
     Raises ServiceUnavailable, OSError with errno EIO if the service refused the call.
     """
-    wait_for_service(name, min(timeout_s, THERE_S))
+    there_s, answer_s = (THERE_S, ANSWER_S) if timeout_s is None else (timeout_s, timeout_s)
+    wait_for_service(name, there_s)
     answers, failures = [], []
 
     def call() -> None:
@@ -62,11 +63,11 @@ def call_service(name: str, kind: type, *arguments: Any, timeout_s: float = ANSW
     # rospy's own call has no time limit: a server that was stopped would hold its clients for ever.
     caller = threading.Thread(target=call, name="call " + name, daemon=True)
     caller.start()
-    caller.join(timeout_s)
+    caller.join(answer_s)
     if answers:
         return answers[0]
     if not failures:
-        raise ServiceUnavailable("the service %s did not answer within %.0f s" % (name, timeout_s))
+        raise ServiceUnavailable("the service %s did not answer within %.0f s" % (name, answer_s))
     if isinstance(failures[0], rospy.ServiceException):
         raise OSError(errno.EIO, "the service %s failed: %s" % (name, failures[0])) from failures[0]
     raise failures[0]
