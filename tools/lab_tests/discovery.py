@@ -60,7 +60,8 @@ def runs_in_real_time(path: Path) -> bool:
 
 def looks_at_the_whole_tree(path: Path) -> bool:
     """Whether a test file says that it reads files of all packages."""
-    return re.search(r"^pytestmark = .*\bpytest\.mark\.tree\b", path.read_text(encoding="utf-8"), re.M) is not None
+    text = path.read_text(encoding="utf-8", errors="replace")
+    return re.search(r"^pytestmark = .*\bpytest\.mark\.tree\b", text, re.M) is not None
 
 
 @dataclass
@@ -206,7 +207,7 @@ def _named(inventory: Inventory, name: str, root: Path) -> list[str]:
     if test_id and len(found) > 1:
         # Files of several packages may have one name.
         function = test_id.partition("[")[0].rpartition("::")[2]
-        found = [path for path in found if function in path.read_text(encoding="utf-8")] or found
+        found = [path for path in found if function in path.read_text(encoding="utf-8", errors="replace")] or found
     # A .test file that is called by its own name runs even if it is long, as one test does that is called so.
     return [f"{path}::rostest" if path.suffix == ".test" else f"{path}{separator}{test_id}" for path in found]
 
