@@ -58,7 +58,8 @@ STRETCH = 2.0
 MIN_FILES_FOR_WORKERS = 3
 USAGE = "./baxter.sh test [NAME…] [OPTION…] [pytest's options]"
 EXAMPLES = """\
-A NAME is a package, a test file (test_x.py, x.test), a test (test_x.py::test_one), ruff or catkin_lint. Examples:
+A NAME is a package, a folder (src/baxter), a test file (test_x.py, x.test), a test (test_x.py::test_one), ruff or
+catkin_lint. Examples:
   ./baxter.sh test                        everything but what takes minutes; what continuous integration runs
   ./baxter.sh test --changed              what changed since the last commit, and all that depends on it
   ./baxter.sh test --changed main~3       the same since that commit

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The test runner must not miss a failure: discovery, selection, counting, and left-over processes of a test."""
 
+import fcntl
 import os
 import re
 import signal
@@ -91,6 +92,14 @@ def test_files_that_are_named_twice_run_once(workspace):
 
 def test_path_selects(workspace):
     assert chosen(workspace, str(workspace / "src/beta/test/unit/test_beta.py")) == ["test_beta.py"]
+
+
+def test_a_folder_selects_what_is_below_it(workspace, monkeypatch):
+    monkeypatch.chdir(workspace)
+    assert chosen(workspace, "src/group/") == chosen(workspace, "alpha")
+    assert chosen(workspace, "./src") == chosen(workspace, "alpha", "beta", "gamma")
+    with pytest.raises(SelectionError, match="'src/copy/alpha'"):
+        chosen(workspace, "src/copy/alpha")
 
 
 def test_unknown_name_lists_the_packages(workspace):
@@ -261,8 +270,7 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, fake_rostest, monkeypatch,
     assert detail is None or detail in tally.details[0]
 
 
-@pytest.mark.parametrize(("name", "mark"), [("ahead", ""), ("in_time", "<!-- real time -->"),
-                                            ("in_time", "<!-- whole machine -->")])
+@pytest.mark.parametrize(("name", "mark"), [("ahead", ""), ("in_time", "<!-- real time -->")])
 def test_labs_run_ahead_unless_the_file_says_real_time(tmp_path, fake_rostest, name, mark):
     path = tmp_path / f"{name}.test"
     path.write_text(f"{mark}<launch/>")
@@ -376,6 +384,14 @@ def test_rounds_follow_each_other(tmp_path, words):
     (tmp_path / "test_one.py").write_text("import tempfile\ndef test_one(): tempfile.TemporaryFile().close()")
     done = run_pytest(tmp_path, *words, rounds=2)
     assert (done.returncode, done.stdout.count("1 passed, 0 failed, 0 skipped")) == (0, 2), done.stdout + done.stderr
+
+
+def test_a_run_beside_another_one_says_so(tmp_path):
+    (tmp_path / "test_one.py").write_text("def test_one(): pass")
+    assert "Another run" not in run_pytest(tmp_path, rounds=2).stdout
+    with (tmp_path / ".baxter/tests/run.lock").open("w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert "Another run" in run_pytest(tmp_path).stdout
 
 
 def test_a_worker_that_dies_fails_its_test_and_the_others_run(tmp_path):

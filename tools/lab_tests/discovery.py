@@ -48,14 +48,9 @@ def shares_its_lab(path: Path) -> bool:
     return _has_mark(path, "shared lab")
 
 
-def is_whole_machine(path: Path) -> bool:
-    """Whether a .test file must run alone, because it measures time."""
-    return _has_mark(path, "whole machine")
-
-
 def runs_in_real_time(path: Path) -> bool:
     """Whether the labs of a .test file run in real time; others run ahead (rostests.SPEED)."""
-    return is_whole_machine(path) or _has_mark(path, "real time")
+    return _has_mark(path, "real time")
 
 
 def looks_at_the_whole_tree(path: Path) -> bool:
@@ -127,9 +122,9 @@ class Selection:
 def select(inventory: Inventory, arguments: list[str], root: Path, changed: list[Path] | None = None) -> Selection:
     """The :class:`Selection` of a command line; raises SelectionError for an unknown name.
 
-    Names are packages, test files (with or without folder and suffix), pytest node ids, or a linter. Everything that
-    starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that depend on them,
-    run besides those that were named.
+    Names are packages, folders, test files (with or without folder and suffix), pytest node ids, or a linter.
+    Everything that starts with a dash goes to pytest. ``changed``: files; the tests of their packages, and of all that
+    depend on them, run besides those that were named.
     """
     names, pytest_arguments = names_and_options(arguments)
     title = ", ".join(names) if changed is None else "what has changed"
@@ -197,11 +192,16 @@ def _named(inventory: Inventory, name: str, root: Path) -> list[str]:
         return [f"{root}/{LINTERS[name]}"]
     if name in inventory.folders or name in inventory.files:
         return [str(path) for path in inventory.files.get(name, [])]
+    if "/" in name and Path(name).is_dir():
+        below = [path for path in inventory.all_files() if Path(name).resolve() in path.resolve().parents]
+        if not below:
+            raise SelectionError(f"there are no tests in the folder '{name}'")
+        return [str(path) for path in below]
     file_name, separator, test_id = name.partition("::")
     found = [path for path in inventory.all_files() if _means(file_name, path)]
     if not found:
         raise SelectionError(
-            f"'{name}' is not a package, a test file or a pytest option. "
+            f"'{name}' is not a package, a folder with a slash, a test file or a pytest option. "
             f"Packages: {', '.join(sorted(inventory.folders))}"
         )
     if test_id and len(found) > 1:

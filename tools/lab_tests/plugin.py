@@ -20,7 +20,7 @@ import random
 import resource
 import shutil
 import tempfile
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 from lab_tests import comma_locale, left_threads, rostests
-from lab_tests.discovery import WORKERS_BESIDE_CORES, is_long, is_whole_machine, mostly_waits, package_of
+from lab_tests.discovery import WORKERS_BESIDE_CORES, is_long, mostly_waits, package_of
 from lab_tests.results import Tally, summary
 from lab_tests.shared_labs import lab_of
 
@@ -214,8 +214,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         source.shuffle(order)
         for unit in order:
             source.shuffle(units[unit])
-    # Tests that need the whole machine first: later they would wait for a moment in which nothing else runs.
-    order.sort(key=lambda unit: not any(is_whole_machine(config.rootpath / file) for file in files[unit]))
     items[:] = [item for unit in order for item in units[unit]]
 
 
@@ -228,7 +226,7 @@ def _tell(config, name: str, value):
 
 
 class RunWorker:
-    """In each worker: the locale, the lock on the machine, and what each test took."""
+    """In each worker: the locale, ROS tests, and the processor's time of each test."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
@@ -240,7 +238,6 @@ class RunWorker:
         self.environment = dict(os.environ)
         os.environ.update(comma_locale.variables(LOCALE_FOLDER))
         locale.setlocale(locale.LC_ALL, "")
-        self._machine = open(work_folder(config) / "machine.lock", "w")
         self._shared: dict[Path, Tally] = {}
         self._skipped_modules: list[tuple[str, str]] = []
 
@@ -276,14 +273,9 @@ class RunWorker:
         if self._skipped_modules:
             _tell(self._config, "modules", self._skipped_modules)
 
-    @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
-        fcntl.flock(self._machine, fcntl.LOCK_EX if is_whole_machine(item.path) else fcntl.LOCK_SH)
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self) -> None:
         self._before_s = _processor_s()
-        try:
-            return (yield)
-        finally:
-            fcntl.flock(self._machine, fcntl.LOCK_UN)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_makereport(self, item: pytest.Item, call: pytest.CallInfo[None]) -> None:
@@ -299,7 +291,6 @@ class RunWorker:
         os.environ.clear()
         os.environ.update(self.environment)
         locale.setlocale(locale.LC_ALL, "")
-        self._machine.close()
 
 
 def _processor_s() -> float:
@@ -313,6 +304,12 @@ class RunController:
     def __init__(self, config: pytest.Config) -> None:
         self._config, self._folder = config, work_folder(config)
         self._total = Tally()
+        self._running = (self._folder / "run.lock").open("w")
+        try:
+            fcntl.flock(self._running, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print("Another run of tests is under way in this workspace: a ROS test that both have waits for the other.",
+                  flush=True)
         self._durations = read_durations(self._folder)
         self._took: dict[str, list[float]] = {}
         # A folder of its own for temporary files, which is removed at the end. pytest's own folders stay for the user.
@@ -404,6 +401,7 @@ class RunController:
         atexit.unregister(shutil.rmtree)
         shutil.rmtree(self._temporary, ignore_errors=True)
         # Another round may follow in this process.
+        self._running.close()
         variable, tempfile.tempdir = self._own_places
         if variable is None:
             os.environ.pop("TMPDIR")
