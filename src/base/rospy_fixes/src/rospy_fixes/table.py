@@ -38,6 +38,8 @@ FIXES = (
         "each other for ever", "", "test_signals.py"),
     Fix("rospy.topics", "closed_connections", EVERYWHERE, "a connection that ends takes the newest one with it",
         "", "test_closed_connections.py"),
+    Fix("rospy.topics", "first_messages", EVERYWHERE, "what is published as soon as a subscriber is connected is lost",
+        "", "test_first_messages.py"),
     Fix("rospy.impl.tcpros_base", "refused_connections", EVERYWHERE, "a refused subscriber waits without a word",
         "", "test_refused_connections.py"),
     Fix("rospy.impl.tcpros_pubsub", "late_subscribers", EVERYWHERE, "shutdown handlers publish to nobody that connects "
