@@ -21,7 +21,6 @@ from urllib.parse import quote
 import rosgraph
 import rospkg
 import rospy
-from tornado import netutil
 
 from baxter_conformance.reader import NO_ANSWER, read
 from baxter_model.interface import physical_robot
@@ -55,7 +54,6 @@ from lab_web.task_queue import TaskQueue
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from master_calls.simulator_start import SimulatorDied, StartWatch
-from processes import ports
 from processes.memory import return_large_blocks
 from rospy_fixes.ports.threads import lasting
 from rospy_nodes.rest import Demand
@@ -66,7 +64,7 @@ from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
 from web_bridge.errors import shown
 from web_bridge.loop_thread import LoopThread
-from web_bridge.serving import Serving, tls_context
+from web_bridge.serving import Serving, first_sockets, port_of, tls_context
 from web_bridge.session import Bridge
 from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer
 from web_bridge.websocket import Clients, SocketOptions
@@ -78,6 +76,8 @@ if TYPE_CHECKING:
     from baxter_conformance.comparison import ConformanceFinding
 
 FIRST_PORT = 8090
+# So many are tried.
+PORTS = 100
 _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
 #: while nobody needs them, and how often it is looked whether somebody does.
@@ -167,9 +167,10 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
     tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
     if tokens[0] == tokens[1]:
         raise PageFailure("--token and --view-token are the same; pages that only watch need another one")
-    port, network = _port(options), "" if options.public else "127.0.0.1"
-    # Before the node, whose name ends the page that has the port.
-    _require_free(port, network)
+    network = "" if options.public else "127.0.0.1"
+    # Before the node, whose name ends the page that has the port. Browsers that come early wait.
+    sockets = _sockets(options, network)
+    port = port_of(sockets)
     return_large_blocks()
     limit_ports()
     end_on_signals()
@@ -220,10 +221,7 @@ def serve(options: argparse.Namespace, page: Path, libraries: Path) -> None:
                                       *episode_routes(pages, equipment.episodes),
                                       *_notebook_routes(notebooks, access),
                                       (r"/snapshot", SnapshotHandler, {"server": video}))
-    try:
-        serving = Serving(loop_thread, application, port, network)
-    except OSError as error:
-        raise _no_port(port, error) from None
+    serving = Serving(loop_thread, application, port, network, sockets=sockets)
     secure = _serve_securely(loop_thread, application, port, network) if options.public else None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
         ("the robot's states", watch), *equipment.loops.items())]
@@ -356,26 +354,16 @@ def _findings() -> list[ConformanceFinding]:
     return findings_of(physical_robot(), lambda robot: read(robot, _MESSAGES_S), rosgraph.is_master_online, NO_ANSWER)
 
 
-def _port(options: argparse.Namespace) -> int:
-    if options.port is not None:
-        return options.port
+def _sockets(options: argparse.Namespace, network: str) -> list[socket.socket]:
+    """Sockets that listen on the page's port. Raises PageFailure."""
+    ports = range(FIRST_PORT, FIRST_PORT + PORTS) if options.port is None else [options.port]
     try:
-        return ports.free_port(range(FIRST_PORT, FIRST_PORT + 100))
+        return first_sockets(ports, network)
     except OSError as error:
-        raise PageFailure(error.strerror) from None
-
-
-def _require_free(port: int, network: str) -> None:
-    """Raises PageFailure where the port is taken."""
-    try:
-        for opened in netutil.bind_sockets(port, network):
-            opened.close()
-    except OSError as error:
-        raise _no_port(port, error) from None
-
-
-def _no_port(port: int, error: OSError) -> PageFailure:
-    return PageFailure("port %d cannot be opened: %s; name another one by --port" % (port, error))
+        if options.port is None:
+            raise PageFailure("no port from %d to %d is free; end a program that holds one, or name another one by "
+                              "--port" % (ports[0], ports[-1])) from None
+        raise PageFailure("port %d cannot be opened: %s; name another one by --port" % (options.port, error)) from None
 
 
 def forwarded_address(variables: Mapping[str, str], port: int) -> str:
@@ -393,7 +381,8 @@ def _serve_securely(loop_thread: LoopThread, application: Any, port: int, networ
     """The same pages by https on another port, for headsets and telephones; None where there is no certificate."""
     try:
         tls = tls_context(*certificate(kept_in(), [_host(), "localhost"]))
-        return Serving(loop_thread, application, ports.free_port(range(port + 1, port + 100)), network, tls)
+        return Serving(loop_thread, application, port, network, tls,
+                       sockets=first_sockets(range(port + 1, port + PORTS), network))
     except (CertificateError, OSError) as error:
         rospy.logwarn("no page by https, which headsets need: %s", error)
         return None

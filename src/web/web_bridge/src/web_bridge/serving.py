@@ -2,8 +2,10 @@
 """A tornado application on a port, in a LoopThread. No ROS."""
 from __future__ import annotations
 
+import errno
+import socket
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from tornado import httpserver, netutil
@@ -50,6 +52,22 @@ def listen(loop_thread: LoopThread, application: Application, endpoint: Endpoint
                 return None
 
 
+def first_sockets(ports: Iterable[int], address: str) -> list[socket.socket]:
+    """Sockets that listen on the first port that is free: nobody else can take it meanwhile. Raises OSError."""
+    error = OSError(errno.EADDRINUSE, "no port was named")
+    for port in ports:
+        try:
+            return netutil.bind_sockets(port, address)
+        except OSError as taken:
+            error = taken
+    raise error
+
+
+def port_of(sockets: list[socket.socket]) -> int:
+    """The port of sockets, where the kernel chose it."""
+    return sockets[0].getsockname()[1]
+
+
 class LimitedServer(httpserver.HTTPServer):
     """Beyond MAX_CONNECTIONS a new one closes the oldest: without descriptors, tornado's loop would try to accept
     without a pause, and connections that say nothing must not keep others out.
@@ -76,13 +94,14 @@ class LimitedServer(httpserver.HTTPServer):
 
 class Serving:
     """Listens from the constructor on; raises OSError where the port is taken. ``address``: "" is every network.
-    ``idle_s``: time for a client's request [s].
+    ``idle_s``: time for a client's request [s]; ``sockets``: those that listen already.
     """
 
     def __init__(self, loop_thread: LoopThread, application: Application, port: int, address: str,
-                 tls: ssl.SSLContext | None = None, idle_s: float = IDLE_S) -> None:
+                 tls: ssl.SSLContext | None = None, idle_s: float = IDLE_S,
+                 sockets: list[socket.socket] | None = None) -> None:
         self._loop_thread = loop_thread
-        self._sockets = netutil.bind_sockets(port, address)
+        self._sockets = netutil.bind_sockets(port, address) if sockets is None else sockets
         loop_thread.run(self._start(application, tls, idle_s))
 
     async def _start(self, application: Application, tls: ssl.SSLContext | None, idle_s: float) -> None:
@@ -92,8 +111,8 @@ class Serving:
 
     @property
     def port(self) -> int:
-        """The first port, where the kernel chose it."""
-        return self._sockets[0].getsockname()[1]
+        """The first port."""
+        return port_of(self._sockets)
 
     def url(self, endpoint: Endpoint) -> str:
         """The address for a log."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The limits for clients without a token: memory, connections, time."""
 import contextlib
+import errno
 import socket
 
 import pytest
@@ -49,6 +50,25 @@ def served():
     made = Served()
     yield made
     made.close()
+
+
+def test_the_first_free_port_is_held_from_then_on():
+    taken = serving.first_sockets([0], "127.0.0.1")
+    number = serving.port_of(taken)
+    try:
+        others = serving.first_sockets([number, 0], "127.0.0.1")
+        assert serving.port_of(others) != number
+        others[0].close()
+        with pytest.raises(OSError) as refused:
+            serving.first_sockets([number], "127.0.0.1")
+        assert refused.value.errno == errno.EADDRINUSE
+    finally:
+        taken[0].close()
+    loop = LoopThread()
+    made = serving.Serving(loop, web.Application([]), 1, "", sockets=serving.first_sockets([number], "127.0.0.1"))
+    assert made.port == number
+    made.close()
+    loop.stop()
 
 
 def test_a_large_body_is_refused_before_it_is_read(served):
