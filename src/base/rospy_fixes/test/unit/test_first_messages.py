@@ -72,8 +72,9 @@ publisher.impl.close()
 
 
 def said(program):
-    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=DEADLINE_S,
-                          env={**os.environ, "PYTHONPATH": "%s:%s" % (OURS, os.environ.get("PYTHONPATH", ""))})
+    environment = {**os.environ, "PYTHONPATH": "%s:%s" % (OURS, os.environ.get("PYTHONPATH", ""))}
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True,
+                          timeout=DEADLINE_S, env=environment)
     assert done.stderr == ""
     return done.stdout.splitlines()
 

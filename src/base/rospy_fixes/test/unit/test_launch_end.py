@@ -25,7 +25,8 @@ NODES = {"node": "#!/bin/sh\nexec sleep 600\n", "deaf": "#!/bin/sh\ntrap '' INT\
          "python": "#!/usr/bin/env python3\nimport os\nos.execlp('sleep', 'sleep', '600')\n",
          "short": "#!/bin/sh\nexit 3\n"}
 # A program in Python that Ctrl-C interrupts says so itself.
-INTERRUPTED_STUB = re.compile(r'Traceback \(most recent call last\):\n  File "\S*/stubs/python".*?\nKeyboardInterrupt\n', re.S)
+INTERRUPTED_STUB = re.compile(r'Traceback \(most recent call last\):\n  File "\S*/stubs/python".*?'
+                              r'\nKeyboardInterrupt\n', re.S)
 # Loads a launch file once, and runs it once for each of `cases`, in a separate process: `sign` comes at the `moment`-th
 # call of a Python function in the start of the processes (None: once all of them run), and once more 50 calls later.
 # Prints for each case how it ended, the calls that there were and what it wrote.

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 ACTION = "/move_group"
 RESULT_TOPIC, RESULT_TYPE = ACTION + "/result", "moveit_msgs/MoveGroupActionResult"
 PLANNING_S = 5.0
-# Until its connections are there; until it must have answered [s, wall time: the simulation may be paused]. Both may take
-# long on a busy machine, and the user can stop the planning.
+# Until its connections are there; until it must have answered [s, wall time: the simulation may be paused]. Both
+# may take long on a busy machine, and the user can stop the planning.
 _CONNECT_S, _ANSWER_S = 15.0, 12.0 * PLANNING_S
 # A goal is met within this [rad].
 _NEAR_RAD = 1e-3
