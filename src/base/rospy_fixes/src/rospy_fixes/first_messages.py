@@ -21,7 +21,8 @@ LONGEST_S = 1.0
 def amend(topics: Any) -> None:
     """Make the publishers of rospy.topics answer a subscriber and note its connection in one step."""
     taking = threading.local()
-    take = TCPROSHandler.topic_connection_handler
+    handler: Any = TCPROSHandler
+    take = handler.topic_connection_handler
     write, add = TCPROSTransport.write_header, topics._TopicImpl.add_connection
 
     @functools.wraps(take)
@@ -44,8 +45,8 @@ def amend(topics: Any) -> None:
             return add(self, connection)
         taking.now = False
         # What is published waits for this lock. Listeners of the topic, which may wait for others, are told without it.
-        lock = self.publock
-        is_held = lock is not None and lock.acquire(timeout=LONGEST_S)
+        lock = self.publock or threading.RLock()  # a topic that has ended has none
+        is_held = lock.acquire(timeout=LONGEST_S)
         try:
             write(getattr(connection, "_connection", connection))  # without the publisher's queue
             return add(self, connection)
@@ -56,5 +57,5 @@ def amend(topics: Any) -> None:
             if is_held:
                 lock.release()
 
-    TCPROSHandler.topic_connection_handler = topic_connection_handler
+    handler.topic_connection_handler = topic_connection_handler
     TCPROSTransport.write_header, topics._TopicImpl.add_connection = write_header, add_connection
