@@ -44,7 +44,12 @@ def amend(topics: Any) -> None:
         if not getattr(taking, "now", False):
             return add(self, connection)
         taking.now = False
-        # What is published waits for this lock. Listeners of the topic, which may wait for others, are told without it.
+        # What is published waits for this lock. Listeners of the topic, which may wait for others, are told without it:
+        # connections that this one would end, end before.
+        for other in self.connections:
+            if other.endpoint_id == connection.endpoint_id:
+                other.close()
+        self.check()
         lock = self.publock or threading.RLock()  # a topic that has ended has none
         is_held = lock.acquire(timeout=LONGEST_S)
         try:

@@ -70,6 +70,33 @@ writer.join()
 publisher.impl.close()
 """
 
+# A listener that waits for a thread which publishes, when a connection ends and when one begins.
+REPLACED = """
+import socket, threading
+import rospy
+from rospy.impl import tcpros_pubsub
+from std_msgs.msg import String
+rospy.core.set_initialized(True)
+class Listener(rospy.SubscribeListener):
+    def wait(self, text):
+        thread = threading.Thread(target=publisher.publish, args=(text,), daemon=True)
+        thread.start()
+        thread.join(20.0)
+        print(text, thread.is_alive(), flush=True)
+    def peer_subscribe(self, topic, to_all, to_one):
+        self.wait("begins")
+    def peer_unsubscribe(self, topic, left):
+        self.wait("ends")
+publisher = rospy.Publisher("/t", String, Listener(), queue_size=10)
+pairs = [socket.socketpair(), socket.socketpair()]
+for ours, theirs in pairs:
+    header = {"topic": "/t", "md5sum": String._md5sum, "callerid": "/listener"}
+    tcpros_pubsub.TCPROSHandler().topic_connection_handler(theirs, ("", 0), header)
+print(publisher.get_num_connections(), flush=True)
+import os
+os._exit(0)  # a listener waits at the end, too
+"""
+
 
 def said(program):
     environment = {**os.environ, "PYTHONPATH": "%s:%s" % (OURS, os.environ.get("PYTHONPATH", ""))}
@@ -86,3 +113,7 @@ def test_the_first_message_after_the_answer_arrives():
 
 def test_a_subscriber_that_has_gone_leaves_no_thread_and_a_message_that_is_stuck_lets_others_connect():
     assert said(GONE_AND_STUCK) == ["BrokenPipeError", "0 []", "None", "1 True"]
+
+
+def test_a_listener_may_wait_for_a_message_to_be_published():
+    assert said(REPLACED) == ["begins False", "ends False", "begins False", "1"]
