@@ -386,6 +386,14 @@ def test_rounds_follow_each_other(tmp_path, words):
     assert (done.returncode, done.stdout.count("1 passed, 0 failed, 0 skipped")) == (0, 2), done.stdout + done.stderr
 
 
+@pytest.mark.parametrize("words", [[], ["-n3", "--dist=loadscope"]], ids=["one process", "workers"])
+def test_a_wrong_expression_is_named(tmp_path, words):
+    (tmp_path / "test_one.py").write_text("def test_one(): pass")
+    done = run_pytest(tmp_path, "-k", "one and", *words)
+    assert done.returncode == 4 and "'-k': one and" in done.stdout and "test_one.py" not in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("0 passed, 1 failed")
+
+
 def test_a_run_beside_another_one_says_so(tmp_path):
     (tmp_path / "test_one.py").write_text("def test_one(): pass")
     assert "Another run" not in run_pytest(tmp_path, rounds=2).stdout

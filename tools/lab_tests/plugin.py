@@ -318,6 +318,16 @@ class RunController:
         self._temporary = Path(tempfile.mkdtemp(prefix="lab_tests_"))
         os.environ["TMPDIR"] = tempfile.tempdir = str(self._temporary)
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionstart(self) -> None:
+        # Workers would not say what is wrong in an expression of -k or -m.
+        marks: Any = self._config.pluginmanager.get_plugin("mark")
+        try:
+            marks.pytest_collection_modifyitems([], self._config)
+        except pytest.UsageError as error:
+            self._fail(str(error))
+            raise
+
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: WorkerController) -> None:
         node.workerinput["durations"] = self._durations
