@@ -7,6 +7,7 @@ of a goal that it sent at once was published to nobody.
 """
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
 from typing import Any
@@ -48,7 +49,8 @@ def amend(topics: Any) -> None:
         # connections that this one would end, end before.
         for other in self.connections:
             if other.endpoint_id == connection.endpoint_id:
-                other.close()
+                with contextlib.suppress(Exception):  # as closed_connections: a listener's error keeps nobody out
+                    other.close()
         self.check()
         lock = self.publock or threading.RLock()  # a topic that has ended has none
         is_held = lock.acquire(timeout=LONGEST_S)

@@ -87,6 +87,7 @@ class Listener(rospy.SubscribeListener):
         self.wait("begins")
     def peer_unsubscribe(self, topic, left):
         self.wait("ends")
+        raise ValueError("a listener's error")
 publisher = rospy.Publisher("/t", String, Listener(), queue_size=10)
 pairs = [socket.socketpair(), socket.socketpair()]
 for ours, theirs in pairs:
@@ -115,5 +116,5 @@ def test_a_subscriber_that_has_gone_leaves_no_thread_and_a_message_that_is_stuck
     assert said(GONE_AND_STUCK) == ["BrokenPipeError", "0 []", "None", "1 True"]
 
 
-def test_a_listener_may_wait_for_a_message_to_be_published():
+def test_a_listener_may_wait_for_a_message_to_be_published_and_fail():
     assert said(REPLACED) == ["begins False", "ends False", "begins False", "1"]

@@ -361,8 +361,8 @@ def _sockets(options: argparse.Namespace, network: str) -> list[socket.socket]:
         return first_sockets(ports, network)
     except OSError as error:
         if options.port is None:
-            raise PageFailure("no port from %d to %d is free; end a program that holds one, or name another one by "
-                              "--port" % (ports[0], ports[-1])) from None
+            raise PageFailure("no port from %d to %d can be opened: %s; end a program that holds one, or name another "
+                              "one by --port" % (ports[0], ports[-1], error)) from None
         raise PageFailure("port %d cannot be opened: %s; name another one by --port" % (options.port, error)) from None
 
 
